@@ -1,0 +1,35 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from kinfmu.drivers.constant_speed import ConstantSpeed
+from kinfmu.drivers.driver import Driver
+from kinfmu.drivers.law import Law
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import BodyName, Placement
+from kinfmu.units import Quantity
+
+
+@dataclass(frozen=True)
+class Angle(Driver):
+    """The angle of a body, driven: a crank turned by a motor on the ground.
+
+        Phi = phi_i - u(t)        (1 row)
+
+    of: the body; law: u(t) [rad]. Haug (1989), driving constraints.
+    """
+
+    type: ClassVar[str] = "angle"
+    noun: ClassVar[str] = "angle"
+    quantity: ClassVar[Quantity] = Quantity("angle")
+
+    name: str
+    of: BodyName
+    law: Law = field(default_factory=ConstantSpeed)
+
+    def bodies(self) -> tuple[str, ...]:
+        return (self.of,)
+
+    def measure(self, at: Placement) -> Value:
+        return at.angle(self.of)

@@ -1,0 +1,41 @@
+"""The contract of a driver: a constraint row whose target moves."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from kinfmu.drivers.law import Law
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Placement
+from kinfmu.units import Quantity
+
+
+class Driver(ABC):
+    """One driving row Phi(q, t) = measured quantity - u(t) = 0.
+
+    A leaf is a frozen dataclass with fields `name`, its own keys, and last `law`. `noun` names the input of an FMU:
+    a driver `crank` with noun `angle` has the inputs `crank_angle`, `crank_speed` and `crank_acceleration`.
+    """
+
+    type: ClassVar[str]
+    noun: ClassVar[str]
+    quantity: ClassVar[Quantity]
+    name: str
+    law: Law
+
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that the row touches, ground included."""
+
+    @abstractmethod
+    def measure(self, at: Placement) -> Value:
+        """The driven quantity in a pose."""
+
+    def residual(self, at: Placement, target: Value) -> Value:
+        """Phi of the driving row for a target u."""
+        return self.measure(at) - target
+
+    def inputs(self) -> tuple[str, str, str]:
+        """Names of the inputs for value, speed and acceleration."""
+        return f"{self.name}_{self.noun}", f"{self.name}_speed", f"{self.name}_acceleration"

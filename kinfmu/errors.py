@@ -1,0 +1,83 @@
+"""Everything that kinfmu raises on purpose.
+
+    KinfmuError
+    |-- MechanismError          the mechanism as written cannot be used: file, table, key and what would be valid
+    |   |-- InconsistentError   a constraint contradicts the others: the gap says by how much
+    |   |-- MobilityError       drivers and degrees of freedom do not match
+    |-- AssemblyError           the bodies cannot be put together near the start pose
+    |   |-- AmbiguousStartError the start pose lies where branches cross and nothing says which one is meant
+    |-- PoseError               a sample that cannot be reached, or where the solver gave up
+    |-- FmuError                building or stepping an FMU
+    |-- LogError                writing or reading a log
+    |-- MissingPackageError     an optional package is not installed
+
+Each message is one line that names the thing, the value and what would be valid; the data stay on the exception.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class KinfmuError(Exception):
+    """Root of all errors raised on purpose; keyword arguments stay on the exception as attributes."""
+
+    def __init__(self, message: str, **data: object) -> None:
+        super().__init__(message)
+        self.data = data
+
+    def __getattr__(self, name: str) -> object:
+        data = self.__dict__.get("data", {})
+        if name in data:
+            return data[name]
+        raise AttributeError(name)
+
+
+class MechanismError(KinfmuError):
+    """The mechanism as written cannot be used."""
+
+
+class InconsistentError(MechanismError):
+    """A constraint contradicts the others; `gap` is by how much, as a length."""
+
+
+class MobilityError(MechanismError):
+    """Drivers and degrees of freedom do not match."""
+
+
+class AssemblyError(KinfmuError):
+    """The bodies cannot be put together near the start pose."""
+
+
+class AmbiguousStartError(AssemblyError):
+    """The start pose lies where branches cross and nothing says which one is meant."""
+
+
+class PoseError(KinfmuError):
+    """A sample that cannot be reached, or where the solver gave up."""
+
+
+class FmuError(KinfmuError):
+    """Building or stepping an FMU failed."""
+
+
+class LogError(KinfmuError):
+    """Writing or reading a log failed."""
+
+
+class MissingPackageError(KinfmuError):
+    """An optional package is not installed."""
+
+
+def listed(names: Iterable[str]) -> str:
+    """`a, b, c`, or `none`: how messages list what would be valid."""
+    return ", ".join(names) or "none"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """`; did you mean 'coupler'?` when something known is close to `word`, else nothing."""
+    import difflib
+
+    known = list(known)
+    near = difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
+    return f"; did you mean '{near[0]}'?" if near else ""

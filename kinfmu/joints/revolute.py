@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Joint, Placement, PointPair, body_of
+
+
+@dataclass(frozen=True)
+class Revolute(Joint):
+    """A pin: one point of each body, kept together.
+
+        Phi = r_j + A_j s_b - r_i - A_i s_a        (2 rows, scale 1)
+
+    between: the two points 'body.point', s_a and s_b in their bodies' frames. Haug (1989), revolute joint.
+    """
+
+    type: ClassVar[str] = "revolute"
+    labels: ClassVar[tuple[str, ...]] = ("x", "y")
+
+    name: str
+    between: PointPair
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(body_of(point) for point in self.between)
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        a_x, a_y = at.point(self.between[0])
+        b_x, b_y = at.point(self.between[1])
+        return b_x - a_x, b_y - a_y

@@ -1,0 +1,8 @@
+"""What the engineer writes: bodies, points, joints and drivers, in Python or as a TOML file."""
+
+from __future__ import annotations
+
+from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+
+__all__ = ["Body", "Mechanism", "Point", "RunSettings", "Start"]

@@ -1,0 +1,50 @@
+"""Bodies and their points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+GROUND_NAME = "ground"
+
+
+class Point(NamedTuple):
+    """A point fixed in a body: its coordinates s = (s_x, s_y) in the body's frame [length]."""
+
+    x: float
+    y: float
+
+
+class Start(NamedTuple):
+    """A rough pose from which assembly starts; what is None is left to assembly."""
+
+    x: float | None = None
+    y: float | None = None
+    phi: float | None = None  # [rad]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body with named points in its own frame.
+
+    points: name -> (s_x, s_y) [length]; start: rough pose (x, y, phi) of the frame, each may be None. The body named
+    `ground` does not move: its frame is the world's.
+    """
+
+    name: str
+    points: Mapping[str, Point] = field(default_factory=dict)
+    start: Start = Start()
+
+    def __post_init__(self) -> None:
+        points = {name: Point(float(x), float(y)) for name, (x, y) in self.points.items()}
+        object.__setattr__(self, "points", MappingProxyType(points))
+        object.__setattr__(self, "start", Start(*self.start))
+
+    @property
+    def is_ground(self) -> bool:
+        return self.name == GROUND_NAME
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self.points.items()), self.start))

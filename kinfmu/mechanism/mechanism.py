@@ -1,0 +1,197 @@
+"""Mechanism: what the engineer writes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import get_type_hints
+
+from kinfmu.drivers import Driver
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.joints import Joint
+from kinfmu.joints.joint import Reference
+from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.units import METRES
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+COORDINATES = ("x", "y", "phi")
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """The run that a mechanism is meant for: from start to stop in communication steps, all [s]."""
+
+    start: float = 0.0
+    stop: float = 1.0
+    step: float = 0.01
+
+    def __post_init__(self) -> None:
+        for key in ("start", "stop", "step"):
+            if not math.isfinite(getattr(self, key)):
+                raise MechanismError(f"[run] {key} = {getattr(self, key)!r} must be a finite number of seconds")
+        if self.step <= 0.0:
+            raise MechanismError(f"[run] step = {self.step!r} must be positive")
+        if self.stop < self.start:
+            raise MechanismError(f"[run] stop = {self.stop!r} lies before start = {self.start!r}")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A planar mechanism: bodies, the joints between them, and the drivers that move it.
+
+    points: points of interest, name -> 'body.point'; coordinates: which generalized coordinates q holds: 'moving'
+    (without those that a joint fixes to a constant), 'all', or names such as 'coupler.x' in the wanted order.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...] = ()
+    drivers: tuple[Driver, ...] = ()
+    points: Mapping[str, str] = field(default_factory=dict)
+    coordinates: str | tuple[str, ...] = "moving"
+    run: RunSettings = RunSettings()
+    length_unit: str = "m"
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("bodies", "joints", "drivers"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))
+        if not isinstance(self.coordinates, str):
+            object.__setattr__(self, "coordinates", tuple(self.coordinates))
+        if not any(body.is_ground for body in self.bodies):
+            object.__setattr__(self, "bodies", (Body(GROUND_NAME), *self.bodies))
+        object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
+        _check(self)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.bodies, self.joints, self.drivers, tuple(self.points.items()), self.coordinates))
+
+    @property
+    def moving_bodies(self) -> tuple[Body, ...]:
+        """Bodies other than the ground, in file order."""
+        return tuple(body for body in self.bodies if not body.is_ground)
+
+    @property
+    def body_points(self) -> dict[str, tuple[float, float]]:
+        """Body-fixed coordinates of every point, by 'body.point'."""
+        return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """All generalized coordinates x, y, phi of the moving bodies, in file order."""
+        return tuple(f"{body.name}.{c}" for body in self.moving_bodies for c in COORDINATES)
+
+
+def _check(mechanism: Mechanism) -> None:
+    """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
+    if mechanism.length_unit not in METRES:
+        raise MechanismError(
+            f"[units] length = '{mechanism.length_unit}' is not a unit of length; known: {listed(METRES)}"
+        )
+    if not _NAME.match(mechanism.name):
+        raise MechanismError(f"name = '{mechanism.name}' must be letters, digits and underscores, no digit first")
+    tables: dict[str, Iterable[Body | Joint | Driver]] = {
+        "bodies": mechanism.bodies,
+        "joints": mechanism.joints,
+        "drivers": mechanism.drivers,
+    }
+    for table, members in tables.items():
+        _check_names(table, [member.name for member in members])
+    _check_names("points", mechanism.points)
+    if not mechanism.moving_bodies:
+        raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
+    for body in mechanism.bodies:
+        _check_numbers(body)
+    points = mechanism.body_points
+    for member in (*mechanism.joints, *mechanism.drivers):
+        _check_references(mechanism, member, points)
+    for name, target in mechanism.points.items():
+        _check_point(mechanism, f"[points] {name}", target)
+        if any(name == body.name for body in mechanism.bodies):
+            raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would mean two things")
+    if isinstance(mechanism.coordinates, str):
+        if mechanism.coordinates not in ("moving", "all"):
+            raise MechanismError(
+                f"[outputs] coordinates = '{mechanism.coordinates}' must be 'moving', 'all' or a list of names"
+            )
+    else:
+        known = mechanism.coordinate_names
+        for name in mechanism.coordinates:
+            if name not in known:
+                raise MechanismError(
+                    f"[outputs] coordinates: '{name}' is no coordinate of this mechanism{suggestion(name, known)}; "
+                    f"coordinates: {listed(known)}"
+                )
+        if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
+            raise MechanismError("[outputs] coordinates names a coordinate twice")
+
+
+def _check_names(table: str, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if not _NAME.match(name):
+            raise MechanismError(f"[{table}] '{name}' must be letters, digits and underscores, no digit first")
+        if name in seen:
+            raise MechanismError(f"[{table}] '{name}' is there twice")
+        seen.add(name)
+
+
+def _check_numbers(body: Body) -> None:
+    for name, point in body.points.items():
+        if not _NAME.match(name):
+            raise MechanismError(f"[bodies.{body.name}] points: '{name}' must be letters, digits and underscores")
+        if not all(map(math.isfinite, point)):
+            raise MechanismError(f"[bodies.{body.name}] points.{name} = {list(point)} must be two finite numbers")
+    for key, value in body.start._asdict().items():
+        if value is not None and not math.isfinite(value):
+            raise MechanismError(f"[bodies.{body.name}] start.{key} = {value!r} must be a finite number")
+    if body.is_ground and any(value is not None for value in body.start):
+        raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
+
+
+def _check_references(mechanism: Mechanism, member: Joint | Driver, points: Mapping[str, object]) -> None:
+    table = "joints" if isinstance(member, Joint) else "drivers"
+    hints = get_type_hints(type(member), include_extras=True)
+    for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+        where, value = f"[{table}.{member.name}] {key.name}", getattr(member, key.name)
+        for reference in getattr(hints[key.name], "__metadata__", ()):
+            if not isinstance(reference, Reference):
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            for one in values:
+                if reference.kind == "point":
+                    _check_point(mechanism, where, one)
+                elif reference.kind == "body":
+                    _check_body(mechanism, where, one)
+                elif one not in reference.choices:
+                    raise MechanismError(f"{where} = '{one}' must be one of {listed(reference.choices)}")
+        if isinstance(value, float | int) and not math.isfinite(value):
+            raise MechanismError(f"{where} = {value!r} must be a finite number")
+    bodies = member.bodies()
+    if len(bodies) > 1 and len(set(bodies)) == 1:
+        raise MechanismError(f"[{table}.{member.name}] joins body '{bodies[0]}' to itself")
+    if set(bodies) == {GROUND_NAME}:
+        raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
+
+
+def _check_body(mechanism: Mechanism, where: str, name: str) -> None:
+    names = [body.name for body in mechanism.bodies]
+    if name not in names:
+        raise MechanismError(
+            f"{where}: body '{name}' is not in the mechanism{suggestion(name, names)}; bodies: {listed(names)}"
+        )
+
+
+def _check_point(mechanism: Mechanism, where: str, name: str) -> None:
+    body_name, dot, point = name.partition(".")
+    if not dot:
+        raise MechanismError(f"{where} = '{name}' must be 'body.point'")
+    _check_body(mechanism, where, body_name)
+    known = next(body for body in mechanism.bodies if body.name == body_name).points
+    if point not in known:
+        raise MechanismError(
+            f"{where}: body '{body_name}' has no point '{point}'{suggestion(point, known)}; its points: {listed(known)}"
+        )

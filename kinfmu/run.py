@@ -1,0 +1,134 @@
+"""Run: the result of a solve or of a simulation, with named columns, units and a status for every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.errors import KinfmuError, suggestion
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.solve.status import Status
+from kinfmu.units import unit_of
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class Column(NamedTuple):
+    """One column of a run."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]  # (n,)
+
+
+class Event(NamedTuple):
+    """Something that happened at a time of a run, such as a pose that could not be reached."""
+
+    t: float
+    level: str  # "info", "warning" or "error"
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """n samples of a mechanism's motion.
+
+    t: (n,) [s]. outputs: names of the m output coordinates, first the generalized coordinates q, then the points of
+    interest; values, rates, accelerations: (n, m) in the mechanism's unit of length, rad and s. fixed: coordinates that
+    a joint holds at a constant. inputs: (n, 3 d): value, speed and acceleration of each driver. status, iterations:
+    (n,); residual: (n,) largest residual relative to the mechanism's size; margin: (n,) 1 / condition; error: (n, 3)
+    estimated error of q, qd, qdd; watch: (n, w) residual of the rows set aside as redundant, relative to the size.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations.
+    """
+
+    t: FloatArray
+    outputs: tuple[str, ...]
+    coordinate_count: int  # how many of the outputs are generalized coordinates
+    values: FloatArray
+    rates: FloatArray
+    accelerations: FloatArray
+    fixed: Mapping[str, float]
+    input_names: tuple[str, ...]
+    inputs: FloatArray
+    status: IntArray
+    iterations: IntArray
+    residual: FloatArray
+    margin: FloatArray
+    error: FloatArray
+    watch_names: tuple[str, ...]
+    watch: FloatArray
+    length_unit: str = "m"
+    mechanism_text: str = ""  # the mechanism as TOML
+    info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
+    events: tuple[Event, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the generalized coordinates, the columns of q."""
+        return self.outputs[: self.coordinate_count]
+
+    @property
+    def q(self) -> FloatArray:
+        """Generalized coordinates, (n, len(names))."""
+        return self.values[:, : self.coordinate_count]
+
+    @property
+    def qd(self) -> FloatArray:
+        """Velocities of the generalized coordinates."""
+        return self.rates[:, : self.coordinate_count]
+
+    @property
+    def qdd(self) -> FloatArray:
+        """Accelerations of the generalized coordinates."""
+        return self.accelerations[:, : self.coordinate_count]
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """(n,) True where the sample holds numbers (status 0 to 2)."""
+        return np.asarray(self.status <= Status.BRIDGED)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def columns(self) -> Iterator[Column]:
+        """Every column in file order: time, inputs, values, rates, accelerations, diagnostics, watches."""
+        yield Column("time", "s", self.t)
+        for k, name in enumerate(self.input_names):
+            yield Column(name, self.input_unit(name), self.inputs[:, k])
+        for order, table in enumerate((self.values, self.rates, self.accelerations)):
+            for k, name in enumerate(self.outputs):
+                unit = unit_of(quantity_of(name, order), self.length_unit)
+                yield Column(derivative_name(name, order), unit, table[:, k])
+        yield Column("solver.status", "1", self.status)
+        yield Column("solver.residual", "1", self.residual)
+        yield Column("solver.iterations", "1", self.iterations)
+        yield Column("solver.margin", "1", self.margin)
+        for k, name in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
+            yield Column(name, "1", self.error[:, k])
+        for k, name in enumerate(self.watch_names):
+            yield Column(f"watch.{name}", "1", self.watch[:, k])
+
+    def input_unit(self, name: str) -> str:
+        """Unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
+        first = self.input_names[self.input_names.index(name) // 3 * 3]
+        kind = "angle" if first.endswith("_angle") else "length"
+        order = ("speed", "acceleration").index(name.rpartition("_")[2]) + 1 if name != first else 0
+        return unit_of(quantity_of(".phi" if kind == "angle" else ".x", order), self.length_unit)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The column of that name, (n,); a fixed coordinate is a column of its constant, its rates are zero."""
+        names = []
+        for column in self.columns():
+            if column.name == name:
+                return column.values
+            names.append(column.name)
+        for fixed, value in self.fixed.items():
+            for order in range(3):
+                if name == derivative_name(fixed, order):
+                    return np.full(len(self.t), value if order == 0 else 0.0)
+        raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")
