@@ -1,0 +1,277 @@
+"""Mechanism files: TOML to Mechanism and back. Messages name the file, the table, the key and what would be valid."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from kinfmu.drivers import DRIVERS, LAWS, Driver
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.joints import JOINTS, Joint
+from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.units import METRES, Quantity, factors
+
+LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
+_TABLES = ("name", "title", "units", "run", "bodies", "joints", "drivers", "points", "outputs")
+_ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
+
+
+def read(path: str | Path) -> Mechanism:
+    """The mechanism that a TOML file describes; MechanismError names the file, the table and the key at fault."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise MechanismError(f"{path}: {path.stat().st_size} bytes is no mechanism file (largest: {LARGEST_FILE})")
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
+    except OSError as error:
+        raise MechanismError(f"{path}: cannot be read ({error.strerror})") from None
+    return parse(text, str(path))
+
+
+def parse(text: str, where: str = "mechanism") -> Mechanism:
+    """The mechanism that TOML text describes; `where` names the text in messages."""
+    try:
+        return _mechanism(tomllib.loads(text.replace("\r\n", "\n")))
+    except tomllib.TOMLDecodeError as error:
+        raise MechanismError(f"{where}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
+    except MechanismError as error:
+        raise type(error)(f"{where}: {error}", **error.data) from None
+
+
+def _mechanism(document: dict[str, Any]) -> Mechanism:
+    _known_keys("", document, _TABLES)
+    units = _table(document, "units")
+    _known_keys("[units]", units, ("length",))
+    unit = _text("[units] length", units.get("length", "m"))
+    outputs = _table(document, "outputs")
+    _known_keys("[outputs]", outputs, ("coordinates",))
+    coordinates = outputs.get("coordinates", "moving")
+    if isinstance(coordinates, list):
+        coordinates = tuple(_text("[outputs] coordinates", name) for name in coordinates)
+    elif not isinstance(coordinates, str):
+        raise MechanismError(f"[outputs] coordinates = {coordinates!r} must be 'moving', 'all' or a list of names")
+    if "name" not in document:
+        raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
+    reader = _Reader(_checked_unit(unit))
+    return Mechanism(
+        name=_text("name", document["name"]),
+        title=_text("title", document.get("title", "")),
+        length_unit=unit,
+        bodies=tuple(reader.body(name, body) for name, body in _tables(document, "bodies")),
+        joints=tuple(reader.joint(name, joint) for name, joint in _tables(document, "joints")),
+        drivers=tuple(reader.driver(name, driver) for name, driver in _tables(document, "drivers")),
+        points={name: _text(f"[points] {name}", target) for name, target in _table(document, "points").items()},
+        coordinates=coordinates,
+        run=reader.run(_table(document, "run")),
+    )
+
+
+def _checked_unit(unit: str) -> str:
+    """The unit itself if it is one of length; Mechanism repeats this check for mechanisms written in Python."""
+    if unit not in METRES:
+        raise MechanismError(f"[units] length = '{unit}' is not a unit of length; known: {listed(METRES)}")
+    return unit
+
+
+class _Reader:
+    """Reads tables whose numbers may carry units."""
+
+    def __init__(self, length_unit: str) -> None:
+        self.length_unit = length_unit
+
+    def number(self, where: str, value: object, quantity: Quantity) -> float:
+        """A number, or text such as '60 deg' with a unit of that quantity."""
+        known = factors(quantity, self.length_unit)
+        if isinstance(value, str):
+            digits, _, unit = value.strip().partition(" ")
+            try:
+                number = float(digits)
+            except ValueError:
+                valid = f"a number or text such as '{_example(quantity)}'" if known else "a number"
+                raise MechanismError(f"{where} = '{value}' must be {valid}") from None
+            unit = unit.strip()
+            if unit not in known:
+                raise MechanismError(f"{where} = '{value}': unit '{unit}' must be one of {listed(known)}")
+            number *= known[unit]
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            try:
+                number = float(value)
+            except OverflowError:
+                number = math.inf
+        else:
+            raise MechanismError(f"{where} = {value!r} must be a number")
+        if not math.isfinite(number):
+            raise MechanismError(f"{where} = {value!r} must be a finite number")
+        return number
+
+    def body(self, name: str, table: Mapping[str, Any]) -> Body:
+        where = f"[bodies.{name}]"
+        _known_keys(where, table, ("points", "start"))
+        points = {}
+        for point, value in _subtable(where, table, "points").items():
+            if not isinstance(value, list) or len(value) != 2:
+                raise MechanismError(f"{where} points.{point} = {value!r} must be two numbers [x, y]")
+            points[point] = Point(*(self.number(f"{where} points.{point}", v, _LENGTH) for v in value))
+        start = _subtable(where, table, "start")
+        _known_keys(f"{where} start", start, ("x", "y", "phi"))
+        quantities = {"x": _LENGTH, "y": _LENGTH, "phi": _ANGLE}
+        return Body(
+            name, points, Start(**{k: self.number(f"{where} start.{k}", v, quantities[k]) for k, v in start.items()})
+        )
+
+    def joint(self, name: str, table: Mapping[str, Any]) -> Joint:
+        where = f"[joints.{name}]"
+        cls = _chosen(where, table, "type", JOINTS)
+        _known_keys(where, table, ("type", *_keys(cls)))
+        return _built(where, cls, {"name": name, **self.values(where, cls, table)})
+
+    def driver(self, name: str, table: Mapping[str, Any]) -> Driver:
+        where = f"[drivers.{name}]"
+        cls = _chosen(where, table, "type", DRIVERS)
+        law = _chosen(where, table, "law", LAWS)
+        own = [key for key in _keys(cls) if key != "law"]
+        _known_keys(where, table, ("type", "law", *own, *_keys(law)))
+        constants = {
+            key: self.number(f"{where} {key}", table[key], Quantity(cls.quantity.kind, order))
+            for key, order in law.orders.items()
+            if key in table
+        }
+        values = {"name": name, "law": _built(where, law, constants), **self.values(where, cls, table, skip=("law",))}
+        return _built(where, cls, values)
+
+    def run(self, table: Mapping[str, Any]) -> RunSettings:
+        _known_keys("[run]", table, ("start", "stop", "step"))
+        return RunSettings(**{key: self.number(f"[run] {key}", value, _TIME) for key, value in table.items()})
+
+    def values(self, where: str, cls: type, table: Mapping[str, Any], skip: Iterable[str] = ()) -> dict[str, Any]:
+        """Fields of a joint or driver from its table, each read as its annotation says."""
+        hints = get_type_hints(cls, include_extras=True)
+        values: dict[str, Any] = {}
+        for key in fields(cls):
+            if key.name == "name" or key.name in skip:
+                continue
+            if key.name not in table:
+                if key.default is MISSING and key.default_factory is MISSING:
+                    raise MechanismError(f"{where} needs the key '{key.name}'; keys: {listed(_keys(cls))}")
+                continue
+            value, spot = table[key.name], f"{where} {key.name}"
+            quantity = next((m for m in getattr(hints[key.name], "__metadata__", ()) if isinstance(m, Quantity)), None)
+            if quantity is not None:
+                values[key.name] = self.number(spot, value, quantity)
+            elif getattr(hints[key.name], "__origin__", None) is str:
+                values[key.name] = _text(spot, value)
+            else:
+                if not isinstance(value, list) or len(value) != 2:
+                    raise MechanismError(f"{spot} = {value!r} must be two points ['body.point', 'body.point']")
+                values[key.name] = tuple(_text(spot, v) for v in value)
+        return values
+
+
+def _built(where: str, cls: type, values: dict[str, Any]) -> Any:
+    try:
+        return cls(**values)
+    except ValueError as error:  # what a leaf checks about its own numbers
+        raise MechanismError(f"{where} {error}") from None
+
+
+def _keys(cls: type) -> list[str]:
+    return [key.name for key in fields(cls) if key.name != "name"]
+
+
+def _chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
+    """The class whose `type` the table names under `key`."""
+    known = {cls.type: cls for cls in classes}
+    if key not in table:
+        raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
+    word = _text(f"{where} {key}", table[key])
+    if word not in known:
+        raise MechanismError(f"{where} {key} = '{word}' is not known{suggestion(word, known)}; known: {listed(known)}")
+    return known[word]
+
+
+def _known_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    known = list(known)
+    for key in table:
+        if key not in known:
+            place = f"{where} {key}" if where else f"[{key}]" if isinstance(table[key], dict) else key
+            raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
+
+
+def _table(document: Mapping[str, Any], name: str) -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise MechanismError(f"{name} = {table!r} must be a table [{name}]")
+    return table
+
+
+def _tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
+    for key, table in _table(document, name).items():
+        if not isinstance(table, dict):
+            raise MechanismError(f"[{name}] {key} = {table!r} must be a table [{name}.{key}]")
+        yield key, table
+
+
+def _subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise MechanismError(f"{where} {key} = {value!r} must be a table")
+    return value
+
+
+def _text(where: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise MechanismError(f"{where} = {value!r} must be text")
+    return value
+
+
+def _example(quantity: Quantity) -> str:
+    examples = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
+    return examples[quantity.kind] + ("", "/s", "/s2")[quantity.order]
+
+
+def text(mechanism: Mechanism) -> str:
+    """The mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
+    lines = [f"name = {_toml(mechanism.name)}"]
+    if mechanism.title:
+        lines.append(f"title = {_toml(mechanism.title)}")
+    lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}", "", "[run]"]
+    lines += [f"{key.name} = {_toml(getattr(mechanism.run, key.name))}" for key in fields(RunSettings)]
+    for body in mechanism.bodies:
+        lines += ["", f"[bodies.{body.name}]"]
+        points = ", ".join(f"{name} = {_toml(point)}" for name, point in body.points.items())
+        lines.append(f"points = {{ {points} }}" if points else "points = {}")
+        start = ", ".join(f"{key} = {_toml(value)}" for key, value in body.start._asdict().items() if value is not None)
+        if start:
+            lines.append(f"start = {{ {start} }}")
+    for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
+        for member in members:
+            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}"]
+            for key in _keys(type(member)):
+                value = getattr(member, key)
+                if key == "law":
+                    lines.append(f"law = {_toml(value.type)}")
+                    lines += [f"{constant} = {_toml(getattr(value, constant))}" for constant in _keys(type(value))]
+                else:
+                    lines.append(f"{key} = {_toml(value)}")
+    if mechanism.points:
+        lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
+    lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped) + '"'
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return repr(value)
