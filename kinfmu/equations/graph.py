@@ -1,0 +1,209 @@
+"""Symbols: the joints' formulas traced into a graph of arithmetic, with derivatives taken on the graph.
+
+Equal expressions are one node. Simplifications keep every bit of the value (up to the sign of a zero), so that traced
+code and direct evaluation agree exactly. Nodes are numbered in the order of creation, arguments first: all passes run
+along the numbers, nothing recurses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from kinfmu.joints.arithmetic import cos, sin, sqrt
+
+
+class Node:
+    """A number in the graph: a constant, a symbol, or an operation on earlier nodes."""
+
+    __slots__ = ("args", "graph", "id", "op", "value")
+
+    def __init__(self, graph: Graph, op: str, args: tuple[Node, ...], value: float | str | None, number: int) -> None:
+        self.graph = graph
+        self.op = op  # "constant", "symbol", "+", "-", "*", "/", "neg", "sin", "cos", "sqrt"
+        self.args = args
+        self.value = value  # of a constant its float, of a symbol its name
+        self.id = number
+
+    @property
+    def constant(self) -> float | None:
+        return self.value if self.op == "constant" else None  # type: ignore[return-value]  # constants hold floats
+
+    @property
+    def name(self) -> str:
+        """Name of a symbol."""
+        return str(self.value)
+
+    def __repr__(self) -> str:
+        return str(self.value) if not self.args else f"{self.op}({', '.join(map(repr, self.args))})"
+
+    def __add__(self, other: Any) -> Node:
+        a, b = self, self.graph.lift(other)
+        if a.constant == 0.0:
+            return b
+        if b.constant == 0.0:
+            return a
+        if a.constant is not None and b.constant is not None:
+            return self.graph.constant(a.constant + b.constant)
+        if b.op == "neg":
+            return a - b.args[0]
+        if a.op == "neg":
+            return b - a.args[0]
+        return self.graph.node("+", *sorted((a, b), key=_number))
+
+    def __sub__(self, other: Any) -> Node:
+        a, b = self, self.graph.lift(other)
+        if b.constant == 0.0:
+            return a
+        if a.constant == 0.0:
+            return -b
+        if a is b:
+            return self.graph.constant(0.0)
+        if a.constant is not None and b.constant is not None:
+            return self.graph.constant(a.constant - b.constant)
+        if b.op == "neg":
+            return a + b.args[0]
+        if a.op == "neg":
+            return -(a.args[0] + b)
+        return self.graph.node("-", a, b)
+
+    def __rsub__(self, other: Any) -> Node:
+        return self.graph.lift(other) - self
+
+    def __neg__(self) -> Node:
+        if self.constant is not None:
+            return self.graph.constant(-self.constant)
+        if self.op == "neg":
+            return self.args[0]
+        if self.op == "-":
+            return self.args[1] - self.args[0]
+        return self.graph.node("neg", self)
+
+    def __mul__(self, other: Any) -> Node:
+        a, b = sorted((self, self.graph.lift(other)), key=_number)
+        for x, y in ((a, b), (b, a)):
+            if x.constant == 0.0:
+                return x
+            if x.constant == 1.0:
+                return y
+            if x.constant == -1.0:
+                return -y
+            if x.op == "neg":
+                return -(x.args[0] * y)
+        if a.constant is not None and b.constant is not None:
+            return self.graph.constant(a.constant * b.constant)
+        return self.graph.node("*", a, b)
+
+    def __truediv__(self, other: Any) -> Node:
+        a, b = self, self.graph.lift(other)
+        if a.constant == 0.0 or b.constant == 1.0:
+            return a
+        if a.constant is not None and b.constant is not None:
+            return self.graph.constant(a.constant / b.constant)
+        if a.op == "neg":
+            return -(a.args[0] / b)
+        if b.constant == -1.0:
+            return -a
+        return self.graph.node("/", a, b)
+
+    def __rtruediv__(self, other: Any) -> Node:
+        return self.graph.lift(other) / self
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def _number(node: Node) -> int:
+    return node.id
+
+
+class Graph:
+    """Owner of nodes; equal expressions are the same node."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[tuple[Any, ...], Node] = {}
+
+    def node(self, op: str, *args: Node) -> Node:
+        return self._intern(op, args, None)
+
+    def constant(self, value: float) -> Node:
+        return self._intern("constant", (), float(value) + 0.0)  # + 0.0: one zero
+
+    def symbol(self, name: str) -> Node:
+        return self._intern("symbol", (), name)
+
+    def lift(self, x: Any) -> Node:
+        """A node of this graph for a node or a number."""
+        return x if isinstance(x, Node) else self.constant(x)
+
+    def _intern(self, op: str, args: tuple[Node, ...], value: float | str | None) -> Node:
+        key = (op, value, *(arg.id for arg in args))
+        if key not in self._nodes:
+            self._nodes[key] = Node(self, op, args, value, len(self._nodes))
+        return self._nodes[key]
+
+    def function(self, name: str, x: Node) -> Node:
+        """sin, cos or sqrt of a node."""
+        if x.constant is not None:
+            return self.constant(getattr(math, name)(x.constant))
+        return self.node(name, x)
+
+    def derivative(self, targets: Sequence[Node], rates: Mapping[Node, Node]) -> list[Node]:
+        """Derivatives of the targets when symbols move at the given rates; symbols without a rate stand still."""
+        zero, one = self.constant(0.0), self.constant(1.0)
+        d: dict[Node, Node] = {}
+        for node in reachable(targets):
+            a = node.args[0] if node.args else node
+            b = node.args[-1] if node.args else node
+            if node.op in ("constant", "symbol"):
+                d[node] = rates.get(node, zero)
+            elif node.op == "+":
+                d[node] = d[a] + d[b]
+            elif node.op == "-":
+                d[node] = d[a] - d[b]
+            elif node.op == "neg":
+                d[node] = -d[a]
+            elif node.op == "*":
+                d[node] = d[a] * b + a * d[b]
+            elif node.op == "/":
+                d[node] = (d[a] - node * d[b]) / b
+            elif node.op == "sin":
+                d[node] = self.function("cos", a) * d[a]
+            elif node.op == "cos":
+                d[node] = -(self.function("sin", a) * d[a])
+            else:  # sqrt
+                d[node] = d[a] / (node * (one + one))
+        return [d[target] for target in targets]
+
+
+def reachable(targets: Iterable[Node]) -> list[Node]:
+    """The targets and everything they are made of, arguments first."""
+    found: dict[int, Node] = {}
+    stack = list(targets)
+    while stack:
+        node = stack.pop()
+        if node.id not in found:
+            found[node.id] = node
+            stack.extend(node.args)
+    return [found[number] for number in sorted(found)]
+
+
+def symbols(targets: Iterable[Node]) -> list[Node]:
+    """The symbols that the targets are made of, in the order of their numbers."""
+    return [node for node in reachable(targets) if node.op == "symbol"]
+
+
+@sin.register
+def _(x: Node) -> Node:
+    return x.graph.function("sin", x)
+
+
+@cos.register
+def _(x: Node) -> Node:
+    return x.graph.function("cos", x)
+
+
+@sqrt.register
+def _(x: Node) -> Node:
+    return x.graph.function("sqrt", x)

@@ -1,0 +1,142 @@
+"""System: all constraint rows of a mechanism stacked, evaluated directly with numpy. The readable reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinfmu.equations.taylor import Taylor
+from kinfmu.joints import GROUND, Placement, Pose
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.units import METRES
+
+FloatArray = NDArray[np.float64]
+
+
+class Row(NamedTuple):
+    """One scalar constraint equation: row `label` of the joint or driver `owner`."""
+
+    owner: str
+    label: str
+    scale: float  # residual per unit of length
+    is_driver: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.owner}.{self.label}"
+
+
+class System:
+    """Phi(q, u) = [Phi_K(q); Phi_D(q, u)]: joint rows in file order, then one row for each driver.
+
+    q: (n,) all coordinates x, y, phi of the moving bodies in file order; u: (d,) driver values. Haug (1989), chapter 3:
+
+        position       Phi(q, u) = 0             Newton: Phi_q dq = -Phi
+        velocity       Phi_q qd  = nu            nu = -Phi_t
+        acceleration   Phi_q qdd = gamma         gamma = -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.coordinates = mechanism.coordinate_names
+        self.size = size_of(mechanism)
+        rows = [
+            Row(joint.name, label, scale)
+            for joint in mechanism.joints
+            for label, scale in zip(joint.labels, joint.scales(), strict=True)
+        ]
+        per_length = {"angle": 1.0 / self.size}  # an angle off by a unit moves a point at distance `size` by `size`
+        rows += [
+            Row(driver.name, driver.noun, per_length.get(driver.quantity.kind, 1.0), is_driver=True)
+            for driver in mechanism.drivers
+        ]
+        self.rows = tuple(rows)
+        self.joint_row_count = len(rows) - len(mechanism.drivers)
+        self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)
+        is_angle = [name.endswith(".phi") for name in self.coordinates]
+        self.column_scales: FloatArray = np.where(is_angle, 1.0, self.size)  # (n,) coordinates per unit of motion
+
+    def evaluate(self, q: Sequence[Any], u: Sequence[Any]) -> list[Any]:
+        """Phi in whatever arithmetic q and u are in, one value a row."""
+        at = placement(self.mechanism, q)
+        phi = [value for joint in self.mechanism.joints for value in joint.residual(at)]
+        return phi + [driver.residual(at, target) for driver, target in zip(self.mechanism.drivers, u, strict=True)]
+
+    def residual(self, q: ArrayLike, u: ArrayLike) -> FloatArray:
+        """Phi(q, u), (m,)."""
+        return np.array(self.evaluate(_floats(q), _floats(u)))
+
+    def jacobian(self, q: ArrayLike) -> FloatArray:
+        """Phi_q, (m, n)."""
+        unit = np.eye(len(self.coordinates))
+        along = [Taylor(value, unit[k]) for k, value in enumerate(_floats(q))]
+        n = len(self.coordinates)
+        return np.array([_lines(phi, n) for phi in self.evaluate(along, [0.0] * len(self.mechanism.drivers))])
+
+    def nu(self, q: ArrayLike, ud: ArrayLike) -> FloatArray:
+        """Right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""
+        moving = [Taylor(0.0, rate) for rate in _floats(ud)]
+        return np.array([-_derivative(phi, 1) for phi in self.evaluate(_floats(q), moving)])
+
+    def gamma(self, q: ArrayLike, qd: ArrayLike, u: ArrayLike, ud: ArrayLike, udd: ArrayLike) -> FloatArray:
+        """Right side of the acceleration equation, (m,): minus the second derivative of Phi along q + qd t, u(t)."""
+        along = [Taylor(value, rate) for value, rate in zip(_floats(q), _floats(qd), strict=True)]
+        moving = [Taylor(*target) for target in zip(_floats(u), _floats(ud), _floats(udd), strict=True)]
+        return np.array([-_derivative(phi, 2) for phi in self.evaluate(along, moving)])
+
+    def scaled_jacobian(self, q: ArrayLike) -> FloatArray:
+        """Phi_q with rows as lengths over the size and columns in sizes and radians: pure numbers of order one."""
+        return self.jacobian(q) / self.scales[:, None] * self.column_scales / self.size
+
+    def gaps(self, phi: ArrayLike) -> FloatArray:
+        """By how much each joint row is open, as a length, (joint rows,)."""
+        values, gaps = list(_floats(phi)), []
+        for joint in self.mechanism.joints:
+            count = len(joint.labels)
+            gaps += joint.gaps(tuple(values[:count]))
+            values = values[count:]
+        return np.array(gaps)
+
+    def measure(self, q: ArrayLike) -> FloatArray:
+        """The driven quantities in a pose, (d,)."""
+        at = placement(self.mechanism, _floats(q))
+        return np.array([driver.measure(at) for driver in self.mechanism.drivers])
+
+
+def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
+    """Poses of the bodies from all coordinates q, in any arithmetic."""
+    poses = {GROUND_NAME: GROUND}
+    for k, body in enumerate(mechanism.moving_bodies):
+        poses[body.name] = Pose.of(*q[3 * k : 3 * k + 3])
+    return Placement(poses, mechanism.body_points)
+
+
+def size_of(mechanism: Mechanism) -> float:
+    """The mechanism's size [length]: the longest body, measured between its points (and its frame, unless ground)."""
+    longest = 0.0
+    for body in mechanism.bodies:
+        points = list(body.points.values()) if body.is_ground else [*body.points.values(), (0.0, 0.0)]
+        xy = np.array(points or [(0.0, 0.0)], dtype=float)
+        longest = max(longest, float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0)))))
+    for joint in mechanism.joints:
+        longest = max(longest, float(getattr(joint, "length", 0.0)))
+    return longest or 1.0 / METRES[mechanism.length_unit]
+
+
+def _floats(values: ArrayLike) -> list[float]:
+    return [float(value) for value in np.asarray(values, dtype=float)]
+
+
+def _lines(phi: Any, n: int) -> FloatArray:
+    """First derivatives along n lines; a residual that met no Taylor number depends on nothing."""
+    return np.broadcast_to(_derivative(phi, 1), (n,))
+
+
+def _derivative(phi: Any, order: int) -> Any:
+    if not isinstance(phi, Taylor):
+        return 0.0
+    return phi.d1 if order == 1 else phi.d2

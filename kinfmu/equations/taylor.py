@@ -1,0 +1,86 @@
+"""Taylor numbers: a value with its first and second derivative along a line, for the dense reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinfmu.joints.arithmetic import cos, sin, sqrt
+
+Derivative = Any  # float, or (n,) for n lines at once
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taylor:
+    """f, f' and f'' along one line or along n lines at once.
+
+        (f g)'' = f'' g + 2 f' g' + f g'',   h(f)'' = h''(f) f'^2 + h'(f) f''
+
+    The joints' own formulas run on these numbers: with unit vectors as f' they give the Jacobian, with the velocities
+    they give nu and gamma. No formula is differentiated by hand, none by finite differences.
+    """
+
+    f: float
+    d1: Derivative = 0.0
+    d2: Derivative = 0.0
+
+    def __add__(self, other: Taylor | float) -> Taylor:
+        o = _lifted(other)
+        return Taylor(self.f + o.f, self.d1 + o.d1, self.d2 + o.d2)
+
+    def __neg__(self) -> Taylor:
+        return Taylor(-self.f, -self.d1, -self.d2)
+
+    def __sub__(self, other: Taylor | float) -> Taylor:
+        o = _lifted(other)
+        return Taylor(self.f - o.f, self.d1 - o.d1, self.d2 - o.d2)
+
+    def __rsub__(self, other: float) -> Taylor:
+        return _lifted(other) - self
+
+    def __mul__(self, other: Taylor | float) -> Taylor:
+        o = _lifted(other)
+        return Taylor(
+            self.f * o.f, self.d1 * o.f + self.f * o.d1, self.d2 * o.f + 2.0 * self.d1 * o.d1 + self.f * o.d2
+        )
+
+    def __truediv__(self, other: Taylor | float) -> Taylor:
+        o = _lifted(other)
+        quotient = self.f / o.f
+        d1 = (self.d1 - quotient * o.d1) / o.f
+        return Taylor(quotient, d1, (self.d2 - 2.0 * d1 * o.d1 - quotient * o.d2) / o.f)
+
+    def __rtruediv__(self, other: float) -> Taylor:
+        return _lifted(other) / self
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def _lifted(x: Taylor | float) -> Taylor:
+    return x if isinstance(x, Taylor) else Taylor(float(x))
+
+
+def _chain(x: Taylor, h: float, h1: float, h2: float) -> Taylor:
+    """h(x) from the value and the two derivatives of h at x.f."""
+    return Taylor(h, h1 * x.d1, h2 * x.d1 * x.d1 + h1 * x.d2)
+
+
+@sin.register
+def _(x: Taylor) -> Taylor:
+    s, c = float(np.sin(x.f)), float(np.cos(x.f))
+    return _chain(x, s, c, -s)
+
+
+@cos.register
+def _(x: Taylor) -> Taylor:
+    s, c = float(np.sin(x.f)), float(np.cos(x.f))
+    return _chain(x, c, -s, -c)
+
+
+@sqrt.register
+def _(x: Taylor) -> Taylor:
+    root = float(np.sqrt(x.f))
+    return _chain(x, root, 0.5 / root, -0.25 / (root * x.f))
