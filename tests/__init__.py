@@ -1,0 +1,1 @@
+"""Tests of kinfmu; the folders mirror its rooms."""
