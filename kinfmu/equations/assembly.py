@@ -1,0 +1,148 @@
+"""Assembly: putting the bodies together near a rough pose, and walking along the motion that some rows leave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.equations.system import FloatArray, System
+
+CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
+SINGULAR = 1e-4  # margin below which a start pose counts as singular
+BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
+_ITERATIONS = 200
+_RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
+
+
+def close(
+    system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | None = None
+) -> tuple[FloatArray, float]:
+    """The pose nearest to q where the chosen rows hold (all of them if None), and its residual relative to the size.
+
+    Levenberg-Marquardt far away, the shortest Gauss-Newton step near by, so that redundant rows and singular points do
+    no harm. Stops on the residual: a residual above CLOSED means that the pose does not close.
+    """
+    chosen = list(range(len(system.rows))) if rows is None else list(rows)
+    row_scales = system.scales[chosen] * system.size
+    best, residual = q.copy(), system.residual(q, u)[chosen] / row_scales
+    damping = 1e-3
+    for _ in range(_ITERATIONS):
+        norm = float(np.linalg.norm(residual))
+        jacobian = system.scaled_jacobian(best)[chosen]
+        if norm <= 1e-3:  # close enough for the full step
+            step = np.linalg.lstsq(jacobian, -residual, rcond=_RANK)[0]
+        else:
+            damped = np.vstack([jacobian, np.sqrt(damping) * np.eye(jacobian.shape[1])])
+            step = np.linalg.lstsq(damped, np.concatenate([-residual, np.zeros(jacobian.shape[1])]), rcond=None)[0]
+            longest = float(np.abs(step).max(initial=0.0))
+            step *= min(1.0, 0.5 / longest) if longest > 0.0 else 1.0  # half a radian or half a size at most
+        trial = best + system.column_scales * step
+        trial_residual = system.residual(trial, u)[chosen] / row_scales
+        if np.linalg.norm(trial_residual) < norm:
+            best, residual = trial, trial_residual
+            damping = max(damping / 5.0, 1e-12)
+        elif norm <= 1e-3 or damping > 1e8:
+            break
+        else:
+            damping *= 8.0
+    return best, float(np.abs(residual).max(initial=0.0))
+
+
+def motion_samples(
+    system: System, q: FloatArray, rows: Sequence[int], count: int, step: float = 0.2
+) -> list[FloatArray]:
+    """Up to `count` poses spread along the motion that the chosen rows leave, starting with the one nearest to q.
+
+    Random directions of the null space of the scaled Jacobian (seeded), `step` in radians and sizes. Empty if the rows
+    do not close near q; one pose if they leave no motion.
+    """
+    u = np.zeros(len(system.mechanism.drivers))
+    rng = np.random.default_rng(1989)
+    start, gap = close(system, q, u, rows)
+    if gap > CLOSED:
+        return []
+    samples, direction = [start], None
+    while len(samples) < count:
+        free = null_space(system.scaled_jacobian(samples[-1])[list(rows)])  # (n, free directions)
+        if free.shape[1] == 0:
+            break
+        if direction is None:
+            direction = free @ rng.standard_normal(free.shape[1])
+        direction = free @ (free.T @ direction) + 0.3 * free @ rng.standard_normal(free.shape[1])
+        direction /= np.abs(direction).max()
+        length = step
+        while length > 1e-3:
+            pose, gap = close(system, samples[-1] + length * system.column_scales * direction, u, rows)
+            if gap <= CLOSED:
+                break
+            length /= 2.0
+        else:
+            break
+        samples.append(pose)
+    return samples
+
+
+def null_space(matrix: FloatArray) -> FloatArray:
+    """Orthonormal basis of the directions that a matrix maps to zero, (n, k)."""
+    _, singular, right = np.linalg.svd(matrix)
+    rank = int((singular > _RANK * singular.max(initial=0.0)).sum())
+    return np.asarray(right[rank:].T)
+
+
+def rough_start(system: System) -> FloatArray:
+    """The start pose as the mechanism gives it; what it leaves out is 0."""
+    return np.array([value or 0.0 for body in system.mechanism.moving_bodies for value in body.start])
+
+
+def start_targets(system: System) -> FloatArray:
+    """Driver values of the start pose, (d,): as measured in it where it gives what the driver moves, else by the law."""
+    given = [value is not None for body in system.mechanism.moving_bodies for value in body.start]
+    q = rough_start(system)
+    measured, seen = system.measure(q), system.jacobian(q)[system.joint_row_count :] != 0.0
+    targets = []
+    for k, driver in enumerate(system.mechanism.drivers):
+        is_given = all(known for known, used in zip(given, seen[k], strict=True) if used)
+        law = {name: getattr(driver.law, name) for name in driver.law.orders}
+        targets.append(measured[k] if is_given else driver.law.target(system.mechanism.run.start, **law))
+    return np.array(targets, dtype=float)
+
+
+class Assembled(NamedTuple):
+    """A closed pose: coordinates q (n,), driver values u (d,), and how far from singular it is."""
+
+    q: FloatArray
+    u: FloatArray
+    margin: float  # smallest over largest singular value of the scaled Jacobian of all rows
+
+
+def assemble(system: System) -> Assembled | None:
+    """The start pose, closed; if it is singular, the more regular of the poses a little beside it.
+
+    None if the rows, all together, do not close near the start pose.
+    """
+    u = start_targets(system)
+    q, gap = close(system, rough_start(system), u)
+    if gap > CLOSED:
+        return None
+    found = Assembled(q, u, margin(system, q))
+    if found.margin > SINGULAR:
+        return found
+    beside = []
+    for side in (1.0, -1.0):
+        step = side * BESIDE * np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
+        near, gap = close(system, q, u + step)
+        if gap <= CLOSED:
+            beside.append(Assembled(near, u + step, margin(system, near)))
+    return max([found, *beside], key=lambda pose: pose.margin)
+
+
+def _reach(system: System, kind: str) -> float:
+    return 1.0 if kind == "angle" else system.size
+
+
+def margin(system: System, q: FloatArray) -> float:
+    """Smallest over largest singular value of the scaled Jacobian of all rows: 0 at a singular point."""
+    singular = np.linalg.svd(system.scaled_jacobian(q), compute_uv=False)
+    return float(singular[-1] / singular[0]) if len(singular) == len(system.coordinates) else 0.0
