@@ -1,1 +1,38 @@
-"""."""
+"""What a run leaves: MCAP as the durable record, Rerun as the picture, tables for everything else.
+
+The writers and readers load their packages (mcap, rerun, pyarrow) when first used, not when this room is imported.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from kinfmu.log.mcap_file import read, write_mcap
+    from kinfmu.log.rerun_file import write_rrd
+    from kinfmu.log.review import review
+    from kinfmu.log.table import write_table
+
+__all__ = ["read", "review", "write_mcap", "write_rrd", "write_table"]
+
+_HOME = {
+    "read": "mcap_file",
+    "review": "review",
+    "write_mcap": "mcap_file",
+    "write_rrd": "rerun_file",
+    "write_table": "table",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public function, from the module that holds it."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'kinfmu.log' has no attribute '{name}'")
+    found = getattr(import_module(f"kinfmu.log.{_HOME[name]}"), name)
+    globals()[name] = found  # from now on without this detour, also where the module is called like the function
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

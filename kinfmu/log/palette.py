@@ -1,0 +1,37 @@
+"""Colours: one a body, the same in linkage and plots. After Okabe and Ito (2008), safe for colour-blind eyes."""
+
+from __future__ import annotations
+
+Colour = tuple[int, int, int]
+
+BODIES: tuple[Colour, ...] = (
+    (230, 159, 0),
+    (86, 180, 233),
+    (0, 178, 130),
+    (204, 121, 167),
+    (213, 94, 0),
+    (60, 120, 200),
+    (240, 228, 66),
+)
+GROUND: Colour = (150, 150, 150)
+BAR: Colour = (190, 190, 190)
+OUT_OF_REACH: Colour = (110, 110, 110)
+STATUS: tuple[Colour, ...] = (
+    (0, 140, 100),
+    (230, 159, 0),
+    (60, 120, 200),
+    (200, 60, 50),
+    (170, 50, 120),
+    (120, 40, 40),
+)  # by kinfmu.solve.Status
+
+
+def body(index: int) -> Colour:
+    """Colour of the body at this place of the mechanism file; points of interest go on after the bodies."""
+    return BODIES[index % len(BODIES)]
+
+
+def lighter(colour: Colour) -> Colour:
+    """The same colour half way to white: y beside x."""
+    red, green, blue = ((value + 255) // 2 for value in colour)
+    return red, green, blue

@@ -1,0 +1,81 @@
+"""How a run went: samples by status, the worst residual, and what happened when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.run import Event, Run
+from kinfmu.solve.status import Status
+
+_LEVELS = {Status.OK: "info", Status.BRIDGED: "info", Status.NEAR_SINGULAR: "warning"}  # the others: "error"
+MEANINGS = {
+    Status.OK: "ok",
+    Status.NEAR_SINGULAR: "near singular: right, with fewer digits",
+    Status.BRIDGED: "bridged across a singular point",
+    Status.OUTSIDE: "outside: the drivers cannot take the mechanism there",
+    Status.INCONSISTENT: "inconsistent: a constraint set aside as redundant does not hold",
+    Status.NOT_CONVERGED: "not converged",
+}
+
+
+class Worst(NamedTuple):
+    """The largest residual of the samples that hold numbers, relative to the mechanism's size, and when."""
+
+    residual: float
+    t: float  # [s]
+
+
+class Change(NamedTuple):
+    """The first sample of a stretch of one status."""
+
+    row: int
+    t: float  # [s]
+    status: Status
+
+
+def label(status: Status) -> str:
+    """'near singular' of Status.NEAR_SINGULAR."""
+    return status.name.lower().replace("_", " ")
+
+
+def counts(run: Run) -> dict[Status, int]:
+    """Samples by status, those that occur, in the order of Status."""
+    values, numbers = np.unique(run.status, return_counts=True)
+    return {Status(int(value)): int(number) for value, number in zip(values, numbers, strict=True)}
+
+
+def worst_residual(run: Run) -> Worst | None:
+    """None when no sample holds numbers."""
+    rows = np.flatnonzero(run.good & np.isfinite(run.residual))
+    if not len(rows):
+        return None
+    row = rows[np.argmax(run.residual[rows])]
+    return Worst(float(run.residual[row]), float(run.t[row]))
+
+
+def changes(run: Run) -> Iterator[Change]:
+    """Every sample whose status differs from the one before, the first sample included."""
+    starts = np.flatnonzero(np.diff(run.status, prepend=run.status[:1] - 1))
+    for row in starts:
+        yield Change(int(row), float(run.t[row]), Status(int(run.status[row])))
+
+
+def happenings(run: Run) -> list[Event]:
+    """Changes of status and the run's own events, by time; a run that begins well begins without an entry."""
+    found = [
+        Event(change.t, _LEVELS.get(change.status, "error"), f"status: {MEANINGS[change.status]}")
+        for change in changes(run)
+        if change.row or change.status is not Status.OK
+    ]
+    return sorted([*found, *run.events], key=lambda event: event.t)
+
+
+def sentence(run: Run) -> str:
+    """One line, such as '181 samples: 179 ok, 2 bridged; worst residual 1.1e-16 at 37 s'."""
+    parts = ", ".join(f"{number} {label(status)}" for status, number in counts(run).items())
+    text = f"{len(run)} sample{'' if len(run) == 1 else 's'}" + (f": {parts}" if parts else "")
+    worst = worst_residual(run)
+    return f"{text}; worst residual {worst.residual:.2g} at {worst.t:g} s" if worst else text
