@@ -1,0 +1,87 @@
+# Sourced by the scripts beside it: the checkout's own Python environment, .venv.
+# shellcheck shell=bash
+#
+#   set_up run    kinfmu and what it needs to run
+#   set_up dev    that, and the tools for tests and checks
+#
+# Both do nothing (in well under half a second) when the environment is there and pyproject.toml is as it was installed.
+
+ROOT="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)"
+VENV="$ROOT/.venv"
+
+# Nothing of another environment that may be active leaks into this one.
+unset VIRTUAL_ENV PYTHONPATH PYTHONHOME PIP_TARGET PIP_PREFIX
+export PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1
+
+fail() {
+    printf '%s\n' "kinfmu: $*" >&2
+    exit 1
+}
+
+# Prints the first Python that is new enough and can make environments.
+find_python() {
+    local name found="" version
+    for name in python3 python3.14 python3.13 python3.12 python3.11 python; do
+        version="$("$name" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)" || continue
+        if ! "$name" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
+            found="$found; $name is $version"
+        elif ! "$name" -c 'import ensurepip, venv' 2>/dev/null; then
+            found="$found; $name is $version without venv (Debian: apt-get install python$version-venv)"
+        else
+            echo "$name"
+            return
+        fi
+    done
+    fail "needs Python 3.11 or newer with venv and pip; looked for python3, python3.11 to python3.14${found:-; found none}"
+}
+
+# What a finished installation of $1 (run or dev) records: a moved checkout or another pyproject.toml is not it.
+installation() {
+    printf '%s\n' "$1 in $ROOT"
+    cat "$ROOT/pyproject.toml"
+}
+
+is_set_up() {
+    local kind
+    "$VENV/bin/python" -c '' 2>/dev/null || return 1
+    for kind in "$1" dev; do # dev has all that run has
+        [[ "$(cat "$VENV/installed-$kind" 2>/dev/null)" != "$(installation "$kind")" ]] || return 0
+    done
+    return 1
+}
+
+set_up() {
+    local kind="$1" python what="."
+    if is_set_up "$kind"; then return; fi
+    if [[ "$kind" == dev ]]; then what=".[dev]"; fi
+
+    exec 9<"$ROOT" # where there is flock, a second script started meanwhile waits here
+    if command -v flock >/dev/null; then flock 9; fi
+    if ! is_set_up "$kind"; then
+        rm -f "$VENV/installed-run" "$VENV/installed-dev" # an interrupted installation leaves no record
+        if ! "$VENV/bin/python" -m pip --version >/dev/null 2>&1; then
+            python="$(find_python)"
+            echo "kinfmu: making .venv with $("$python" --version)" >&2
+            "$python" -m venv --clear "$VENV"
+        fi
+        echo "kinfmu: installing into .venv" >&2
+        (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --editable "$what") || fail "installing into .venv failed, see above"
+        installation "$kind" >"$VENV/installed-$kind"
+    fi
+    exec 9<&-
+}
+
+# Prints the comment at the head of a script when it is asked for help.
+help_if_asked() {
+    if [[ "${1:-}" == --help || "${1:-}" == -h ]]; then
+        sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"
+        exit 0
+    fi
+}
+
+takes_no_arguments() {
+    if (($# > 0)); then
+        printf '%s\n' "kinfmu: scripts/$(basename "$0") takes no arguments, got '$*'" >&2
+        exit 2
+    fi
+}
