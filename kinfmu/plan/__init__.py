@@ -1,1 +1,18 @@
-"""."""
+"""SolvePlan: what is computed, in what order, for the outputs asked for."""
+
+from __future__ import annotations
+
+from kinfmu.plan.block import Block
+from kinfmu.plan.determinant import determinant_formula
+from kinfmu.plan.plan import DriverInfo, LawConstant, Motion, SolvePlan, compile_plan, plan_from
+
+__all__ = [
+    "Block",
+    "DriverInfo",
+    "LawConstant",
+    "Motion",
+    "SolvePlan",
+    "compile_plan",
+    "determinant_formula",
+    "plan_from",
+]

@@ -1,0 +1,102 @@
+"""A block of the plan with its formulas: assignments, residuals, Jacobian and the right sides, all from one trace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from kinfmu.equations.graph import Node
+from kinfmu.equations.system import System
+from kinfmu.naming import derivative_name
+from kinfmu.plan.structure import BlockStructure, RowTracer, given_value
+from kinfmu.plan.trace import Tracer
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows solved together for k unknowns z, and the coordinates that they give outright.
+
+        Newton         J dz = -r              r, J: residuals (m,), jacobian (m, k); m > k: least squares
+        velocity       J zd = -velocity       velocity (m,): rate of r with z at rest
+        acceleration   J zdd = -acceleration  acceleration (m,): second rate of r with zdd = 0
+
+    assigned: coordinate -> its position, rate and acceleration as nodes, in the order of evaluation. row_scales:
+    residual per mechanism size. Symbols are coordinates, rates and accelerations under their contract names.
+    """
+
+    assigned: tuple[tuple[str, tuple[Node, Node, Node]], ...]
+    unknowns: tuple[str, ...]
+    row_names: tuple[str, ...]
+    assigned_by: tuple[str, ...]  # row that gives each assigned coordinate
+    row_scales: tuple[float, ...]
+    residuals: tuple[Node, ...]
+    jacobian: tuple[tuple[Node, ...], ...]
+    velocity: tuple[Node, ...]
+    acceleration: tuple[Node, ...]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return (*(name for name, _ in self.assigned), *self.unknowns)
+
+
+class Rates:
+    """Derivatives with respect to time on the graph: each symbol's rate is the symbol of its next derivative."""
+
+    def __init__(self, tracer: Tracer, fixed: Mapping[str, float]) -> None:
+        self.graph = tracer.graph
+        self.first: dict[Node, Node] = {}
+        self.both: dict[Node, Node] = {}
+        for name, symbol in tracer.symbols.items():
+            if name not in fixed:
+                rate, acceleration = (self.graph.symbol(derivative_name(name, order)) for order in (1, 2))
+                self._add(symbol, rate, acceleration)
+        for driver in tracer.mechanism.drivers:
+            value, speed, acceleration = (self.graph.symbol(name) for name in driver.inputs())
+            self._add(value, speed, acceleration)
+
+    def _add(self, symbol: Node, rate: Node, acceleration: Node) -> None:
+        self.first[symbol] = rate
+        self.both[symbol] = rate
+        self.both[rate] = acceleration
+
+    def of(self, nodes: Sequence[Node], at_rest: Sequence[Node] = ()) -> list[Node]:
+        """First derivatives, with the symbols `at_rest` standing still."""
+        moving = {symbol: rate for symbol, rate in self.first.items() if symbol not in at_rest}
+        return self.graph.derivative(nodes, moving)
+
+    def second(self, nodes: Sequence[Node], unaccelerated: Sequence[Node] = ()) -> list[Node]:
+        """Second derivatives, with the accelerations of the symbols `unaccelerated` zero."""
+        still = {self.first[symbol] for symbol in unaccelerated}
+        moving = {symbol: rate for symbol, rate in self.both.items() if symbol not in still}
+        return self.graph.derivative(self.of(nodes), moving)
+
+
+def build_block(
+    system: System, tracer: Tracer, row: RowTracer, rates: Rates, structure: BlockStructure, fixed: Mapping[str, Node]
+) -> Block:
+    """Trace the rows of a block once and take everything from that trace."""
+    known = dict(fixed)
+    assigned = []
+    for name, index in structure.assigned:
+        value = given_value(tracer, row, index, name, known)
+        if value is None:  # found linear when the structure was found, so this is a fault of ours
+            raise AssertionError(f"{system.rows[index].name} does not give {name}")
+        known[name] = value
+        (rate,), (acceleration,) = rates.of([value]), rates.second([value])
+        assigned.append((name, (value, rate, acceleration)))
+    solved = (*structure.rows, *structure.companions)
+    unknowns = [tracer.symbols[name] for name in structure.unknowns]
+    residuals = [row(index, known) for index in solved]
+    one = tracer.graph.constant(1.0)
+    columns = [tracer.graph.derivative(residuals, {unknown: one}) for unknown in unknowns]
+    return Block(
+        assigned=tuple(assigned),
+        unknowns=structure.unknowns,
+        row_names=tuple(system.rows[index].name for index in solved),
+        assigned_by=tuple(system.rows[index].name for _, index in structure.assigned),
+        row_scales=tuple(float(system.rows[index].scale * system.size) for index in solved),
+        residuals=tuple(residuals),
+        jacobian=tuple(zip(*columns, strict=True)) if columns else (),
+        velocity=tuple(rates.of(residuals, at_rest=unknowns)),
+        acceleration=tuple(rates.second(residuals, unaccelerated=unknowns)),
+    )

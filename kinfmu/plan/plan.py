@@ -1,0 +1,295 @@
+"""SolvePlan: what is computed, in what order, for the outputs asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from kinfmu.equations.assembly import Assembled
+from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.equations.system import System
+from kinfmu.errors import InconsistentError, MechanismError, MobilityError, listed, suggestion
+from kinfmu.mechanism import Mechanism
+from kinfmu.plan.anchor import find_anchor
+from kinfmu.plan.block import Block, Rates, build_block
+from kinfmu.plan.structure import RowTracer, find_structure
+from kinfmu.plan.trace import Tracer
+from kinfmu.redundancy import Redundancy, find_redundancy
+from kinfmu.units import Quantity
+
+
+class DriverInfo(NamedTuple):
+    """A driver as the world sees it: names of its inputs for value, speed and acceleration, and what it measures."""
+
+    name: str
+    inputs: tuple[str, str, str]
+    quantity: Quantity
+
+
+class LawConstant(NamedTuple):
+    """A constant of a law of motion, settable under its name `<driver>.<key>`."""
+
+    name: str
+    value: float
+    quantity: Quantity
+
+
+class Motion(NamedTuple):
+    """Something that moves: its position, rate and acceleration as nodes."""
+
+    name: str
+    position: Node
+    rate: Node
+    acceleration: Node
+
+
+@dataclass(frozen=True, eq=False)
+class SolvePlan:
+    """A value: everything that a back end needs to print the code of a mechanism. Equal plans have equal `text`.
+
+    outputs: the generalized coordinates q, then the points of interest; fixed: coordinates that never move; blocks in
+    the order of solving; watches: rows set aside as redundant, relative to the size; laws: u, ud, udd of each driver
+    over the symbol `time`; anchor: an assembled, regular pose.
+    """
+
+    mechanism: Mechanism
+    size: float
+    drivers: tuple[DriverInfo, ...]
+    law_constants: tuple[LawConstant, ...]
+    laws: tuple[Motion, ...]
+    blocks: tuple[Block, ...]
+    outputs_motion: tuple[Motion, ...]
+    coordinate_count: int
+    fixed: Mapping[str, float]
+    watches: tuple[tuple[str, Node], ...]
+    anchor: Assembled
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs: q first, then points of interest."""
+        return tuple(motion.name for motion in self.outputs_motion)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the generalized coordinates q."""
+        return self.outputs[: self.coordinate_count]
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Coordinates found by Newton, block after block."""
+        return tuple(name for block in self.blocks for name in block.unknowns)
+
+    @property
+    def watch_names(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in self.watches)
+
+    @cached_property
+    def text(self) -> str:
+        """The plan as text, the same for equal plans: its nodes numbered in order, then what is made of them."""
+        roots = [node for block in self.blocks for node in _nodes(block)]
+        roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
+        roots += [node for _, node in self.watches]
+        number = {node: k for k, node in enumerate(reachable(roots))}
+        lines = [f"plan {self.mechanism.name} size {self.size!r} anchor {self.anchor_values!r}"]
+        for node, k in number.items():
+            lines.append(f"{k} = {node.op} {node.value if not node.args else ' '.join(str(number[a]) for a in node.args)}")
+        for block in self.blocks:
+            lines.append(f"block {block.unknowns} {block.row_names} {block.row_scales} {[number[n] for n in _nodes(block)]}")
+        lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
+        lines += [f"watch {name} {number[node]}" for name, node in self.watches]
+        lines += [f"{list(self.fixed.items())} {self.law_constants} {self.drivers} {self.coordinate_count}"]
+        return "\n".join(lines)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SolvePlan) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    @property
+    def anchor_values(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Driver values and unknowns of the anchor."""
+        place = {name: k for k, name in enumerate(self.mechanism.coordinate_names)}
+        return tuple(map(float, self.anchor.u)), tuple(float(self.anchor.q[place[name]]) for name in self.unknowns)
+
+    def depends(self, output: str) -> tuple[int, ...]:
+        """Drivers (by position) on which an output depends structurally."""
+        (motion,) = (motion for motion in self.outputs_motion if motion.name == output)
+        return self._drivers_behind([motion.position])
+
+    def _drivers_behind(self, nodes: Sequence[Node]) -> tuple[int, ...]:
+        inputs = {driver.inputs[0]: k for k, driver in enumerate(self.drivers)}
+        wanted = {symbol.name for symbol in symbols(nodes)}
+        for block in reversed(self.blocks):
+            if wanted & set(block.coordinates):
+                wanted |= {symbol.name for symbol in symbols(_nodes(block)[: _position_count(block)])}
+        return tuple(sorted(inputs[name] for name in wanted if name in inputs))
+
+
+def _nodes(block: Block) -> list[Node]:
+    """All nodes of a block, those of the position stage first."""
+    nodes = [motion[0] for _, motion in block.assigned]
+    nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+    nodes += [node for _, motion in block.assigned for node in motion[1:]]
+    return [*nodes, *block.velocity, *block.acceleration]
+
+
+def _position_count(block: Block) -> int:
+    return len(block.assigned) + len(block.residuals) + sum(len(row) for row in block.jacobian)
+
+
+def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> SolvePlan:
+    """The plan for a mechanism, for all its outputs or only those named: unread loops are not solved.
+
+    Raises InconsistentError, MobilityError, AssemblyError or AmbiguousStartError.
+    """
+    system = System(mechanism)
+    return plan_from(system, find_redundancy(system), outputs)
+
+
+def plan_from(system: System, redundancy: Redundancy, outputs: Sequence[str] | None = None) -> SolvePlan:
+    """The plan, when redundancy is known already."""
+    mechanism = system.mechanism
+    refuse_inconsistent(system, redundancy)
+    refuse_mobility(system, redundancy)
+    anchor = find_anchor(system)
+    tracer = Tracer(mechanism)
+    set_aside = [row.index for row in redundancy.redundant]
+    structure = find_structure(system, tracer, redundancy.kept, set_aside)
+    known = {name: tracer.graph.constant(value) for name, value in structure.fixed.items()}
+    rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
+    motions, coordinate_count, fixed = _outputs(mechanism, tracer, rates, known)
+    if outputs is not None:
+        motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
+    blocks = _needed(
+        [build_block(system, tracer, row, rates, part, known) for part in structure.blocks],
+        [motion.position for motion in motions],
+    )
+    solved = {name for block in blocks for name in block.coordinates}
+    watches = []
+    for index in set_aside:
+        node = row(index, known)
+        if all(symbol.name in solved for symbol in symbols([node])):
+            watches.append((system.rows[index].name, node / (system.rows[index].scale * system.size)))
+    return SolvePlan(
+        mechanism=mechanism,
+        size=system.size,
+        drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
+        law_constants=_law_constants(mechanism),
+        laws=_laws(mechanism, tracer),
+        blocks=tuple(blocks),
+        outputs_motion=tuple(motions),
+        coordinate_count=coordinate_count,
+        fixed=fixed,
+        watches=tuple(watches),
+        anchor=anchor,
+    )
+
+
+def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
+    """Raise the InconsistentError of the first row that contradicts the others."""
+    for dependent in redundancy.inconsistent:
+        unit = system.mechanism.length_unit
+        raise InconsistentError(
+            f"[joints.{dependent.row.owner}] contradicts the other joints: {listed(dependent.implied_by_joints)} "
+            f"leave its row '{dependent.row.label}' open by {abs(dependent.gap):.6g} {unit}, whatever the pose; "
+            f"change a length by that gap or remove the joint",
+            joint=dependent.row.owner,
+            gap=dependent.gap,
+        )
+
+
+def refuse_mobility(system: System, redundancy: Redundancy) -> None:
+    """Raise a MobilityError if there are not as many drivers as degrees of freedom."""
+    names = [driver.name for driver in system.mechanism.drivers]
+    mobility = redundancy.mobility
+    if len(names) == mobility:
+        return
+    if len(names) < mobility:
+        missing = mobility - len(names)
+        raise MobilityError(
+            f"[drivers] mobility is {mobility} but there {_are(len(names), 'driver')} ({listed(names)}): "
+            f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed",
+            mobility=mobility,
+        )
+    if mobility == 0:
+        raise MobilityError(
+            f"[drivers] mobility is 0: the joints leave no motion, so nothing can be driven ({listed(names)})",
+            mobility=0,
+        )
+    raise MobilityError(
+        f"[drivers] mobility is {mobility} but there {_are(len(names), 'driver')} ({listed(names)}): "
+        f"remove {len(names) - mobility}",
+        mobility=mobility,
+    )
+
+
+def _are(count: int, noun: str) -> str:
+    return f"is 1 {noun}" if count == 1 else f"are {count} {noun}s" if count else f"is no {noun}"
+
+
+def _outputs(
+    mechanism: Mechanism, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
+) -> tuple[list[Motion], int, dict[str, float]]:
+    """Outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
+    if mechanism.coordinates == "moving":
+        wanted = [name for name in mechanism.coordinate_names if name not in known]
+    elif mechanism.coordinates == "all":
+        wanted = list(mechanism.coordinate_names)
+    else:
+        wanted = list(mechanism.coordinates)
+    nodes = [(name, known.get(name, tracer.symbols[name])) for name in wanted]
+    fixed = {name: float(node.constant or 0.0) for name, node in known.items() if name not in wanted}
+    coordinate_count = len(nodes)
+    for name, target in mechanism.points.items():
+        for coordinate, node in zip(("x", "y"), tracer.point(target, known), strict=True):
+            if node.constant is None:
+                nodes.append((f"{name}.{coordinate}", node))
+            else:
+                fixed[f"{name}.{coordinate}"] = node.constant
+    positions = [node for _, node in nodes]
+    motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
+    return [Motion(*motion) for motion in motions], coordinate_count, fixed
+
+
+def _chosen(motions: Sequence[Motion], coordinate_count: int, outputs: Sequence[str]) -> tuple[list[Motion], int]:
+    known = [motion.name for motion in motions]
+    for name in outputs:
+        if name not in known:
+            raise MechanismError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
+    chosen = [(k, motion) for k, motion in enumerate(motions) if motion.name in outputs]
+    return [motion for _, motion in chosen], sum(k < coordinate_count for k, _ in chosen)
+
+
+def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
+    """The blocks on which the outputs depend, in order."""
+    wanted = {symbol.name for symbol in symbols(positions)}
+    needed = []
+    for block in reversed(blocks):
+        if wanted & set(block.coordinates):
+            wanted |= {symbol.name for symbol in symbols(_nodes(block)[: _position_count(block)])}
+            needed.append(block)
+    return needed[::-1]
+
+
+def _law_constants(mechanism: Mechanism) -> tuple[LawConstant, ...]:
+    return tuple(
+        LawConstant(f"{driver.name}.{key}", float(getattr(driver.law, key)), Quantity(driver.quantity.kind, order))
+        for driver in mechanism.drivers
+        for key, order in driver.law.orders.items()
+    )
+
+
+def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
+    graph = tracer.graph
+    time, one = graph.symbol("time"), graph.constant(1.0)
+    laws = []
+    for driver in mechanism.drivers:
+        constants = {key: graph.symbol(f"{driver.name}.{key}") for key in driver.law.orders}
+        target = graph.lift(driver.law.target(time, **constants))
+        (rate,) = graph.derivative([target], {time: one})
+        (acceleration,) = graph.derivative([rate], {time: one})
+        laws.append(Motion(driver.name, target, rate, acceleration))
+    return tuple(laws)

@@ -1,0 +1,251 @@
+"""Structure of the rows: which coordinates are constants, which are given outright, and which blocks remain.
+
+    rows -> constants -> matching and strongly connected components -> blocks in order -> assignments in each block
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+
+from kinfmu.equations.graph import Node, symbols
+from kinfmu.equations.system import System
+from kinfmu.errors import MobilityError, listed
+from kinfmu.plan.trace import Tracer
+
+
+@dataclass(frozen=True)
+class BlockStructure:
+    """Rows solved together, by index into System.rows.
+
+    assigned: (coordinate, row) in the order of evaluation: the row gives the coordinate outright. unknowns: coordinates
+    left for Newton, with their rows; companions: rows set aside whose joint keeps another row here, solved along by
+    least squares.
+    """
+
+    assigned: tuple[tuple[str, int], ...]
+    unknowns: tuple[str, ...]
+    rows: tuple[int, ...]
+    companions: tuple[int, ...] = ()
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return (*(name for name, _ in self.assigned), *self.unknowns)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """fixed: coordinates that joints hold at a constant, in file order; blocks: in the order of solving."""
+
+    fixed: Mapping[str, float]
+    blocks: tuple[BlockStructure, ...]
+
+
+class RowTracer:
+    """Rows of the system by index, traced with what is known so far."""
+
+    def __init__(self, system: System, tracer: Tracer) -> None:
+        self.tracer = tracer
+        self._owners: list[tuple[str, int, int]] = []  # (kind, number of the joint or driver, row within it)
+        for number, joint in enumerate(system.mechanism.joints):
+            self._owners += [("joint", number, k) for k in range(len(joint.labels))]
+        self._owners += [("driver", number, 0) for number in range(len(system.mechanism.drivers))]
+
+    def __call__(self, index: int, known: Mapping[str, Node]) -> Node:
+        kind, number, k = self._owners[index]
+        mechanism = self.tracer.mechanism
+        if kind == "joint":
+            return self.tracer.joint(mechanism.joints[number], known)[k]
+        return self.tracer.driver(mechanism.drivers[number], known)
+
+
+def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_aside: Sequence[int]) -> Structure:
+    """Order of solving the kept joint rows and the driver rows; rows set aside may join a block as companions."""
+    row = RowTracer(system, tracer)
+    fixed, used = _constants(system, tracer, row, kept)
+    known = {name: tracer.graph.constant(value) for name, value in fixed.items()}
+    driving = range(system.joint_row_count, len(system.rows))
+    open_rows = [index for index in (*kept, *driving) if index not in used]
+    unknown = [name for name in system.coordinates if name not in fixed]
+    number = {name: k for k, name in enumerate(unknown)}
+    meets = {
+        index: [number[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in number]
+        for index in open_rows
+    }
+    blocks = [
+        _torn(system, tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
+        for rows, columns in _blocks(system, open_rows, unknown, meets)
+    ]
+    return Structure(fixed, tuple(_with_companions(system, tracer, row, known, blocks, kept, set_aside)))
+
+
+def linear_coefficient(row: Node, symbol: Node) -> float | None:
+    """c where the row is c * symbol + rest, with a constant c != 0 and a rest free of the symbol; else None."""
+    graph = row.graph
+    (slope,) = graph.derivative([row], {symbol: graph.constant(1.0)})
+    return slope.constant or None
+
+
+def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Mapping[str, Node]) -> Node | None:
+    """What a row gives outright for a coordinate: -rest / c, or None if it does not."""
+    coefficient = linear_coefficient(row(index, known), tracer.symbols[name])
+    if coefficient is None:
+        return None
+    rest = row(index, {**known, name: tracer.graph.constant(0.0)})
+    return -rest if coefficient == 1.0 else rest if coefficient == -1.0 else rest / -coefficient
+
+
+def _constants(
+    system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]
+) -> tuple[dict[str, float], set[int]]:
+    """Coordinates that the kept joint rows fix to constants, and the rows used up by that."""
+    values: dict[str, Node] = {}
+    used: set[int] = set()
+    touching: dict[str, list[int]] = {}  # body -> rows
+    joints = {joint.name: joint for joint in system.mechanism.joints}
+    for index in kept:
+        for body in joints[system.rows[index].owner].bodies():
+            touching.setdefault(body, []).append(index)
+    waiting = list(kept)
+    heapq.heapify(waiting)
+    while waiting:
+        index = heapq.heappop(waiting)
+        if index in used:
+            continue
+        free = symbols([row(index, values)])
+        if len(free) != 1:
+            continue
+        value = given_value(tracer, row, index, free[0].name, values)
+        if value is None or value.constant is None:
+            continue
+        values[free[0].name] = value
+        used.add(index)
+        for again in touching[free[0].name.partition(".")[0]]:
+            heapq.heappush(waiting, again)
+    fixed = {name: node.constant for name in system.coordinates if (node := values.get(name)) is not None}
+    return {name: value for name, value in fixed.items() if value is not None}, used
+
+
+def _blocks(
+    system: System, rows: Sequence[int], unknown: Sequence[str], meets: Mapping[int, Sequence[int]]
+) -> list[tuple[list[int], list[int]]]:
+    """Blocks of rows and columns (positions in `rows` and `unknown`) in the order of solving."""
+    row_number = np.repeat(np.arange(len(rows)), [len(meets[index]) for index in rows])
+    column = np.array([k for index in rows for k in meets[index]], dtype=int)
+    shape = (len(rows), len(unknown))
+    incidence = csr_matrix((np.ones(len(column)), (row_number, column)), shape=shape)
+    match = maximum_bipartite_matching(incidence, perm_type="column")  # column of each row, -1 if none
+    if len(rows) != len(unknown) or (match < 0).any():
+        missed = [unknown[k] for k in range(len(unknown)) if k not in set(match.tolist())]
+        spare = [system.rows[index].name for index, k in zip(rows, match, strict=True) if k < 0]
+        raise MobilityError(f"rows and coordinates do not match: nothing determines {listed(missed)}; spare rows: {listed(spare)}")
+    owner = np.empty(len(unknown), dtype=int)
+    owner[match] = np.arange(len(rows))
+    needs = csr_matrix((np.ones(len(column)), (row_number, owner[column])), shape=(len(rows), len(rows)))
+    _, component = connected_components(needs, connection="strong")
+    members: dict[int, list[int]] = {}
+    for k, label in enumerate(component):
+        members.setdefault(int(label), []).append(k)
+    order = _topological(component, row_number, owner[column], members)
+    return [(members[label], sorted(int(match[k]) for k in members[label])) for label in order]
+
+
+def _topological(
+    component: Sequence[int], row_number: Iterable[int], needed: Iterable[int], members: Mapping[int, Sequence[int]]
+) -> list[int]:
+    """Components in an order where each comes after those it needs; ties go to the earlier row of the file."""
+    before: dict[int, set[int]] = {label: set() for label in members}
+    after: dict[int, set[int]] = {label: set() for label in members}
+    for a, b in zip(row_number, needed, strict=True):
+        if component[a] != component[b]:
+            before[int(component[a])].add(int(component[b]))
+            after[int(component[b])].add(int(component[a]))
+    ready = [(members[label][0], label) for label, needs in before.items() if not needs]
+    heapq.heapify(ready)
+    order = []
+    while ready:
+        _, label = heapq.heappop(ready)
+        order.append(label)
+        for later in sorted(after[label]):
+            before[later].discard(label)
+            if not before[later]:
+                heapq.heappush(ready, (members[later][0], later))
+    return order
+
+
+def _torn(
+    system: System,
+    tracer: Tracer,
+    row: RowTracer,
+    known: Mapping[str, Node],
+    rows: Sequence[int],
+    columns: Sequence[str],
+) -> BlockStructure:
+    """Assignments taken out of a block: rows that give a coordinate outright, as long as they do not need each other."""
+    needs: dict[str, set[str]] = {}  # assigned coordinate -> coordinates of the block in its row
+    assigned: dict[str, int] = {}
+    for index in rows:
+        traced = row(index, known)
+        inside = [symbol.name for symbol in symbols([traced]) if symbol.name in columns]
+        for name in sorted(inside, key=lambda name: (name.endswith(".phi"), columns.index(name))):
+            if name in assigned or linear_coefficient(traced, tracer.symbols[name]) is None:
+                continue
+            others = {other for other in inside if other != name}
+            if _reaches(needs, others, name):
+                continue
+            assigned[name] = index
+            needs[name] = others
+            break
+    order: list[str] = []
+    left = dict(assigned)
+    while left:
+        ready = [name for name in left if not needs[name] & left.keys()]
+        order += ready
+        for name in ready:
+            del left[name]
+    rest = tuple(index for index in rows if index not in assigned.values())
+    unknowns = tuple(name for name in columns if name not in assigned)
+    return BlockStructure(tuple((name, assigned[name]) for name in order), unknowns, rest)
+
+
+def _reaches(needs: Mapping[str, set[str]], start: set[str], goal: str) -> bool:
+    """True if an assignment among `start` needs `goal`, directly or through others."""
+    stack, seen = list(start), set(start)
+    while stack:
+        name = stack.pop()
+        if name == goal:
+            return True
+        new = needs.get(name, set()) - seen
+        seen |= new
+        stack += new
+    return False
+
+
+def _with_companions(
+    system: System,
+    tracer: Tracer,
+    row: RowTracer,
+    known: Mapping[str, Node],
+    blocks: Sequence[BlockStructure],
+    kept: Sequence[int],
+    set_aside: Sequence[int],
+) -> list[BlockStructure]:
+    """Blocks with the rows set aside whose joint keeps another row: dropping one axis of a pin by file order would make
+    singular points that the mechanism has not, so the last block that the row meets solves it along.
+    """
+    home = {name: k for k, block in enumerate(blocks) for name in block.coordinates}
+    owners = {system.rows[index].owner for index in kept}
+    companions: dict[int, list[int]] = {}
+    for index in set_aside:
+        met = [home[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in home]
+        if system.rows[index].owner in owners and met and blocks[max(met)].unknowns:
+            companions.setdefault(max(met), []).append(index)
+    return [
+        BlockStructure(block.assigned, block.unknowns, block.rows, tuple(companions.get(k, ())))
+        for k, block in enumerate(blocks)
+    ]

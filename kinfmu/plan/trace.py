@@ -1,0 +1,46 @@
+"""Tracing the joints' formulas, with some coordinates known as constants or as expressions of others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kinfmu.drivers import Driver
+from kinfmu.equations.graph import Graph, Node
+from kinfmu.joints import GROUND, Joint, Placement, Pose
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+
+
+class Tracer:
+    """Turns joints, drivers and points into nodes of one graph; every coordinate and driver value is a symbol there."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.graph = Graph()
+        self.symbols = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
+        self.targets = {driver.name: self.graph.symbol(driver.inputs()[0]) for driver in mechanism.drivers}
+        self._points = mechanism.body_points
+
+    def joint(self, joint: Joint, known: Mapping[str, Node]) -> tuple[Node, ...]:
+        """Rows of a joint, with `known` in place of the symbols of some coordinates."""
+        return tuple(self.graph.lift(row) for row in joint.residual(self._placement(joint.bodies(), known)))
+
+    def driver(self, driver: Driver, known: Mapping[str, Node]) -> Node:
+        """Row of a driver."""
+        placement = self._placement(driver.bodies(), known)
+        return self.graph.lift(driver.residual(placement, self.targets[driver.name]))
+
+    def point(self, name: str, known: Mapping[str, Node]) -> tuple[Node, Node]:
+        """World coordinates of a point 'body.point'."""
+        x, y = self._placement((name.partition(".")[0],), known).point(name)
+        return self.graph.lift(x), self.graph.lift(y)
+
+    def _placement(self, bodies: tuple[str, ...], known: Mapping[str, Node]) -> Placement:
+        poses = {}
+        for body in bodies:
+            if body == GROUND_NAME:
+                poses[body] = GROUND
+            else:
+                names = (f"{body}.{coordinate}" for coordinate in ("x", "y", "phi"))
+                poses[body] = Pose.of(*(known.get(name, self.symbols[name]) for name in names))
+        return Placement(poses, self._points)
