@@ -1,0 +1,60 @@
+"""Public names: all of them are in `__all__`, can be had, and say what they are."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from types import ModuleType
+
+import pytest
+
+import kinfmu
+
+PACKAGES = ["kinfmu", *(m.name for m in pkgutil.walk_packages(kinfmu.__path__, "kinfmu.") if m.ispkg)]
+MODULES = [m.name for m in pkgutil.walk_packages(kinfmu.__path__, "kinfmu.")]
+
+
+def public_members(module: ModuleType) -> set[str]:
+    """Names without underscore of kinfmu's own classes, functions and constants that a package holds."""
+    return {
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and not inspect.ismodule(value)
+        and (getattr(value, "__module__", "").startswith("kinfmu") or name.isupper())
+    }
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_every_public_name_of_a_package_is_in_all(name: str) -> None:
+    package = importlib.import_module(name)
+    exported = getattr(package, "__all__", [])
+    assert len(set(exported)) == len(exported)
+    assert public_members(package) <= set(exported)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_every_exported_name_is_there_and_documented(name: str) -> None:
+    package = importlib.import_module(name)
+    for member in getattr(package, "__all__", []):
+        value = getattr(package, member)
+        if inspect.isclass(value) or inspect.isfunction(value):
+            text = value.__doc__ or ""
+            assert text, f"{name}.{member} has no docstring"
+            assert not text.startswith(f"{value.__name__}("), f"{name}.{member} has only a generated docstring"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_module_or_the_class_it_is_named_after_says_what_it_is(name: str) -> None:
+    module = importlib.import_module(name)
+    namesake = name.rpartition(".")[2].replace("_", "")
+    classes = [value for key, value in vars(module).items() if inspect.isclass(value) and key.lower() == namesake]
+    assert module.__doc__ or any(value.__doc__ for value in classes)
+
+
+def test_the_api_of_the_contract_is_exported() -> None:
+    contract = {"load", "save", "check", "solve", "build", "simulate", "Mechanism", "Body", "Point", "VERSION"}
+    assert contract <= set(kinfmu.__all__)
+    assert contract <= set(dir(kinfmu))
+    assert {"write_mcap", "write_rrd", "read"} <= set(kinfmu.log.__all__)
