@@ -75,13 +75,14 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     metres: length of the mechanism's unit [m]. Links lie in layers above each other so that none hides another.
     """
     width = 0.02 * scene.size * metres
-    links = [_link(ROOT, palette.GROUND, [], np.array(list(scene.supports.values())), width, 0.0, metres)]
+    links = [_link(ROOT, palette.GROUND, [np.array([point]) for point in scene.supports.values()], width, 0.0, metres)]
     for body in scene.bodies:
-        height = width * (1 + body.index)
-        links.append(_link(body.name, palette.body(body.index), body.strips, body.pins, width, height, metres))
+        links.append(
+            _link(body.name, palette.body(body.index), [body.outline], width, width * (1 + body.index), metres)
+        )
     for bar in scene.bars:
         ends = np.array([[0.0, 0.0], [bar.length, 0.0]])
-        links.append(_link(_bar_frame(bar.name), palette.BAR, [ends], ends, 0.6 * width, -width, metres))
+        links.append(_link(_bar_frame(bar.name), palette.BAR, [ends], 0.6 * width, -width, metres))
     joints = [
         f'<joint name={quoteattr(link + "_floats")} type="floating">'
         f"<parent link={quoteattr(ROOT)}/><child link={quoteattr(link)}/></joint>"
@@ -96,15 +97,9 @@ def _bar_frame(joint: str) -> str:
 
 
 def _link(
-    name: str,
-    colour: palette.Colour,
-    strips: Iterable[FloatArray],
-    pins: FloatArray,
-    width: float,
-    height: float,
-    metres: float,
+    name: str, colour: palette.Colour, strips: Iterable[FloatArray], width: float, height: float, metres: float
 ) -> str:
-    """A link of boxes along its polylines and discs at its pins; width, height [m], strips and pins in the unit."""
+    """A link of boxes along its polylines and discs at their corners; width, height [m], strips in the unit."""
     rgba = " ".join(f"{channel / 255:.3g}" for channel in colour)
     material = f'<material name={quoteattr(name)}><color rgba="{rgba} 1"/></material>'
     visuals = []
@@ -115,9 +110,9 @@ def _link(
                 f'<visual><origin xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 {np.arctan2(dy, dx):.9g}"/>'
                 f'<geometry><box size="{np.hypot(dx, dy):.9g} {width:.9g} {width:.9g}"/></geometry>{material}</visual>'
             )
-    for x, y in metres * pins.reshape(-1, 2):
-        visuals.append(
-            f'<visual><origin xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"/>'
-            f'<geometry><cylinder radius="{width:.9g}" length="{1.2 * width:.9g}"/></geometry>{material}</visual>'
-        )
+        for x, y in metres * np.unique(strip, axis=0):
+            visuals.append(
+                f'<visual><origin xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"/>'
+                f'<geometry><cylinder radius="{width:.9g}" length="{1.2 * width:.9g}"/></geometry>{material}</visual>'
+            )
     return f"<link name={quoteattr(name)}>{''.join(visuals)}</link>"

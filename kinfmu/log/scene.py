@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Coordinate, Distance
+from kinfmu.joints import Coordinate, Distance, Revolute
 from kinfmu.joints.joint import Joint
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.body import GROUND_NAME, Body
@@ -20,17 +20,15 @@ FLAT = 1e-6  # points nearer to one line than this part of their extent count as
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A moving body: lines and pins in its own frame, and where the frame is.
+    """A moving body: a line through its points in its own frame, and where the frame is.
 
-    strips: polylines (k, 2); pins: points that joints use, (p, 2); middle: (2,) where its name stands; pose: (n, 3) of
-    x, y [length], phi [rad], NaN where the run has no numbers; index: its place in the file, for the colour.
+    outline: polyline (k, 2); pose: (n, 3) of x, y [length], phi [rad], NaN where the run has no numbers; index: its
+    place in the file, for the colour.
     """
 
     name: str
     index: int
-    strips: tuple[FloatArray, ...]
-    pins: FloatArray
-    middle: FloatArray
+    outline: FloatArray
     pose: FloatArray
 
 
@@ -56,14 +54,16 @@ class DrawnGuide:
 class Scene:
     """Everything to draw of one run, lengths in the mechanism's unit, y up.
 
-    supports: pins of the ground, name -> (x, y); paths: world coordinates (n, 2) of the points of interest; left_out:
-    bodies whose pose the run does not hold -> the missing coordinates; low, high: corners (2,) of all that moves.
+    supports: pins of the ground, name -> (x, y); pins: (n, p, 2), where joints hold bodies; paths: (n, 2) of the
+    points of interest, by name; left_out: bodies whose pose the run does not hold -> the missing coordinates; low,
+    high: corners (2,) of the box around everything.
     """
 
     bodies: tuple[DrawnBody, ...]
     bars: tuple[DrawnBar, ...]
     guides: tuple[DrawnGuide, ...]
     supports: Mapping[str, tuple[float, float]]
+    pins: FloatArray
     paths: Mapping[str, FloatArray]
     left_out: Mapping[str, tuple[str, ...]]
     low: FloatArray
@@ -91,7 +91,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     """The drawable part of `run`."""
     poses, left_out = _poses(run, mechanism)
     points = mechanism.body_points
-    used = _points_of_joints(mechanism)
+    used = {text for joint in mechanism.joints for text in _texts(joint)}
 
     def track(point: str) -> FloatArray | None:
         body = point.partition(".")[0]
@@ -100,14 +100,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         return world(poses[body], points[point]) if body in poses else None
 
     bodies = tuple(
-        DrawnBody(
-            name=body.name,
-            index=index,
-            strips=outline(_coordinates(body)),
-            pins=np.array([p for name, p in body.points.items() if f"{body.name}.{name}" in used]).reshape(-1, 2),
-            middle=_coordinates(body).mean(axis=0),
-            pose=poses[body.name],
-        )
+        DrawnBody(body.name, index, outline(_coordinates(body)), poses[body.name])
         for index, body in enumerate(mechanism.moving_bodies)
         if body.name in poses
     )
@@ -125,8 +118,17 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         for name, point in points.items()
         if name in used and name.startswith(f"{GROUND_NAME}.")
     }
-    low, high = _bounds(mechanism, poses, supports)
-    return Scene(bodies, tuple(bars), tuple(guides), supports, paths, left_out, low, high)
+    pins = [pin for joint in mechanism.joints for point in _pins_of(joint, points) if (pin := track(point)) is not None]
+    return Scene(
+        bodies,
+        tuple(bars),
+        tuple(guides),
+        supports,
+        np.stack(pins, axis=1) if pins else np.empty((len(run), 0, 2)),
+        paths,
+        left_out,
+        *_bounds(mechanism, poses, supports),
+    )
 
 
 def world(pose: FloatArray, s: tuple[float, float]) -> FloatArray:
@@ -136,21 +138,25 @@ def world(pose: FloatArray, s: tuple[float, float]) -> FloatArray:
     return np.column_stack([x + c * s[0] - sin * s[1], y + sin * s[0] + c * s[1]])
 
 
-def outline(points: FloatArray) -> tuple[FloatArray, ...]:
-    """Polylines (k, 2) that make a link out of its points (p, 2): a line, or a hull with spokes to points inside."""
+def outline(points: FloatArray) -> FloatArray:
+    """A polyline (k, 2) that makes a link out of its points (p, 2): along them, or around them and to those inside."""
     points = np.unique(points, axis=0)
-    if len(points) < 2:
-        return ()
+    if len(points) < 3:
+        return points
     centred = points - points.mean(axis=0)
     _, extents, directions = np.linalg.svd(centred, full_matrices=False)
-    if len(points) == 2 or extents[1] <= FLAT * extents[0]:
-        along = centred @ directions[0]
-        return (points[[int(np.argmin(along)), int(np.argmax(along))]],)
+    if extents[1] <= FLAT * extents[0]:
+        return points[np.argsort(centred @ directions[0])]
     hull = _hull(points)
-    rim = points[hull]
-    inside = np.delete(points, hull, axis=0)
-    spokes = [np.stack([point, rim[int(np.argmin(np.hypot(*(rim - point).T)))]]) for point in inside]
-    return (np.vstack([rim, rim[:1]]), *spokes)
+    rim, inside = points[hull], np.delete(points, hull, axis=0)
+    nearest = [int(np.argmin(np.hypot(*(rim - point).T))) for point in inside]
+    route = []
+    for k, corner in enumerate(rim):
+        route.append(corner)
+        for point, home in zip(inside, nearest, strict=True):
+            if home == k:
+                route += [point, corner]  # a spoke, there and back
+    return np.array([*route, rim[0]])
 
 
 def _hull(points: FloatArray) -> list[int]:
@@ -186,10 +192,10 @@ def _poses(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[
     return poses, left_out
 
 
-def _points_of_joints(mechanism: Mechanism) -> set[str]:
-    """Every 'body.point' that a joint refers to, whatever its type."""
-    known = mechanism.body_points
-    return {name for joint in mechanism.joints for name in _texts(joint) if name in known}
+def _pins_of(joint: Joint, points: Mapping[str, object]) -> list[str]:
+    """Points 'body.point' where a joint is drawn; those of a revolute joint coincide."""
+    named = [text for text in _texts(joint) if text in points]
+    return named[:1] if isinstance(joint, Revolute) else named
 
 
 def _texts(joint: Joint) -> list[str]:
@@ -202,7 +208,7 @@ def _texts(joint: Joint) -> list[str]:
 
 def _coordinates(body: Body) -> FloatArray:
     """Body-fixed points (p, 2), the frame's origin for a body that names none."""
-    return np.array(list(body.points.values()) or [(0.0, 0.0)], dtype=float).reshape(-1, 2)
+    return np.array([tuple(point) for point in body.points.values()] or [(0.0, 0.0)])
 
 
 def _bounds(
@@ -214,7 +220,7 @@ def _bounds(
         if body.name in poses:
             pose = poses[body.name]
             pose = pose[np.isfinite(pose).all(axis=1)]
-            corners += [world(pose, (s[0], s[1])) for s in _coordinates(body)]
+            corners += [world(pose, (x, y)) for x, y in _coordinates(body)]
     everything = np.vstack(corners)
     if not len(everything):
         everything = np.zeros((1, 2))

@@ -1,0 +1,144 @@
+"""Rerun recording: the picture of a run, with its blueprint inside.
+
+    /linkage/...        bodies, pins, bars, supports, guides, paths of points; y up
+    /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
+                        one curve a coordinate, in rad and the mechanism's unit of length
+    /solver/accuracy    log10 of residual, watches and estimated errors
+    /solver/iterations  of Newton's method
+    /solver/status      a lane of states
+    /log                changes of status and events
+    /card               mechanism, run and verdict
+
+The blueprint names only these paths, which are the same for every run: recordings of one application share blueprints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+from uuid import uuid4
+
+import numpy as np
+
+from kinfmu.errors import LogError
+from kinfmu.log import palette
+from kinfmu.log.blocks import APPLICATION, send
+from kinfmu.log.blueprint import single
+from kinfmu.log.card import card
+from kinfmu.log.clock import nanoseconds
+from kinfmu.log.linkage import log_linkage
+from kinfmu.log.scene import drawable
+from kinfmu.log.series import Group, accuracy, groups
+from kinfmu.log.target import replacing
+from kinfmu.log.verdict import changes, happenings, label, sentence
+from kinfmu.run import Run
+from kinfmu.solve.status import Status
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+_LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
+
+
+def write_rrd(run: Run, path: str | Path) -> None:
+    """Write `run` as a Rerun recording with the blueprint to review it."""
+    import rerun as rr
+
+    nanoseconds(run.t)  # says what is wrong with a time before a file is begun
+    scene, note = drawable(run)
+    curves = groups(run)
+    diagnostics = accuracy(run)
+    name = run.info.get("title") or run.info.get("name") or Path(path).stem
+    with recording(path, name, single(run, scene, list(curves.values()), diagnostics)) as rec:
+        rec.send_property("kinfmu", rr.AnyValues(verdict=sentence(run), length_unit=run.length_unit, **_entries(run)))
+        if scene:
+            log_linkage(rec, "linkage", run, scene)
+        for group in curves.values():
+            log_group(rec, "", run, group)
+        log_group(rec, "", run, diagnostics)
+        _log_iterations(rec, run)
+        log_status(rec, "", run)
+        rec.log("card", rr.TextDocument(card(run, note), media_type="text/markdown"), static=True)
+
+
+@contextmanager
+def recording(path: str | Path, name: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """A recording that is at `path` as a whole when the block ends."""
+    import rerun as rr
+
+    with replacing(path) as temporary:
+        rec = rr.RecordingStream(APPLICATION, recording_id=f"{Path(path).stem}-{uuid4()}")
+        rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
+        rec.set_log_tick_enabled(False)
+        rec.save(temporary, default_blueprint=layout)
+        try:
+            rec.send_recording_name(name)
+            yield rec
+        finally:
+            rec.flush()
+            rec.disconnect()  # writes the footer
+        _check_whole(temporary, path)
+
+
+def log_group(rec: rr.RecordingStream, root: str, run: Run, group: Group) -> None:
+    """The curves of a group, a gap where they are NaN; a run of one sample as points, which a line would not show."""
+    import rerun as rr
+
+    path = f"{root}/{group.path}"
+    names, colours = list(group.names), list(group.colours)
+    look: rr.SeriesPoints | rr.SeriesLines
+    if len(run) == 1:
+        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[4.0] * len(names))
+    else:
+        look = rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names))
+    rec.log(path, look, static=True)
+    send(rec, path, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(group.values[rows])))
+
+
+def log_status(rec: rr.RecordingStream, root: str, run: Run) -> None:
+    """The lane of states and the log of what happened."""
+    import rerun as rr
+
+    path = f"{root}/solver/status"
+    labels = [label(status) for status in Status]
+    colours = [palette.STATUS[status] for status in Status]
+    rec.log(path, rr.StateConfiguration(values=labels, colors=colours), static=True)
+    turns = list(changes(run))
+    times = np.array([turn.t for turn in turns])
+    send(rec, path, times, lambda rows: rr.StateChange.columns(state=[label(turn.status) for turn in turns[rows]]))
+    events = happenings(run)
+    send(
+        rec,
+        f"{root}/log",
+        np.array([event.t for event in events]),
+        lambda rows: rr.TextLog.columns(
+            text=[event.text for event in events[rows]],
+            level=[_LEVELS.get(event.level, "INFO") for event in events[rows]],
+        ),
+    )
+
+
+def _log_iterations(rec: rr.RecordingStream, run: Run) -> None:
+    import rerun as rr
+
+    look = rr.SeriesLines(names="iterations", colors=[palette.body(1)], widths=1.5, interpolation_mode="StepAfter")
+    one = rr.SeriesPoints(names="iterations", colors=[palette.body(1)], marker_sizes=4.0)
+    rec.log("solver/iterations", one if len(run) == 1 else look, static=True)
+    counts = run.iterations.astype(float)
+    send(rec, "solver/iterations", run.t, lambda rows: rr.Scalars.columns(scalars=counts[rows]))
+
+
+def _entries(run: Run) -> dict[str, str]:
+    """The run's info as recording properties."""
+    return {key: value for key, value in run.info.items() if key not in ("verdict", "length_unit")}
+
+
+def _check_whole(file: Path, path: str | Path) -> None:
+    """Rerun writes from a thread that reports a full disk to nobody: look for the footer."""
+    with file.open("rb") as stream:
+        stream.seek(-min(64, file.stat().st_size), 2)
+        if b"RRF" not in stream.read():
+            raise LogError(f"{path}: the recording could not be written to its end; is the disk full?")
