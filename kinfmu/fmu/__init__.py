@@ -1,1 +1,8 @@
-"""."""
+"""FMUs: one list of variables, the archive built from it, and the loop that steps one."""
+
+from __future__ import annotations
+
+from kinfmu.fmu.build import build
+from kinfmu.fmu.simulate import simulate
+
+__all__ = ["build", "simulate"]

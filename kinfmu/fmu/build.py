@@ -1,0 +1,56 @@
+"""Build the FMU of a mechanism."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.fmu.interface import DRIVES, Drive
+from kinfmu.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from kinfmu.plan import SolvePlan
+
+FLAVOURS = ("python",)
+
+
+def build(
+    mechanism: Mechanism | SolvePlan, path: str | Path | None = None, *, flavour: str = "python", drive: Drive = "time"
+) -> Path:
+    """Write the FMU of a mechanism and return its path.
+
+    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. drive: what drives at first,
+    'time' (the law in the file) or 'inputs'. The same mechanism gives the same bytes. A plan that is at hand already
+    may be given in place of the mechanism.
+    """
+    if flavour not in FLAVOURS:
+        raise FmuError(f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}")
+    if drive not in DRIVES:
+        raise FmuError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
+    from kinfmu import VERSION
+    from kinfmu.fmu.python_flavour import archive
+    from kinfmu.plan import compile_plan
+
+    plan = compile_plan(mechanism) if isinstance(mechanism, Mechanism) else mechanism
+    path = _file(path, plan.mechanism.name)
+    data = archive(plan, drive, VERSION)
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_bytes(data)
+        unfinished.replace(path)  # a host never sees half an FMU
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
+    return path
+
+
+def _file(path: str | Path | None, name: str) -> Path:
+    path = Path(f"{name}.fmu" if path is None else path)
+    if path.is_dir():
+        return path / f"{name}.fmu"
+    if path.suffix != ".fmu":
+        raise FmuError(f"{path}: the file of an FMU ends in .fmu")
+    return path

@@ -1,0 +1,330 @@
+"""The one list of an FMU's variables. Model description, value references and the channels of a run follow from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from kinfmu.errors import FmuError
+from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.solve.status import Status
+from kinfmu.units import Quantity, display_units, unit_of
+
+if TYPE_CHECKING:
+    from kinfmu.plan import SolvePlan
+
+Drive = Literal["time", "inputs"]
+DRIVES: tuple[Drive, ...] = ("time", "inputs")
+
+DEFAULT_TOLERANCE = 1e-9  # residual relative to the mechanism's size above which a sample is not ok
+SMALLEST_TOLERANCE = 1e-15  # round-off: no sample would pass below
+_ORDER_WORDS = ("", "rate of ", "acceleration of ")
+_ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of an FMU, in FMI's words.
+
+    derivative_of: the variable of which this is the time derivative. dependencies: the inputs that an output depends on
+    structurally (all of kind `dependent`), None where FMI lists none; initial_dependencies: inputs and parameters that
+    it depends on when the FMU is initialized.
+    """
+
+    name: str
+    type: Literal["Real", "Integer", "Enumeration", "Boolean", "String"]
+    causality: Literal["input", "output", "parameter", "local"]
+    variability: Literal["constant", "fixed", "tunable", "discrete", "continuous"]
+    description: str
+    initial: Literal["exact", "calculated"] | None = None
+    unit: str | None = None
+    start: float | bool | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    derivative_of: str | None = None
+    dependencies: tuple[str, ...] | None = None
+    initial_dependencies: tuple[str, ...] | None = None
+
+    @property
+    def display_unit(self) -> str | None:
+        """The unit in which tools show the value at first: degrees for angles, else none."""
+        if self.unit in _ANGLES_SHOWN_IN_DEGREES:
+            return next(iter(display_units(self.unit)))
+        return None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Neighbours in the list that a slave computes together, such as the rates of all outputs."""
+
+    name: str
+    variables: tuple[Variable, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(variable.name for variable in self.variables)
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All variables of an FMU, part by part; the value reference of a variable is its place in the list.
+
+    coordinate_count: how many of the outputs are generalized coordinates (they come first).
+    """
+
+    name: str
+    title: str
+    length_unit: str
+    experiment: RunSettings
+    coordinate_count: int
+    parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        twice = [name for name, count in Counter(variable.name for variable in self).items() if count > 1]
+        if twice:
+            raise FmuError(f"mechanism '{self.name}': two variables of the FMU would be named '{twice[0]}'")
+
+    def __iter__(self) -> Iterator[Variable]:
+        for part in self.parts:
+            yield from part.variables
+
+    def part(self, name: str) -> tuple[Variable, ...]:
+        """The variables of a part; an FMU without that part has none."""
+        return next((part.variables for part in self.parts if part.name == name), ())
+
+    def value_references(self) -> dict[str, int]:
+        """Value reference by name."""
+        return {variable.name: reference for reference, variable in enumerate(self)}
+
+
+def interface(plan: SolvePlan, drive: Drive = "time") -> Interface:
+    """The variables of the FMU of a plan; `drive` chooses the default of `driven_by_time`."""
+    mechanism = plan.mechanism
+    every = tuple(range(len(plan.drivers)))
+    depends = {name: plan.depends(name) for name in plan.outputs}
+    parts = (
+        Part("inputs", tuple(_inputs(plan))),
+        Part("values", tuple(_output(plan, name, 0, depends[name]) for name in plan.outputs)),
+        Part("rates", tuple(_output(plan, name, 1, depends[name]) for name in plan.outputs)),
+        Part("accelerations", tuple(_output(plan, name, 2, depends[name]) for name in plan.outputs)),
+        Part("diagnostics", tuple(_diagnostics(plan, every))),
+        Part("errors", tuple(_errors(plan, every))),
+        Part("watch", tuple(_watches(plan, every))),
+        Part("driven", tuple(_driven(plan))),
+        Part("constants", tuple(_law_constants(plan))),
+        Part("tolerance", (_TOLERANCE,)),
+        Part("fixed", tuple(_fixed(plan))),
+        Part("counts", tuple(_counts(plan, every))),
+        Part("drive", (_driven_by_time(drive),)),
+        Part("message", (_MESSAGE,)),
+    )
+    return Interface(
+        mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), parts
+    )
+
+
+_TOLERANCE = Variable(
+    "solver.tolerance",
+    "Real",
+    "parameter",
+    "tunable",
+    "Residual, relative to the mechanism's size, above which a sample is not ok",
+    initial="exact",
+    unit="1",
+    start=DEFAULT_TOLERANCE,
+    minimum=SMALLEST_TOLERANCE,
+    maximum=1.0,
+)
+
+_MESSAGE = Variable(
+    "solver.message",
+    "String",
+    "local",
+    "discrete",
+    "Why the pose cannot be had: driver, value and limit; empty when all is well",
+    initial="calculated",
+)
+
+
+def _driven_by_time(drive: Drive) -> Variable:
+    return Variable(
+        "driven_by_time",
+        "Boolean",
+        "parameter",
+        "fixed",
+        "true: the law in the mechanism file drives; false: the inputs drive",
+        initial="exact",
+        start=drive == "time",
+    )
+
+
+def start_values(mechanism: Mechanism) -> dict[str, float]:
+    """Start value of each input: the law's value at the start of the run, so that a fresh FMU holds a pose; rates 0.
+
+    A rate that stays 0 counts as not wired.
+    """
+    starts = {}
+    for driver in mechanism.drivers:
+        constants = {key: getattr(driver.law, key) for key in driver.law.orders}
+        value, speed, acceleration = driver.inputs()
+        starts[value] = float(driver.law.target(mechanism.run.start, **constants))
+        starts[speed] = starts[acceleration] = 0.0
+    return starts
+
+
+def _inputs(plan: SolvePlan) -> Iterator[Variable]:
+    starts = start_values(plan.mechanism)
+    for driver in plan.drivers:
+        for order, name in enumerate(driver.inputs):
+            wiring = " (estimated from the samples until it is first set to other than 0)" if order else ""
+            yield Variable(
+                name,
+                "Real",
+                "input",
+                "continuous",
+                f"Driver {driver.name}: {_ORDER_WORDS[order]}{driver.quantity.kind}{wiring}",
+                unit=unit_of(Quantity(driver.quantity.kind, order), plan.mechanism.length_unit),
+                start=starts[name],
+            )
+
+
+def _output(plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...]) -> Variable:
+    owner, _, coordinate = name.rpartition(".")
+    kind = "body" if owner in {body.name for body in plan.mechanism.bodies} else "point"
+    return Variable(
+        derivative_name(name, order),
+        "Real",
+        "output",
+        "continuous",
+        f"{kind.capitalize()} {owner}: {_ORDER_WORDS[order]}{coordinate}",
+        initial="calculated",
+        unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
+        derivative_of=derivative_name(name, order - 1) if order else None,
+        dependencies=_input_names(plan, drivers, order),
+        initial_dependencies=_initial_names(plan, drivers, order),
+    )
+
+
+def _input_names(plan: SolvePlan, drivers: tuple[int, ...], order: int) -> tuple[str, ...]:
+    """Inputs that a quantity of the given order depends on.
+
+    A position depends on the value, a rate also on the speed, an acceleration on all three. It stays so when time
+    drives and when rates are estimated from values: what is declared holds for every setting of the parameters.
+    """
+    return tuple(name for k in drivers for name in plan.drivers[k].inputs[: order + 1])
+
+
+def _initial_names(plan: SolvePlan, drivers: tuple[int, ...], order: int, *, tolerance: bool = False) -> tuple[str, ...]:
+    """The same at initialization, where parameters are known quantities too: the law's constants may drive."""
+    if not drivers:
+        return ()
+    prefixes = tuple(f"{plan.drivers[k].name}." for k in drivers)
+    constants = tuple(name for name, _, _ in plan.law_constants if name.startswith(prefixes))
+    extra = (_TOLERANCE.name,) if tolerance else ()
+    return (*_input_names(plan, drivers, order), *constants, *extra, "driven_by_time")
+
+
+def _solver_output(
+    plan: SolvePlan,
+    every: tuple[int, ...],
+    name: str,
+    description: str,
+    order: int = 0,
+    *,
+    kind: Literal["Real", "Integer", "Enumeration"] = "Real",
+    minimum: float | None = None,
+    maximum: float | None = None,
+) -> Variable:
+    return Variable(
+        name,
+        kind,
+        "output",
+        "continuous" if kind == "Real" else "discrete",
+        description,
+        initial="calculated",
+        unit="1" if kind == "Real" else None,
+        minimum=minimum,
+        maximum=maximum,
+        dependencies=_input_names(plan, every, order),
+        initial_dependencies=_initial_names(plan, every, order, tolerance=kind == "Enumeration"),
+    )
+
+
+def _diagnostics(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
+    yield _solver_output(plan, every, "solver.residual", "Largest residual relative to the mechanism's size", minimum=0)
+    yield _solver_output(
+        plan, every, "solver.margin", "1 / condition, smallest over the blocks: 0 at a singular point", minimum=0
+    )
+
+
+def _errors(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
+    for order, suffix in enumerate(("q", "qd", "qdd")):
+        yield _solver_output(plan, every, f"solver.error_{suffix}", f"Estimated error of {suffix}", order, minimum=0)
+
+
+def _watches(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
+    for name in plan.watch_names:
+        text = f"Residual of row {name}, set aside as redundant, relative to the mechanism's size"
+        yield _solver_output(plan, every, f"watch.{name}", text)
+
+
+def _driven(plan: SolvePlan) -> Iterator[Variable]:
+    """What drives in effect: the inputs, with estimates for rates not wired, or the law."""
+    for driver in plan.drivers:
+        for order, name in enumerate(driver.inputs):
+            yield Variable(
+                f"driven.{name}",
+                "Real",
+                "local",
+                "continuous",
+                f"Driver {driver.name}, in effect: {_ORDER_WORDS[order]}{driver.quantity.kind}",
+                initial="calculated",
+                unit=unit_of(Quantity(driver.quantity.kind, order), plan.mechanism.length_unit),
+                derivative_of=f"driven.{driver.inputs[order - 1]}" if order else None,
+            )
+
+
+def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
+    for name, value, quantity in plan.law_constants:
+        driver, _, key = name.rpartition(".")
+        yield Variable(
+            name,
+            "Real",
+            "parameter",
+            "tunable",
+            f"Driver {driver}: {key} of its law",
+            initial="exact",
+            unit=unit_of(quantity, plan.mechanism.length_unit),
+            start=value,
+        )
+
+
+def _fixed(plan: SolvePlan) -> Iterator[Variable]:
+    for name, value in plan.fixed.items():
+        owner, _, coordinate = name.rpartition(".")
+        yield Variable(
+            name,
+            "Real",
+            "local",
+            "constant",
+            f"{owner}: {coordinate}, which the joints fix",
+            initial="exact",
+            unit=unit_of(quantity_of(name), plan.mechanism.length_unit),
+            start=value,
+        )
+
+
+def _counts(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
+    yield _solver_output(
+        plan,
+        every,
+        "solver.status",
+        "How far the numbers can be trusted: 0 to 2 hold numbers, 3 to 5 do not",
+        kind="Enumeration",
+        minimum=min(Status),
+        maximum=max(Status),
+    )
+    yield _solver_output(plan, every, "solver.iterations", "Newton iterations of this pose", kind="Integer", minimum=0)

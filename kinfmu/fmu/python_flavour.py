@@ -1,0 +1,190 @@
+"""The python flavour: an FMU around pythonfmu's binaries that carries its own solver as Python source.
+
+    modelDescription.xml
+    documentation/index.html
+    binaries/<platform>/<identifier>.so|dll       pythonfmu's, as they are
+    resources/slavemodule.txt                     names the module that holds the slave class
+    resources/<package>_slave.py                  the class, with its model and layout
+    resources/<package>/model.py                  the emitted model
+    resources/<package>/{solve,fmu,pythonfmu}/    run time; pythonfmu's own base class
+    resources/mechanism.toml
+
+Hosts keep imported modules for the life of the process, and pythonfmu runs a slave's module twice. So every module
+carries the mechanism's name and a hash of the content in its name, does nothing when imported, and nothing is taken
+from a package that the host may hold in another version: `kinfmu` and `pythonfmu` go in under the package's own name.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import io
+import re
+import sys
+import zipfile
+from collections.abc import Mapping
+from importlib.metadata import distribution
+from importlib.resources import files
+
+from kinfmu.backends.python import emit
+from kinfmu.errors import FmuError
+from kinfmu.fmu import description, documentation
+from kinfmu.fmu.interface import Drive, Interface, interface
+from kinfmu.mechanism import toml_file
+from kinfmu.plan import SolvePlan
+
+CAPABILITIES = {
+    "needsExecutionTool": False,
+    "canHandleVariableCommunicationStepSize": True,
+    "canInterpolateInputs": False,  # pythonfmu's binary refuses input derivatives
+    "canBeInstantiatedOnlyOncePerProcess": False,
+    "canNotUseMemoryManagementFunctions": True,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+    "providesDirectionalDerivative": False,  # as does it for derivatives of any kind
+}
+RUN_TIME = ("slave.py", "estimated_rates.py")  # of this room
+BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
+PARTS_WITH_START = ("inputs", "constants", "tolerance", "fixed", "drive")
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
+
+_ENTRY = '''"""The slave of the FMU '{name}'."""
+
+from {package} import model
+from {package}.fmu.slave import Layout, MechanismSlave, PartLayout
+
+
+class Slave(MechanismSlave):
+    """{title}"""
+
+    model = model
+    layout = Layout(
+        token={token!r},
+        start_time={start!r},
+        parts=(
+{parts}
+        ),
+    )
+'''
+
+
+def archive(plan: SolvePlan, drive: Drive, version: str) -> bytes:
+    """The FMU of a plan as the bytes of its zip archive; the same plan gives the same bytes."""
+    variables = interface(plan, drive)
+    contents = _contents(plan, variables, version)
+    token = hashlib.sha256(b"".join(name.encode() + b"\0" + data for name, data in contents.items())).hexdigest()
+    return _zipped(_named(contents, variables, version, token))
+
+
+def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, bytes]:
+    """Every file, by its path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
+    import pythonfmu
+
+    solver, room = files("kinfmu.solve"), files("kinfmu.fmu")
+    base = files(pythonfmu)
+    contents = {
+        "modelDescription.xml": _description(variables, version, token=""),
+        "documentation/index.html": documentation.page(variables).encode(),
+        "resources/mechanism.toml": toml_file.text(plan.mechanism).encode(),
+        "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
+        "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
+        "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',
+        "kinfmu/model.py": emit(plan).encode(),
+        "kinfmu_slave.py": _entry(variables, token="").encode(),
+    }
+    contents |= {f"kinfmu/fmu/{name}": room.joinpath(name).read_bytes() for name in RUN_TIME}
+    contents |= {f"kinfmu/solve/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
+    contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
+    contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
+    licence = distribution("pythonfmu").read_text("licenses/LICENSE")
+    if licence:
+        contents["documentation/licenses/pythonfmu.txt"] = licence.encode()
+    return dict(sorted(contents.items()))
+
+
+def _binaries(identifier: str) -> dict[str, bytes]:
+    """pythonfmu's binaries by platform, under the name of the FMU's model identifier."""
+    import pythonfmu
+
+    found = {}
+    for platform in files(pythonfmu).joinpath("resources", "binaries").iterdir():
+        for library in platform.iterdir():
+            suffix = library.name.rpartition(".")[2]
+            if suffix in ("so", "dll", "dylib"):
+                found[f"{platform.name}/{identifier}.{suffix}"] = library.read_bytes()
+    if not found:
+        raise FmuError("pythonfmu is installed without its binaries; install the wheel: pip install pythonfmu")
+    return found
+
+
+def _description(variables: Interface, version: str, token: str) -> bytes:
+    return description.write(
+        description.Description(variables, token, variables.name, f"kinfmu {version}"), CAPABILITIES
+    )
+
+
+def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
+    parts = []
+    for part in variables.parts:
+        starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
+        parts.append(f"            PartLayout({part.name!r}, {part.names!r}, {starts!r}),")
+    return _ENTRY.format(
+        name=variables.name,
+        package=package,
+        title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
+        token=token,
+        start=float(variables.experiment.start),
+        parts="\n".join(parts),
+    )
+
+
+def _named(contents: Mapping[str, bytes], variables: Interface, version: str, token: str) -> dict[str, bytes]:
+    """The files under their final names, modules checked to import nothing but themselves and the standard library."""
+    package = f"kinfmu_{variables.name}_{token[:12]}"
+    guid = "{" + "-".join((token[:8], token[8:12], token[12:16], token[16:20], token[20:32])) + "}"
+    named = {"modelDescription.xml": _description(variables, version, guid)}
+    for path, data in contents.items():
+        if path.startswith("kinfmu/"):
+            module = _renamed(data.decode(), package)
+            named[f"resources/{package}/{path.removeprefix('kinfmu/')}"] = module.encode()
+        elif path != "modelDescription.xml":
+            named[path] = data
+    del named["kinfmu_slave.py"]
+    named[f"resources/{package}_slave.py"] = _entry(variables, guid, package).encode()
+    named["resources/slavemodule.txt"] = f"{package}_slave".encode()
+    _check_imports(named, package)
+    return named
+
+
+def _renamed(source: str, package: str) -> str:
+    """A module whose imports from kinfmu and pythonfmu come from `package`."""
+    source = re.sub(r"^(\s*)from kinfmu(?=[.\s])", rf"\1from {package}", source, flags=re.MULTILINE)
+    return re.sub(r"^(\s*)from pythonfmu(?=[.\s])", rf"\1from {package}.pythonfmu", source, flags=re.MULTILINE)
+
+
+def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
+    for path, data in contents.items():
+        if not path.endswith(".py"):
+            continue
+        for node in ast.walk(ast.parse(data)):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            for name in names:
+                if name.partition(".")[0] not in (package, *sys.stdlib_module_names):
+                    raise FmuError(f"{path} imports {name}; a python FMU may import the standard library only")
+
+
+def _zipped(contents: Mapping[str, bytes]) -> bytes:
+    """A zip archive whose bytes depend on the contents alone: fixed dates, permissions, system and order."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as zipped:
+        for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):
+            entry = zipfile.ZipInfo(path, EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3  # Unix: it holds the permissions that follow
+            entry.external_attr = (0o100755 if path.startswith("binaries/") else 0o100644) << 16
+            zipped.writestr(entry, contents[path])
+    return buffer.getvalue()

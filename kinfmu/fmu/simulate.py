@@ -1,0 +1,301 @@
+"""Simulate an FMU through fmpy's low-level calls, and keep what it says as a Run.
+
+fmpy's own `simulate_fmu` records the outputs of u(t - h) at t and gives up without a word where a step is Discard; this
+loop sets at t_k, gets, records, then steps.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.errors import FmuError, MissingPackageError, listed, suggestion
+from kinfmu.fmu import description
+from kinfmu.fmu.description import Description
+from kinfmu.fmu.input_table import InputTable, input_table
+from kinfmu.fmu.interface import Interface
+from kinfmu.run import Event, Run
+from kinfmu.solve.status import Status
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
+_REALS = ("values", "rates", "accelerations", "driven", "diagnostics", "errors", "watch")
+_LEVELS = ("info", "warning", "error", "error", "error", "info")  # of fmi2OK, Warning, Discard, Error, Fatal, Pending
+_DISCARD = 2
+
+
+def simulate(
+    fmu_path: str | Path,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    step: float | None = None,
+    inputs: str | Path | Mapping[str, ArrayLike] | None = None,
+    parameters: Mapping[str, float | bool] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Run:
+    """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
+
+    start, stop, step: [s], from the FMU's default experiment where not given; samples at t_k = start + k step, a last
+    shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or a mapping
+    of such arrays; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name, such
+    as {"crank.speed": 2.0}. progress: called with (samples done, samples in all).
+
+    Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
+    of level "error" names driver, value and limit.
+    """
+    path = Path(fmu_path)
+    with _unpacked(path) as folder:
+        about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))
+        interface = about.interface
+        t = _times(interface, start, stop, step)
+        table = None if inputs is None else input_table(inputs, [v.name for v in interface.part("inputs")])
+        chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
+        samples = _Samples(interface, len(t))
+        with _slave(about, folder, samples.log) as slave:
+            _initialize(slave, interface, chosen, t)
+            _step_through(slave, interface, samples, t, table, progress)
+        mechanism_text = (folder / "resources" / "mechanism.toml").read_text(encoding="utf-8")
+    return samples.run(about, mechanism_text, chosen)
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    """The FMU in a temporary folder, which goes away in the end."""
+    with tempfile.TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
+        try:
+            with zipfile.ZipFile(path) as zipped:
+                zipped.extractall(folder)
+                if "modelDescription.xml" not in zipped.namelist():
+                    raise FmuError(f"{path}: is no FMU (modelDescription.xml is missing)")
+        except zipfile.BadZipFile:
+            raise FmuError(f"{path}: is no FMU (not a zip archive)") from None
+        except OSError as error:
+            raise FmuError(f"{path}: cannot be read ({error.strerror or error})") from None
+        yield Path(folder)
+
+
+def _times(interface: Interface, start: float | None, stop: float | None, step: float | None) -> NDArray[np.float64]:
+    """(n,) t_k = start + k step up to stop, which is always the last."""
+    experiment = interface.experiment
+    first = experiment.start if start is None else float(start)
+    last = experiment.stop if stop is None else float(stop)
+    h = experiment.step if step is None else float(step)
+    if not np.isfinite([first, last, h]).all() or h <= 0.0 or last < first:
+        raise FmuError(
+            f"start = {first:g} s, stop = {last:g} s, step = {h:g} s: "
+            "a run needs finite times, start <= stop and a positive step"
+        )
+    count = int((last - first) / h + LAST_STEP)
+    t = first + h * np.arange(count + 1)
+    if last - t[-1] > LAST_STEP * h:
+        return np.append(t, last)
+    t[-1] = last
+    return t
+
+
+def _parameters(
+    interface: Interface, parameters: Mapping[str, float | bool], *, has_inputs: bool, where: str
+) -> dict[str, float | bool]:
+    """The parameters to set, checked: inputs that are given shall drive unless the caller says otherwise."""
+    known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
+    chosen: dict[str, float | bool] = {}
+    for name, value in parameters.items():
+        if name not in known:
+            raise FmuError(
+                f"{where}: '{name}' is no parameter of this FMU{suggestion(name, known)}; parameters: {listed(known)}"
+            )
+        if known[name].type == "Boolean":
+            if value not in (False, True):
+                raise FmuError(f"{where}: {name} = {value!r} must be true or false")
+            chosen[name] = bool(value)
+        elif not np.isfinite(value):
+            raise FmuError(f"{where}: {name} = {value!r} must be a finite number")
+        else:
+            chosen[name] = float(value)
+    if has_inputs:
+        chosen.setdefault("driven_by_time", False)
+    return chosen
+
+
+@contextmanager
+def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) -> Iterator[Any]:
+    """fmpy's slave, instantiated; freed in the end, its traces in `sys.path` removed."""
+    try:
+        from fmpy.fmi2 import FMU2Slave
+    except ImportError:
+        raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
+    path_before = list(sys.path)
+    messages: list[str] = []
+
+    def logged(status: int, text: str) -> None:
+        messages.append(text)
+        log(status, text)
+
+    try:
+        slave = FMU2Slave(
+            instanceName=about.interface.name,
+            guid=about.token,
+            modelIdentifier=about.model_identifier,
+            unzipDirectory=str(folder),
+        )
+        slave.instantiate(callbacks=_callbacks(logged), loggingOn=True)
+    except Exception as error:  # fmpy raises bare exceptions
+        sys.path[:] = path_before
+        raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
+    try:
+        yield slave
+    finally:
+        slave.freeInstance()
+        sys.path[:] = path_before  # pythonfmu puts the FMU's resources there for good
+
+
+def _callbacks(log: Callable[[int, str], None]) -> Any:
+    """FMI's callbacks: messages go to `log`, nothing to the terminal."""
+    from ctypes import byref
+
+    from fmpy import calloc, free
+    from fmpy.fmi2 import (
+        fmi2CallbackAllocateMemoryTYPE,
+        fmi2CallbackFreeMemoryTYPE,
+        fmi2CallbackFunctions,
+        fmi2CallbackLoggerTYPE,
+    )
+    from fmpy.logging import addLoggerProxy
+
+    def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+        log(status, (message or b"").decode("utf-8", errors="replace"))
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(logger)
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    addLoggerProxy(byref(callbacks))
+    return callbacks
+
+
+def _initialize(
+    slave: Any, interface: Interface, parameters: Mapping[str, float | bool], t: NDArray[np.float64]
+) -> None:
+    references = interface.value_references()
+    for name, value in parameters.items():
+        if isinstance(value, bool):
+            slave.setBoolean([references[name]], [value])
+        else:
+            slave.setReal([references[name]], [value])
+    slave.setupExperiment(startTime=t[0])
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+
+
+def _step_through(
+    slave: Any,
+    interface: Interface,
+    samples: _Samples,
+    t: NDArray[np.float64],
+    table: InputTable | None,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """The loop: set at t_k, get, record, step."""
+    from fmpy.fmi1 import FMICallException
+
+    references = interface.value_references()
+    reals = [references[v.name] for part in _REALS for v in interface.part(part)]
+    counts = [references["solver.status"], references["solver.iterations"]]
+    message = [references["solver.message"]]
+    inputs = [] if table is None else [references[name] for name in table.names]
+    settings = np.empty((len(t), 0)) if table is None else table.at(t)
+    for k, time in enumerate(t.tolist()):
+        samples.now = time
+        if inputs:
+            slave.setReal(inputs, settings[k].tolist())
+        status, iterations = slave.getInteger(counts)
+        samples.add(time, slave.getReal(reals), status, iterations)
+        if progress is not None:
+            progress(k + 1, len(t))
+        if status > Status.BRIDGED:
+            samples.log(_DISCARD, f"at t = {time:g} s: {slave.getString(message)[0].decode()}")
+            return
+        if k + 1 < len(t):
+            try:
+                slave.doStep(time, float(t[k + 1]) - time)
+            except FMICallException as failure:
+                if failure.status != _DISCARD:
+                    raise FmuError(f"at t = {time:g} s: {failure}") from None
+                status, iterations = slave.getInteger(counts)
+                if status > Status.BRIDGED:  # what the step asked for lies out of reach
+                    samples.add(float(t[k + 1]), slave.getReal(reals), status, iterations)
+                return
+
+
+class _Samples:
+    """Rows of a run as they come, and what the FMU says meanwhile."""
+
+    def __init__(self, interface: Interface, count: int) -> None:
+        self._interface = interface
+        self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
+        self._reals = np.empty((count, self._ends[-1]))
+        self._t = np.empty(count)
+        self._counts = np.empty((count, 2), dtype=np.int64)
+        self._size = 0
+        self._events: list[Event] = []
+        self.now = 0.0
+
+    def log(self, status: int, text: str) -> None:
+        """A message of the FMU becomes an event at the current time."""
+        event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
+        if not self._events or self._events[-1] != event:
+            self._events.append(event)
+
+    def add(self, t: float, reals: list[float], status: int, iterations: int) -> None:
+        self._t[self._size] = t
+        self._reals[self._size] = reals
+        self._counts[self._size] = status, iterations
+        self._size += 1
+
+    def run(self, about: Description, mechanism_text: str, parameters: Mapping[str, float | bool]) -> Run:
+        """All rows as a Run; rows whose status is 3 to 5 hold no numbers but the drivers' values asked for."""
+        n = self._size
+        t, status = self._t[:n], self._counts[:n, 0]
+        pieces = np.split(self._reals[:n].copy(), self._ends[:-1], axis=1)
+        part = dict(zip(_REALS, pieces, strict=True))
+        for name in ("values", "rates", "accelerations", "errors", "watch"):
+            part[name][status > Status.BRIDGED] = np.nan
+        interface = self._interface
+        return Run(
+            t=t,
+            outputs=tuple(variable.name for variable in interface.part("values")),
+            coordinate_count=interface.coordinate_count,
+            values=part["values"],
+            rates=part["rates"],
+            accelerations=part["accelerations"],
+            fixed={variable.name: float(variable.start or 0.0) for variable in interface.part("fixed")},
+            input_names=tuple(variable.name for variable in interface.part("inputs")),
+            inputs=part["driven"],
+            status=status,
+            iterations=self._counts[:n, 1],
+            residual=part["diagnostics"][:, 0],
+            margin=part["diagnostics"][:, 1],
+            error=part["errors"],
+            watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
+            watch=part["watch"],
+            length_unit=interface.length_unit,
+            mechanism_text=mechanism_text,
+            info={
+                "name": interface.name,
+                "title": interface.title,
+                "generation_tool": about.generation_tool,
+                "token": about.token,
+                "parameters": ", ".join(f"{name} = {value!r}" for name, value in parameters.items()),
+            },
+            events=tuple(self._events),
+        )

@@ -1,0 +1,510 @@
+"""The slave of a python FMU. It travels inside the FMU, beside `solve/`: standard library and pythonfmu's base class.
+
+An exception that leaves a slave is Fatal in pythonfmu and by FMI's rules ends every instance of the host. So nothing
+here raises: what cannot be done is logged and the next doStep is Discard. pythonfmu's binary answers fmi2GetBooleanStatus
+with Error whatever is asked, so fmi2Terminated cannot be reported; last successful time is kept by the binary itself.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+from typing import Any, ClassVar, NamedTuple
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from kinfmu.fmu.estimated_rates import Sample, estimated_rates
+from kinfmu.solve import Pose, Solver
+
+Row = tuple[float, ...]
+
+NOT_A_NUMBER = math.nan
+MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
+SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
+
+
+class PartLayout(NamedTuple):
+    """Variables that are computed together: their names, and start values where they have some."""
+
+    name: str
+    variables: tuple[str, ...]
+    starts: tuple[Any, ...] = ()
+
+
+class Layout(NamedTuple):
+    """What a slave must know of its interface: variables in order of value references, and the content token."""
+
+    token: str
+    start_time: float  # [s]
+    parts: tuple[PartLayout, ...]
+
+
+class Fetch(NamedTuple):
+    """How to read one list of Real variables: compute these parts, put them in a row, pick these places."""
+
+    parts: tuple[Callable[[], Row], ...]
+    pick: Callable[[Row], Sequence[float]]
+
+
+class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
+    """A mechanism as an FMI 2.0 co-simulation slave.
+
+    The protocol: a set marks; a get solves from the *committed* pose and caches; doStep commits the pose and appends
+    (communication point, driver values). Trial values never influence a result, an unchanged input costs no solve,
+    velocity and acceleration are computed when they are first read.
+
+    A leaf gives `model` (the emitted module) and `layout`.
+    """
+
+    model: ClassVar[Any]
+    layout: ClassVar[Layout]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        parts = {part.name: part for part in self.layout.parts}
+        self._inputs: list[float] = list(parts["inputs"].starts)  # value, speed, acceleration of each driver
+        self._constants: Row = parts["constants"].starts
+        self._fixed: Row = parts["fixed"].starts
+        self._tolerance: float = parts["tolerance"].starts[0]
+        self._driven_by_time: bool = parts["drive"].starts[0]
+        self._references = _Places(self.layout)
+        self._fetches: dict[tuple[int, ...], Fetch] = {}
+        self._solver = Solver(self.model, tolerance=self._tolerance)
+
+        self._initialized = False
+        self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
+        self._touched = False  # something was set since the last commit
+        self._wired = [False] * len(self._inputs)  # rates seen other than 0
+        self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
+        self._stray: str | None = None  # an input that was set although time drives
+        self._stray_reported = False
+
+        self._committed: Pose = self._solver.anchor
+        self._committed_inputs: Row = tuple(self._inputs)
+        self._history: tuple[Sample, ...] = ()  # the last three commits, oldest first
+
+        self._forget()
+
+    # What is asked for, and what is cached of it
+
+    def _forget(self) -> None:
+        """The driver values may have changed: solve again when something is read."""
+        self._pose: Pose | None = None
+        self._values: Row | None = None
+        self._forget_rates()
+
+    def _forget_rates(self) -> None:
+        self._drive: tuple[Row, Row, Row] | None = None
+        self._rates: Row | None = None
+        self._accelerations: Row | None = None
+        self._errors: Row | None = None
+
+    def _driven(self) -> tuple[Row, Row, Row]:
+        """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
+        if self._drive is None:
+            if self._driven_by_time:
+                self._drive = self.model.drive(self._time, self._constants)
+            elif self._touched or not self._history:
+                self._drive = self._by_inputs(self._inputs, self._history, self._time, self._inputs[0::3])
+            else:  # nothing set since the commit: still the committed sample, whose time was that of its doStep
+                t, u = self._history[-1]
+                self._drive = self._by_inputs(self._inputs, self._history[:-1], t, u)
+        return self._drive
+
+    def _by_inputs(
+        self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Sequence[float]
+    ) -> tuple[Row, Row, Row]:
+        speeds, accelerations, wired = inputs[1::3], inputs[2::3], self._wired
+        if not all(wired[k] for k in range(len(wired)) if k % 3):
+            ud, udd = estimated_rates(earlier, t, u)
+            speeds = [s if wired[3 * k + 1] else ud[k] for k, s in enumerate(speeds)]
+            accelerations = [a if wired[3 * k + 2] else udd[k] for k, a in enumerate(accelerations)]
+        return tuple(u), tuple(speeds), tuple(accelerations)
+
+    def _committed_drive(self) -> tuple[Row, Row, Row]:
+        """u, ud, udd at the last commit, where the last good values stem from; at rest in the anchor before it."""
+        if not self._history:
+            rest = (0.0,) * len(self._committed.u)
+            return self._committed.u, rest, rest
+        t, u = self._history[-1]
+        if self._driven_by_time:
+            return self.model.drive(t, self._constants)  # type: ignore[no-any-return]
+        return self._by_inputs(self._committed_inputs, self._history[:-1], t, u)
+
+    def _asked(self) -> Pose:
+        """The pose asked for, good or not: followed from the committed one."""
+        if self._pose is None:
+            u = self._driven()[0] if self._driven_by_time else tuple(self._inputs[0::3])
+            self._pose = self._solver.solve(self._committed, u)
+        return self._pose
+
+    def _shown(self) -> tuple[Pose, Row, Row]:
+        """The pose whose numbers are shown, with ud and udd: the one asked for, or the last good one."""
+        pose = self._asked()
+        if pose.good:
+            _, ud, udd = self._driven()
+            return pose, ud, udd
+        _, ud, udd = self._committed_drive()
+        return self._committed, ud, udd
+
+    # Parts of the list of variables, each computed when first read
+
+    def _read_inputs(self) -> Row:
+        return tuple(self._inputs)
+
+    def _read_values(self) -> Row:
+        if self._values is None:
+            pose = self._asked()
+            self._values = self._solver.outputs(pose if pose.good else self._committed)
+        return self._values
+
+    def _read_rates(self) -> Row:
+        if self._rates is None:
+            pose, ud, _ = self._shown()
+            self._rates = self._solver.rates(pose, ud)
+        return self._rates
+
+    def _read_accelerations(self) -> Row:
+        if self._accelerations is None:
+            self._accelerations = self._solver.accelerations(*self._shown())
+        return self._accelerations
+
+    def _read_diagnostics(self) -> Row:
+        _, residual, _, margin = self._solver.diagnostics(self._asked())
+        return residual, margin
+
+    def _read_errors(self) -> Row:
+        if self._errors is None:
+            self._errors = tuple(self._solver.errors(*self._shown()))
+        return self._errors
+
+    def _read_watch(self) -> Row:
+        pose = self._asked()
+        return tuple(self._solver.watch(pose if pose.good else self._committed))
+
+    def _read_driven(self) -> Row:
+        return tuple(value for driver in zip(*self._driven(), strict=True) for value in driver)
+
+    def _read_constants(self) -> Row:
+        return self._constants
+
+    def _read_tolerance(self) -> Row:
+        return (self._tolerance,)
+
+    def _read_fixed(self) -> Row:
+        return self._fixed
+
+    def _plan_fetch(self, vrs: tuple[int, ...]) -> Fetch:
+        """Work out once how a list of Real value references is read."""
+        places = [self._references.real(vr) for vr in vrs]
+        parts = sorted({part for part, _ in places if part is not None})
+        offsets, width = {}, 0
+        for part in parts:
+            offsets[part] = width
+            width += len(self.layout.parts[part].variables)
+        readers: list[Callable[[], Row]] = [getattr(self, f"_read_{self.layout.parts[part].name}") for part in parts]
+        indices = []
+        for vr, (part, place) in zip(vrs, places, strict=True):
+            if part is None:
+                self.log(f"value reference {vr} is not a Real variable of this FMU", Fmi2Status.error)
+                indices.append(width)
+            else:
+                indices.append(offsets[part] + place)
+        if width in indices:
+            readers.append(_no_number)
+        fetch = Fetch(tuple(readers), _picker(indices))
+        if len(self._fetches) >= MOST_FETCHES:
+            self._fetches.clear()
+        self._fetches[vrs] = fetch
+        return fetch
+
+    # Get
+
+    def get_real(self, vrs: Sequence[int]) -> list[float]:
+        key = tuple(vrs)
+        try:
+            fetch = self._fetches.get(key) or self._plan_fetch(key)
+            row: Row = ()
+            for read in fetch.parts:
+                row += read()
+            return list(fetch.pick(row))
+        except Exception as error:  # an exception here would be Fatal for the host
+            self._report_defect(error)
+            return [NOT_A_NUMBER] * len(key)
+
+    def get_integer(self, vrs: Sequence[int]) -> list[int]:
+        values = []
+        for vr in vrs:
+            name = self._references.name(vr)
+            try:
+                if name == "solver.status":
+                    values.append(int(self._asked().status))
+                elif name == "solver.iterations":
+                    values.append(int(self._solver.diagnostics(self._asked())[2]))
+                else:
+                    self.log(f"value reference {vr} is not an Integer variable of this FMU", Fmi2Status.error)
+                    values.append(0)
+            except Exception as error:  # an exception here would be Fatal for the host
+                self._report_defect(error)
+                values.append(0)
+        return values
+
+    def get_boolean(self, vrs: Sequence[int]) -> list[bool]:
+        values = []
+        for vr in vrs:
+            known = self._references.name(vr) == "driven_by_time"
+            if not known:
+                self.log(f"value reference {vr} is not a Boolean variable of this FMU", Fmi2Status.error)
+            values.append(known and self._driven_by_time)
+        return values
+
+    def get_string(self, vrs: Sequence[int]) -> list[str]:
+        values = []
+        for vr in vrs:
+            known = self._references.name(vr) == "solver.message"
+            if not known:
+                self.log(f"value reference {vr} is not a String variable of this FMU", Fmi2Status.error)
+            values.append(self._asked().message if known else "")
+        return values
+
+    # Set
+
+    def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
+        inputs = self._inputs
+        for vr, value in zip(vrs, values, strict=True):
+            if 0 <= vr < len(inputs) and value - value == 0.0:  # an input, which come first, and a finite number
+                if value != inputs[vr]:
+                    inputs[vr] = value
+                    if vr % 3 == 0:
+                        self._pose = self._values = None
+                    elif value != 0.0:
+                        self._wired[vr] = True
+                    if self._driven_by_time:
+                        self._stray = self.layout.parts[0].variables[vr]
+                self._touched = True
+                self._forget_rates()
+                if self._refused:
+                    self._refused.pop(self.layout.parts[0].variables[vr], None)
+            else:
+                self._set_other_real(vr, value)
+
+    def _set_other_real(self, vr: int, value: float) -> None:
+        """Parameters, which are set rarely, and what is refused."""
+        part, place = self._references.real(vr)
+        kind = "" if part is None else self.layout.parts[part].name
+        name = self._references.name(vr)
+        if kind not in ("inputs", "constants", "tolerance"):
+            self._refuse(name or f"value reference {vr}", "is not a Real variable that can be set")
+            return
+        if not math.isfinite(value):
+            self._refuse(name, f"= {value!r} is not a finite number; {self.get_real([vr])[0]!r} stays")
+            return
+        if kind == "constants":
+            self._constants = (*self._constants[:place], float(value), *self._constants[place + 1 :])
+        elif 0.0 < value:
+            self._set_tolerance(float(value))
+        else:
+            self._refuse(name, f"= {value!r} must be positive; {self._tolerance!r} stays")
+            return
+        self._refused.pop(name, None)
+        self._touched = True
+        self._forget()
+
+    def _set_tolerance(self, value: float) -> None:
+        bridges = self._solver.bridges_dump()
+        self._tolerance = value
+        self._solver = Solver(self.model, tolerance=value)
+        self._solver.bridges_restore(bridges)
+
+    def set_boolean(self, vrs: Sequence[int], values: Sequence[bool]) -> None:
+        for vr, value in zip(vrs, values, strict=True):
+            name = self._references.name(vr)
+            if name != "driven_by_time":
+                self._refuse(name or f"value reference {vr}", "is not a Boolean variable that can be set")
+            elif bool(value) == self._driven_by_time:
+                self._refused.pop(name, None)
+            elif self._initialized:
+                self._refuse(name, f"= {bool(value)} comes too late: it is fixed once the FMU is initialized")
+            else:
+                self._driven_by_time = bool(value)
+                self._forget()
+
+    def set_integer(self, vrs: Sequence[int], values: Sequence[int]) -> None:
+        for vr, _ in zip(vrs, values, strict=True):
+            self._refuse(self._references.name(vr) or f"value reference {vr}", "is not an Integer that can be set")
+
+    def set_string(self, vrs: Sequence[int], values: Sequence[str]) -> None:
+        for vr, _ in zip(vrs, values, strict=True):
+            self._refuse(self._references.name(vr) or f"value reference {vr}", "is not a String that can be set")
+
+    def _refuse(self, name: str, why: str) -> None:
+        """A value was not taken: say so now, and let the next doStep be Discard (a setter cannot return Error)."""
+        self._refused[name] = f"{name} {why}"
+        self.log(self._refused[name], Fmi2Status.error)
+
+    def _report_defect(self, error: Exception) -> None:
+        self.log(f"defect in the FMU: {type(error).__name__}: {error}", Fmi2Status.error)
+
+    # Run
+
+    def setup_experiment(self, start_time: float, *_: Any) -> None:
+        self._time = start_time
+        self._forget()
+
+    def exit_initialization_mode(self) -> None:
+        self._initialized = True
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        try:
+            return self._step(current_time, step_size)
+        except Exception as error:  # an exception here would be Fatal for the host
+            self._report_defect(error)
+            return False
+
+    def _step(self, current_time: float, step_size: float) -> bool:
+        """Commit the pose at the communication point; driven by time, also the one at the end of the step."""
+        if self._stray and not self._stray_reported:
+            self._stray_reported = True
+            self.log(
+                f"{self._stray} was set, but driven_by_time is true: the law drives, inputs have no effect",
+                Fmi2Status.warning,
+            )
+        if self._refused:
+            for reason in self._refused.values():
+                self.log(f"at t = {current_time:g} s: {reason}", Fmi2Status.discard)
+            self._refused.clear()
+            return False
+        if not self._driven_by_time:
+            pose = self._asked()
+            if not pose.good:
+                return self._discard(pose, current_time)
+            if not self._touched or current_time != self._time:
+                self._forget_rates()  # the host holds its inputs, or its clock differs: estimates see another time
+            self._commit(pose, current_time)
+            self._time = current_time + step_size
+            return True
+        pose = self._at_start_of_step(current_time, step_size)
+        if pose.good:
+            self._time = current_time + step_size
+            self._drive = self.model.drive(self._time, self._constants)
+            pose = self._solver.solve(pose, self._drive[0])
+        else:
+            self._time = current_time
+        self._forget()
+        self._pose = pose
+        if not pose.good:
+            return self._discard(pose, self._time)
+        self._commit(pose, self._time)
+        return True
+
+    def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
+        """The pose at the communication point when time drives: the committed one, unless the host or a set moved it."""
+        if self._history and not self._touched and abs(current_time - self._history[-1].t) <= SAME_TIME * step_size:
+            return self._committed
+        u, _, _ = self.model.drive(current_time, self._constants)
+        return self._solver.solve(self._committed, u)
+
+    def _commit(self, pose: Pose, t: float) -> None:
+        earlier = tuple(sample for sample in self._history if sample.t < t)[-2:]
+        self._history = (*earlier, Sample(t, pose.u))
+        self._committed = pose
+        self._committed_inputs = tuple(self._inputs)
+        self._touched = False
+
+    def _discard(self, pose: Pose, t: float) -> bool:
+        self.log(f"at t = {t:g} s: {pose.message}", Fmi2Status.discard)
+        return False
+
+    # State: everything that a result depends on, as JSON
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {
+            "token": self.layout.token,
+            "inputs": list(self._inputs),
+            "constants": list(self._constants),
+            "tolerance": self._tolerance,
+            "driven_by_time": self._driven_by_time,
+            "initialized": self._initialized,
+            "time": self._time,
+            "touched": self._touched,
+            "wired": list(self._wired),
+            "refused": dict(self._refused),
+            "stray": [self._stray, self._stray_reported],
+            "committed": self._solver.dump(self._committed),
+            "committed_inputs": list(self._committed_inputs),
+            "history": [[sample.t, list(sample.u)] for sample in self._history],
+            "bridges": self._solver.bridges_dump(),
+        }
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if state.get("token") != self.layout.token:
+            self._refuse("state", f"is not one of this FMU ({self.layout.token})")
+            return
+        self._inputs = list(state["inputs"])
+        self._constants = tuple(state["constants"])
+        self._tolerance = state["tolerance"]
+        self._driven_by_time = state["driven_by_time"]
+        self._initialized = state["initialized"]
+        self._time = state["time"]
+        self._touched = state["touched"]
+        self._wired = list(state["wired"])
+        self._refused = dict(state["refused"])
+        self._stray, self._stray_reported = state["stray"]
+        self._solver = Solver(self.model, tolerance=self._tolerance)
+        self._solver.bridges_restore(state["bridges"])
+        self._committed = self._solver.restore(state["committed"])
+        self._committed_inputs = tuple(state["committed_inputs"])
+        self._history = tuple(Sample(t, tuple(u)) for t, u in state["history"])
+        self._forget()
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        return json.dumps(state).encode()
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            return dict(json.loads(state))
+        except (ValueError, TypeError):
+            return {}  # refused when it is set: an exception here would be Fatal for the host
+
+
+class _Places:
+    """Where the variable of a value reference is found."""
+
+    _NOT_REAL = ("counts", "drive", "message")
+
+    def __init__(self, layout: Layout) -> None:
+        self._places = [(k, i) for k, part in enumerate(layout.parts) for i in range(len(part.variables))]
+        self._layout = layout
+
+    def real(self, vr: int) -> tuple[int, int] | tuple[None, int]:
+        """Part and place of a Real variable, (None, 0) if the value reference is none of those."""
+        if 0 <= vr < len(self._places):
+            part, place = self._places[vr]
+            if self._layout.parts[part].name not in self._NOT_REAL:
+                return part, place
+        return None, 0
+
+    def name(self, vr: int) -> str:
+        """Name of the variable, empty if there is none."""
+        if 0 <= vr < len(self._places):
+            part, place = self._places[vr]
+            return self._layout.parts[part].variables[place]
+        return ""
+
+
+def _no_number() -> Row:
+    return (NOT_A_NUMBER,)
+
+
+def _picker(indices: list[int]) -> Callable[[Row], Sequence[float]]:
+    """Pick these places of a row: a slice if they are neighbours."""
+    if not indices:
+        return itemgetter(slice(0, 0))
+    if indices == list(range(indices[0], indices[0] + len(indices))):
+        return itemgetter(slice(indices[0], indices[-1] + 1))
+    return itemgetter(*indices)
