@@ -51,7 +51,9 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
 from {package} import model
-from {package}.fmu.slave import Layout, MechanismSlave, PartLayout
+from {package}.fmu.slave import Layout, MechanismSlave, PartLayout, hold
+
+hold(globals())
 
 
 class Slave(MechanismSlave):

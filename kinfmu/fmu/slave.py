@@ -7,6 +7,7 @@ with Error whatever is asked, so fmi2Terminated cannot be reported; last success
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -470,6 +471,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return dict(json.loads(state))
         except (ValueError, TypeError):
             return {}  # refused when it is set: an exception here would be Fatal for the host
+
+
+def hold(namespace: dict[str, Any]) -> None:
+    """Take a reference to a module's namespace for good.
+
+    pythonfmu 0.7 runs the slave's module once an instance and each time releases a reference to its namespace that it
+    does not own: without this, the third instance of a process finds the namespace freed and crashes.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
 
 
 class _Places:
