@@ -35,39 +35,54 @@ find_python() {
     fail "needs Python 3.11 or newer with venv and pip; looked for python3, python3.11 to python3.14${found:-; found none}"
 }
 
-# What a finished installation of $1 (run or dev) records: a moved checkout or another pyproject.toml is not it.
+# What .venv/installed says after an installation of $1 (run or dev).
 installation() {
-    printf '%s\n' "$1 in $ROOT"
+    printf '%s\n' "$ROOT" "$1"
     cat "$ROOT/pyproject.toml"
 }
 
 is_set_up() {
-    local kind
+    local kind installed
     "$VENV/bin/python" -c '' 2>/dev/null || return 1
+    installed="$(cat "$VENV/installed" 2>/dev/null)" || return 1
     for kind in "$1" dev; do # dev has all that run has
-        [[ "$(cat "$VENV/installed-$kind" 2>/dev/null)" != "$(installation "$kind")" ]] || return 0
+        if [[ "$installed" == "$(installation "$kind")" ]]; then return 0; fi
     done
     return 1
 }
 
-set_up() {
-    local kind="$1" python what="."
-    if is_set_up "$kind"; then return; fi
-    if [[ "$kind" == dev ]]; then what=".[dev]"; fi
+# No environment, a broken one, one left by an interruption, or one made when the checkout was elsewhere.
+must_be_made() {
+    local elsewhere="$ROOT"
+    if [[ -e "$VENV/unfinished" ]] || ! "$VENV/bin/python" -c '' 2>/dev/null; then return 0; fi
+    if [[ -e "$VENV/installed" ]]; then IFS= read -r elsewhere <"$VENV/installed"; fi
+    [[ "$elsewhere" != "$ROOT" ]]
+}
 
+install() {
+    local kind="$1" python what="."
+    if [[ "$kind" == dev ]]; then what=".[dev]"; fi
+    if must_be_made; then
+        python="$(find_python)"
+        echo "kinfmu: making .venv with $("$python" --version)" >&2
+        rm -rf "$VENV"
+        mkdir "$VENV"
+        touch "$VENV/unfinished" # until all is installed: pip takes a package that it was interrupted in for whole
+        "$python" -m venv "$VENV"
+    fi
+    touch "$VENV/unfinished"
+    rm -f "$VENV/installed"
+    echo "kinfmu: installing into .venv" >&2
+    (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --editable "$what") || fail "installing into .venv failed, see above"
+    rm "$VENV/unfinished"
+    installation "$kind" >"$VENV/installed"
+}
+
+set_up() {
+    if is_set_up "$1"; then return; fi
     exec 9<"$ROOT" # where there is flock, a second script started meanwhile waits here
     if command -v flock >/dev/null; then flock 9; fi
-    if ! is_set_up "$kind"; then
-        rm -f "$VENV/installed-run" "$VENV/installed-dev" # an interrupted installation leaves no record
-        if ! "$VENV/bin/python" -m pip --version >/dev/null 2>&1; then
-            python="$(find_python)"
-            echo "kinfmu: making .venv with $("$python" --version)" >&2
-            "$python" -m venv --clear "$VENV"
-        fi
-        echo "kinfmu: installing into .venv" >&2
-        (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --editable "$what") || fail "installing into .venv failed, see above"
-        installation "$kind" >"$VENV/installed-$kind"
-    fi
+    if ! is_set_up "$1"; then install "$1"; fi
     exec 9<&-
 }
 

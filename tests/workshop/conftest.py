@@ -19,8 +19,7 @@ case "$*" in
 "-c import ensurepip"*) [ -z "${NO_VENV:-}" ]; exit ;;
 "-c "*) exit ;;
 "--version") echo "Python 3.11"; exit ;;
-"-m pip --version") exit ;;
-"-m venv --clear "*) mkdir -p "$4/bin"; cp "$0" "$4/bin/python"; cp "$0" "$4/bin/kinfmu" ;;
+"-m venv "*) mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; cp "$0" "$3/bin/kinfmu" ;;
 esac
 echo "$(basename "$0") $*" >>"$ASKED"
 echo "PYTHONPATH=${PYTHONPATH-unset} VIRTUAL_ENV=${VIRTUAL_ENV-unset} cwd=$(pwd -P)" >>"$ASKED.environment"
@@ -38,7 +37,7 @@ class Miniature:
         self.bin.mkdir(parents=True)
         shutil.copytree(CHECKOUT / "scripts", self.root / "scripts")
         (self.root / "pyproject.toml").write_text("[project]\n")
-        for tool in ("bash", "sh", "dirname", "basename", "cat", "cp", "mkdir", "rm", "sed", "flock"):
+        for tool in ("bash", "sh", "dirname", "basename", "cat", "cp", "mkdir", "rm", "sed", "touch", "flock"):
             found = shutil.which(tool)
             if found:
                 (self.bin / tool).symlink_to(found)

@@ -21,7 +21,7 @@ def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniatu
     status, said = miniature.run("demo")
     assert status == 0, said
     assert miniature.asked == [
-        f"python3 -m venv --clear {miniature.root}/.venv",
+        f"python3 -m venv {miniature.root}/.venv",
         f"{INSTALL}.",
         "python -m kinfmu.demo",
     ]
@@ -50,27 +50,44 @@ def test_a_changed_pyproject_is_installed_again(miniature: Miniature) -> None:
     assert miniature.asked == []
 
 
-def test_a_moved_checkout_is_installed_again(miniature: Miniature) -> None:
+def test_a_moved_checkout_gets_a_new_environment(miniature: Miniature) -> None:
     miniature.run("setup")
     miniature.root = miniature.root.rename(miniature.root.with_name("moved"))
     miniature.run("setup")
-    assert miniature.asked == [f"{INSTALL}.[dev]"]
+    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.[dev]"]
 
 
-def test_a_failed_installation_is_said_and_tried_again(miniature: Miniature) -> None:
+def test_a_failed_installation_is_said_and_begun_again(miniature: Miniature) -> None:
     status, said = miniature.run("demo", PIP_FAILS="1")
     assert status == 1
     assert said.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
     assert miniature.asked[-1] == f"{INSTALL}."
     assert miniature.run("demo")[0] == 0
-    assert miniature.asked == [f"{INSTALL}.", "python -m kinfmu.demo"]
+    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.demo"]
+
+
+def test_an_interrupted_update_is_begun_again(miniature: Miniature) -> None:
+    miniature.run("demo")
+    assert miniature.run("test", PIP_FAILS="1")[0] == 1
+    miniature.run("demo")
+    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.demo"]
 
 
 def test_a_broken_environment_is_made_anew(miniature: Miniature) -> None:
     miniature.run("demo")
     (miniature.root / ".venv" / "bin" / "python").unlink()
     assert miniature.run("demo")[0] == 0
-    assert miniature.asked[0] == f"python3 -m venv --clear {miniature.root}/.venv"
+    assert miniature.asked[0] == f"python3 -m venv {miniature.root}/.venv"
+
+
+def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature) -> None:
+    tools = miniature.root / ".venv" / "bin"
+    tools.mkdir(parents=True)
+    shutil.copy(miniature.python, tools / "python")
+    (tools / "theirs").touch()
+    miniature.run("demo")
+    assert miniature.asked == [f"{INSTALL}.", "python -m kinfmu.demo"]
+    assert (tools / "theirs").exists()
 
 
 def test_no_python_at_all_is_said_in_one_line(miniature: Miniature) -> None:
