@@ -9,11 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kinfmu.log.review import review
-    from kinfmu.log.table import write_table
-
     from kinfmu.log.mcap_file import read, write_mcap
     from kinfmu.log.rerun_file import write_rrd
+    from kinfmu.log.review import review
+    from kinfmu.log.table import write_table
 
 __all__ = ["read", "review", "write_mcap", "write_rrd", "write_table"]
 

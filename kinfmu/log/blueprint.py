@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from kinfmu.log.blocks import TIMELINE
@@ -17,44 +17,58 @@ if TYPE_CHECKING:
 
 MOST_CURVES = 14  # a longer legend would hide the curves
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
-EDGE = 0.01  # of the run's time, left free on either side of the curves
+EDGE = 0.01  # of the run's time, left free before and after the curves
+LEGEND_ROOM = 0.28  # of the run's time, left free behind the curves for the legend
 
 
-def single(run: Run, scene: Scene | None, curves: Sequence[Group], diagnostics: Group) -> rrb.Blueprint:
+def single(run: Run, scene: Scene | None, curves: Mapping[tuple[str, str], Group], accuracy: Group) -> rrb.Blueprint:
     """One run: what moves on the left, what it measures on the right, one row an order, one column a unit."""
     import rerun.blueprint as rrb
 
-    axis = time_axis([run])
-    by_path = {group.path: group for group in curves}
     rows: list[rrb.Container | rrb.View] = []
     for order in ORDERS:
-        plots = [plot(group, "", axis) for kind in KINDS if (group := by_path.get(f"{order}/{kind}"))]
-        rows.append(rrb.Horizontal(*plots))
-    rows.append(
-        rrb.Horizontal(
-            plot(diagnostics, "", axis),
-            rrb.TimeSeriesView(
-                name="Newton iterations",
-                origin="/solver/iterations",
-                axis_x=axis,
-                plot_legend=rrb.PlotLegend(visible=False),
-            ),
-        )
-    )
-    rows.append(rrb.StateTimelineView(name="solver status", origin="/solver/status", time_view=axis))
-    left: list[rrb.Container | rrb.View] = [linkage_view(["/linkage/**"], [scene] if scene else [])]
-    text: list[rrb.View] = [rrb.TextDocumentView(name="run", origin="/card")]
+        found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
+        if found:
+            rows.append(rrb.Horizontal(*[plot(one.title, [f"/{one.path}"], len(one.names), [run]) for one in found]))
+    solver = plot(accuracy.title, ["/solver/accuracy", "/solver/error"], len(accuracy.names) + 3, [run])
+    rows.append(rrb.Horizontal(solver, plot("Newton iterations", ["/solver/iterations"], 1, [run])))
+    rows.append(status_view([""], [run]))
+    text: list[rrb.View] = [card_view()]
     if happenings(run):
-        text.append(log_view("/log"))
-    left.append(rrb.Horizontal(*text))
-    return arranged(
-        rrb.Horizontal(
-            rrb.Vertical(*left, row_shares=[2.2, 1]),
-            rrb.Vertical(*rows, row_shares=[2, 2, 2, 2, 1]),
-            column_shares=[1, 1.25],
-        ),
-        [run],
+        text.append(log_view([""]))
+    left = rrb.Vertical(
+        linkage_view(["/linkage/**"], [scene] if scene else []), rrb.Horizontal(*text), row_shares=[2.2, 1]
     )
+    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.0])
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
+
+
+def compared(
+    runs: tuple[Run, Run], scenes: Sequence[Scene], curves: Mapping[tuple[str, str], Group], same: bool
+) -> rrb.Blueprint:
+    """Two runs: overlaid on top, below the differences, `same` being whether there are any coordinates in common."""
+    import rerun.blueprint as rrb
+
+    def row(roots: Sequence[str], order: str, words: str) -> rrb.Horizontal:
+        plots = []
+        for kind in KINDS:
+            if group := curves.get((order, kind)):
+                paths = [f"{root}/{group.path}" for root in roots]
+                plots.append(plot(words.format(group.title), paths, len(roots) * len(group.names), runs))
+        return rrb.Horizontal(*plots)
+
+    rows: list[rrb.Container | rrb.View] = [row(["/a", "/b"], "position", "{} of A (wide) and B")]
+    if same:
+        rows += [row(["/difference"], order, "B - A: {}") for order in ORDERS]
+    rows.append(status_view(["/a", "/b"], runs))
+    text: list[rrb.View] = [card_view()]
+    if any(happenings(run) for run in runs):
+        text.append(log_view(["/a", "/b"]))
+    left = rrb.Vertical(
+        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes), rrb.Horizontal(*text), row_shares=[1.6, 1]
+    )
+    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.2])
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
 
 
 def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
@@ -79,26 +93,31 @@ def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
     )
 
 
-def time_axis(runs: Sequence[Run]) -> rrb.TimeAxis:
+def time_axis(runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
     """The time of the whole runs, not the half minute around the cursor that is Rerun's default."""
     import rerun as rr
     import rerun.blueprint as rrb
 
     start = min((float(run.t.min()) for run in runs if len(run)), default=0.0)
     stop = max((float(run.t.max()) for run in runs if len(run)), default=0.0)
-    edge = EDGE * (stop - start) or 0.5
+    length = stop - start or 1.0
     boundary = rr.encodings.TimeRangeBoundary.absolute
-    return rrb.TimeAxis(
-        view_range=rr.TimeRange(start=boundary(seconds=start - edge), end=boundary(seconds=stop + edge))
-    )
+    shown = rr.TimeRange(start=boundary(seconds=start - EDGE * length), end=boundary(seconds=stop + room * length))
+    return rrb.TimeAxis(view_range=shown)
 
 
-def plot(group: Group, root: str, axis: rrb.TimeAxis) -> rrb.TimeSeriesView:
-    """The curves of a group over the whole run."""
+def plot(title: str, paths: Sequence[str], curves: int, runs: Sequence[Run]) -> rrb.TimeSeriesView:
+    """The curves under `paths` over the whole runs, with their names beside them."""
     import rerun.blueprint as rrb
 
-    legend = rrb.PlotLegend(corner="LeftTop", visible=len(group.names) <= MOST_CURVES)
-    return rrb.TimeSeriesView(name=group.title, origin=f"{root}/{group.path}", axis_x=axis, plot_legend=legend)
+    named = 1 < curves <= MOST_CURVES
+    return rrb.TimeSeriesView(
+        name=title,
+        origin="/",
+        contents=list(paths),
+        axis_x=time_axis(runs, LEGEND_ROOM if named else EDGE),
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=named),
+    )
 
 
 def linkage_view(contents: Sequence[str], scenes: Sequence[Scene]) -> rrb.Spatial2DView:
@@ -114,8 +133,26 @@ def linkage_view(contents: Sequence[str], scenes: Sequence[Scene]) -> rrb.Spatia
     return rrb.Spatial2DView(name="linkage", origin="/", contents=list(contents), visual_bounds=bounds)
 
 
-def log_view(origin: str) -> rrb.TextLogView:
+def card_view() -> rrb.TextDocumentView:
+    """Mechanism, run and verdict."""
+    import rerun.blueprint as rrb
+
+    return rrb.TextDocumentView(name="run", origin="/card")
+
+
+def status_view(roots: Sequence[str], runs: Sequence[Run]) -> rrb.StateTimelineView:
+    """A lane of solver states for every run."""
+    import rerun.blueprint as rrb
+
+    contents = [f"{root}/solver/status" for root in roots]
+    return rrb.StateTimelineView(name="solver status", origin="/", contents=contents, time_view=time_axis(runs))
+
+
+def log_view(roots: Sequence[str]) -> rrb.TextLogView:
     """What happened when."""
     import rerun.blueprint as rrb
 
-    return rrb.TextLogView(name="log", origin=origin)
+    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    if len(roots) > 1:
+        columns = rrb.TextLogColumns(text_log_columns=["EntityPath", "LogLevel", "Body"])
+    return rrb.TextLogView(name="log", origin="/", contents=[f"{root}/log" for root in roots], columns=columns)

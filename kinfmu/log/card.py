@@ -14,24 +14,24 @@ MOST_EVENTS = 12  # the log holds them all
 def card(run: Run, note: str = "") -> str:
     """Markdown; `note` is one more sentence, such as what could not be drawn."""
     title = run.info.get("title") or run.info.get("name") or "Run"
-    lines = [f"## {_plain(title)}", "", _period(run), ""]
+    lines = [f"### {plain(title)}", "", _period(run), ""]
     if note:
-        lines += [_plain(note), ""]
-    lines += ["| samples | status |", "|---:|---|"]
-    lines += [f"| {number} | {MEANINGS[status]} |" for status, number in counts(run).items()]
+        lines += [plain(note), ""]
     worst = worst_residual(run)
     if worst:
-        lines += ["", f"Worst residual: {worst.residual:.2g} of the mechanism's size, at {worst.t:g} s."]
+        lines += [f"Worst residual {worst.residual:.2g} of the mechanism's size, at {worst.t:g} s.", ""]
+    lines += ["| samples | status |", "|---:|---|"]
+    lines += [f"| {number} | {MEANINGS[status]} |" for status, number in counts(run).items()]
     if run.watch_names:
         lines += [
             "",
-            f"Watched, set aside as redundant: {_plain(', '.join(run.watch_names[:MOST_EVENTS]))}"
+            f"Watched, set aside as redundant: {plain(', '.join(run.watch_names[:MOST_EVENTS]))}"
             + (f" and {len(run.watch_names) - MOST_EVENTS} more." if len(run.watch_names) > MOST_EVENTS else "."),
         ]
     events = happenings(run)
     if events:
         lines += ["", "| t [s] | event |", "|---:|---|"]
-        lines += [f"| {event.t:g} | {_plain(event.text)} |" for event in events[:MOST_EVENTS]]
+        lines += [f"| {event.t:g} | {plain(event.text)} |" for event in events[:MOST_EVENTS]]
         if len(events) > MOST_EVENTS:
             lines.append(f"| | and {len(events) - MOST_EVENTS} more, in the log |")
     lines += _table("about", {key: value for key, value in run.info.items() if key != "title"})
@@ -50,10 +50,10 @@ def _period(run: Run) -> str:
 def _table(heading: str, entries: Mapping[str, str]) -> list[str]:
     if not entries:
         return []
-    rows = [f"| {_plain(name)} | {_plain(value)} |" for name, value in entries.items()]
+    rows = [f"| {plain(name)} | {plain(value)} |" for name, value in entries.items()]
     return ["", f"| {heading} | |", "|---|---|", *rows]
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Text that Markdown shows as it is, on one line."""
     return re.sub(r"([\\`*_|<>\[\]#])", r"\\\1", " ".join(text.split()))

@@ -64,7 +64,7 @@ class Template:
         return self.uint32(count).words(count)
 
     def fill(self, stamps: NDArray[np.int64], words: NDArray[np.generic] | None = None) -> Bytes:
-        """Messages (n, L): stamps (n,) [ns] go into every time slot, words (n, slots), 8-byte items, into the others."""
+        """Messages (n, L): stamps (n,) [ns] fill every time slot, words (n, slots), 8-byte items, the others."""
         out = np.tile(np.frombuffer(bytes(self._bytes), np.uint8), (len(stamps), 1))
         times = _bytes_of(np.column_stack([stamps // NANOSECONDS, stamps % NANOSECONDS]).astype("<u4"))
         for place in self._stamps:

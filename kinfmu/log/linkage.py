@@ -29,16 +29,21 @@ def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def log_linkage(
-    rec: rr.RecordingStream, root: str, run: Run, scene: Scene, colour: palette.Colour | None = None
+    rec: rr.RecordingStream,
+    root: str,
+    run: Run,
+    scene: Scene,
+    colour: palette.Colour | None = None,
+    width: float = 1.0,
 ) -> None:
-    """The linkage under the entity `root`: all in `colour`, or each body in its own.
+    """The linkage under the entity `root`: all in `colour`, or each body in its own; `width` scales the lines.
 
     Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
     nothing to draw.
     """
     import rerun as rr
 
-    size = scene.size
+    size = width * scene.size
     # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
     rec.log(root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
     _log_ground(rec, root, scene)
@@ -62,14 +67,20 @@ def log_linkage(
         )
         _send_strips(rec, path, run.t[good], bar.ends[good])
         _send_colours(rec, path, run, colour or palette.BAR)
-    _log_points(rec, f"{root}/pins", run, scene.pins, rr.Points2D.from_fields(radii=[_PIN * size], draw_order=30.0))
-    for index, (name, path) in enumerate(scene.paths.items()):
+    _log_points(
+        rec,
+        f"{root}/pins",
+        run,
+        scene.pins,
+        rr.Points2D.from_fields(radii=[_PIN * size], colors=[palette.PIN], draw_order=30.0),
+    )
+    for index, (name, points) in enumerate(scene.paths.items()):
         own = colour or palette.body(len(scene.bodies) + index)
-        _log_path(rec, f"{root}/paths/{name}", path, own)
-        look = rr.Points2D.from_fields(
+        _log_path(rec, f"{root}/paths/{name}", points, own)
+        tip = rr.Points2D.from_fields(
             radii=[_PIN * size], colors=[own], labels=[name], show_labels=colour is None, draw_order=40.0
         )
-        _log_points(rec, f"{root}/points/{name}", run, path[:, None, :], look)
+        _log_points(rec, f"{root}/points/{name}", run, points[:, None, :], tip)
     _log_notice(rec, f"{root}/notice", run, scene)
 
 

@@ -104,8 +104,8 @@ def _run_in(reader: McapReader, where: str) -> Run:
         payloads.append(message.data)
         order.append(message.sequence)
     template = _sample_template(len(column_names(metadata[_RECORD])))
-    table = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), template.length)
-    table = template.read(table[np.argsort(order, kind="stable")])
+    messages = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), template.length)
+    table = template.read(messages[np.argsort(order, kind="stable")])
     return run_of(metadata[_RECORD], table, metadata.get(_INFO, {}), texts[0] if texts else "", where)
 
 

@@ -15,6 +15,8 @@ BODIES: tuple[Colour, ...] = (
 )
 GROUND: Colour = (150, 150, 150)
 BAR: Colour = (190, 190, 190)
+PIN: Colour = (235, 235, 235)
+RUNS: tuple[Colour, Colour] = ((213, 94, 0), (86, 180, 233))  # two runs compared
 OUT_OF_REACH: Colour = (110, 110, 110)
 STATUS: tuple[Colour, ...] = (
     (0, 140, 100),

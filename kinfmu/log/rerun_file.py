@@ -3,7 +3,7 @@
     /linkage/...        bodies, pins, bars, supports, guides, paths of points; y up
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
                         one curve a coordinate, in rad and the mechanism's unit of length
-    /solver/accuracy    log10 of residual, watches and estimated errors
+    /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors
     /solver/iterations  of Newton's method
     /solver/status      a lane of states
     /log                changes of status and events
@@ -30,7 +30,7 @@ from kinfmu.log.card import card
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.linkage import log_linkage
 from kinfmu.log.scene import drawable
-from kinfmu.log.series import Group, accuracy, groups
+from kinfmu.log.series import Group, accuracy, error_estimates, groups
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.run import Run
@@ -45,32 +45,31 @@ _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it."""
-    import rerun as rr
-
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     scene, note = drawable(run)
-    curves = groups(run)
-    diagnostics = accuracy(run)
+    curves, solver = groups(run), accuracy(run)
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(run, scene, list(curves.values()), diagnostics)) as rec:
-        rec.send_property("kinfmu", rr.AnyValues(verdict=sentence(run), length_unit=run.length_unit, **_entries(run)))
+    with recording(path, name, single(run, scene, curves, solver)) as rec:
+        rec.send_property("kinfmu", _properties(run))
         if scene:
-            log_linkage(rec, "linkage", run, scene)
-        for group in curves.values():
+            log_linkage(rec, "/linkage", run, scene)
+        for group in (*curves.values(), solver):
             log_group(rec, "", run, group)
-        log_group(rec, "", run, diagnostics)
+        log_group(rec, "", run, error_estimates(run), as_points=True)
         _log_iterations(rec, run)
         log_status(rec, "", run)
-        rec.log("card", rr.TextDocument(card(run, note), media_type="text/markdown"), static=True)
+        log_card(rec, card(run, note))
 
 
 @contextmanager
-def recording(path: str | Path, name: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+def recording(
+    path: str | Path, name: str, layout: rrb.Blueprint, application: str = APPLICATION
+) -> Iterator[rr.RecordingStream]:
     """A recording that is at `path` as a whole when the block ends."""
     import rerun as rr
 
     with replacing(path) as temporary:
-        rec = rr.RecordingStream(APPLICATION, recording_id=f"{Path(path).stem}-{uuid4()}")
+        rec = rr.RecordingStream(application, recording_id=f"{Path(path).stem}-{uuid4()}")
         rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
         rec.set_log_tick_enabled(False)
         rec.save(temporary, default_blueprint=layout)
@@ -83,19 +82,28 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint) -> Iterator[rr
         _check_whole(temporary, path)
 
 
-def log_group(rec: rr.RecordingStream, root: str, run: Run, group: Group) -> None:
-    """The curves of a group, a gap where they are NaN; a run of one sample as points, which a line would not show."""
+def log_group(
+    rec: rr.RecordingStream, root: str, run: Run, group: Group, width: float = 1.5, as_points: bool = False
+) -> None:
+    """The curves of a group, a gap where they are NaN; as points if asked for or if a line would not show."""
     import rerun as rr
 
     path = f"{root}/{group.path}"
     names, colours = list(group.names), list(group.colours)
     look: rr.SeriesPoints | rr.SeriesLines
-    if len(run) == 1:
-        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[4.0] * len(names))
+    if as_points or len(run) == 1:
+        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[3.0] * len(names))
     else:
-        look = rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names))
+        look = rr.SeriesLines(names=names, colors=colours, widths=[width] * len(names))
     rec.log(path, look, static=True)
     send(rec, path, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(group.values[rows])))
+
+
+def log_card(rec: rr.RecordingStream, markdown: str) -> None:
+    """The text beside the linkage."""
+    import rerun as rr
+
+    rec.log("/card", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
 
 
 def log_status(rec: rr.RecordingStream, root: str, run: Run) -> None:
@@ -125,15 +133,20 @@ def _log_iterations(rec: rr.RecordingStream, run: Run) -> None:
     import rerun as rr
 
     look = rr.SeriesLines(names="iterations", colors=[palette.body(1)], widths=1.5, interpolation_mode="StepAfter")
-    one = rr.SeriesPoints(names="iterations", colors=[palette.body(1)], marker_sizes=4.0)
-    rec.log("solver/iterations", one if len(run) == 1 else look, static=True)
+    one = rr.SeriesPoints(names="iterations", colors=[palette.body(1)], marker_sizes=3.0)
+    rec.log("/solver/iterations", one if len(run) == 1 else look, static=True)
     counts = run.iterations.astype(float)
-    send(rec, "solver/iterations", run.t, lambda rows: rr.Scalars.columns(scalars=counts[rows]))
+    send(rec, "/solver/iterations", run.t, lambda rows: rr.Scalars.columns(scalars=counts[rows]))
 
 
-def _entries(run: Run) -> dict[str, str]:
-    """The run's info as recording properties."""
-    return {key: value for key, value in run.info.items() if key not in ("verdict", "length_unit")}
+def _properties(run: Run) -> rr.AnyValues:
+    """The run's info, unit and verdict as properties of the recording."""
+    import rerun as rr
+
+    about = rr.AnyValues()
+    for name, text in {**run.info, "length_unit": run.length_unit, "verdict": sentence(run)}.items():
+        about.with_component_from_data(name, text)
+    return about
 
 
 def _check_whole(file: Path, path: str | Path) -> None:

@@ -76,10 +76,10 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     """
     width = 0.02 * scene.size * metres
     links = [_link(ROOT, palette.GROUND, [np.array([point]) for point in scene.supports.values()], width, 0.0, metres)]
-    for body in scene.bodies:
-        links.append(
-            _link(body.name, palette.body(body.index), [body.outline], width, width * (1 + body.index), metres)
-        )
+    links += [
+        _link(body.name, palette.body(body.index), [body.outline], width, width * (1 + body.index), metres)
+        for body in scene.bodies
+    ]
     for bar in scene.bars:
         ends = np.array([[0.0, 0.0], [bar.length, 0.0]])
         links.append(_link(_bar_frame(bar.name), palette.BAR, [ends], 0.6 * width, -width, metres))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,19 +50,28 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
 
 
 def accuracy(run: Run) -> Group:
-    """log10 of the residual, the largest watch and the estimated errors of q, qd, qdd, as far as they occur."""
+    """log10 of the residual and of the largest watch, both relative to the mechanism's size."""
     curves = {"residual": run.residual}
     if run.watch_names:
         curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
-    for k, name in enumerate(("error of q", "error of qd", "error of qdd")):
-        if np.any(run.error[:, k] > 0.0):
-            curves[name] = run.error[:, k]
+    return _logarithmic("accuracy", curves, 0, SMALLEST)
+
+
+def error_estimates(run: Run) -> Group:
+    """log10 of the estimated errors of q, qd, qdd, where there are any: they come with samples near singular points."""
+    curves = {f"error of {name}": run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
+    return _logarithmic("error", curves, 2, np.nan)
+
+
+def _logarithmic(path: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
+    """log10 of the curves; `zero` is drawn in the place of 0."""
+    table = np.column_stack(list(curves.values()))
     return Group(
-        path="solver/accuracy",
-        title="log10 of residual and error [relative]",
+        path=f"solver/{path}",
+        title="log10 of residual, watch, estimated error",
         names=tuple(curves),
-        colours=tuple(palette.body(k) for k in range(len(curves))),
-        values=np.log10(np.maximum(np.column_stack(list(curves.values())), SMALLEST)),
+        colours=tuple(palette.body(first_colour + k) for k in range(len(curves))),
+        values=np.log10(np.where(table > 0.0, np.maximum(table, SMALLEST), zero)),
     )
 
 

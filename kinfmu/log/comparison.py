@@ -1,0 +1,109 @@
+"""Rerun recording of two runs: overlaid, with their differences."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.errors import LogError
+from kinfmu.log import palette
+from kinfmu.log.blueprint import compared
+from kinfmu.log.card import plain
+from kinfmu.log.clock import nanoseconds
+from kinfmu.log.linkage import log_linkage
+from kinfmu.log.rerun_file import log_card, log_group, log_status, recording
+from kinfmu.log.scene import drawable
+from kinfmu.log.series import Group, groups
+from kinfmu.log.verdict import sentence
+from kinfmu.run import FloatArray, Run
+
+APPLICATION = "kinfmu_compare"  # its own, for its blueprint is another
+WIDE, NARROW = 4.0, 1.5  # widths of the curves of A and, drawn over them, B
+
+
+def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = ("A", "B")) -> None:
+    """Runs `a` and `b` in one recording, linkages and curves overlaid, B - A for the coordinates that both have."""
+    if a.length_unit != b.length_unit:
+        raise LogError(
+            f"{path}: the runs measure lengths in {a.length_unit} and {b.length_unit}; they need the same unit"
+        )
+    for run in (a, b):
+        nanoseconds(run.t)
+    scenes, notes = zip(*(drawable(run) for run in (a, b)), strict=True)
+    difference = _difference(a, b)
+    curves = groups(a) or groups(b)
+    layout = compared((a, b), [scene for scene in scenes if scene], curves, same=difference is not None)
+    with recording(path, f"{names[0]} and {names[1]}", layout, APPLICATION) as rec:
+        for root, run, scene, colour, line in zip(
+            ("/a", "/b"), (a, b), scenes, palette.RUNS, ((1.0, WIDE), (0.5, NARROW)), strict=True
+        ):
+            if scene:
+                log_linkage(rec, f"{root}/linkage", run, scene, colour, line[0])
+            for group in groups(run).values():
+                log_group(rec, root, run, _named(group, root[1:].upper()), line[1])
+            log_status(rec, root, run)
+        if difference:
+            for group in groups(difference).values():
+                log_group(rec, "/difference", difference, group)
+        log_card(rec, _card(a, b, difference, names, [note for note in notes if note]))
+
+
+def _difference(a: Run, b: Run) -> Run | None:
+    """B - A at the times of A for the coordinates of A that B has too; B is interpolated where its times differ.
+
+    Linear interpolation is off by up to h^2 / 8 times the second derivative; equal times are compared as they are.
+    """
+    common = [name for name in a.outputs if name in b.outputs]
+    if not common or not len(a) or not len(b):
+        return None
+    of_a, of_b = ([run.outputs.index(name) for name in common] for run in (a, b))
+    tables = {
+        key: _at(a.t, b.t, getattr(b, key)[:, of_b]) - getattr(a, key)[:, of_a]
+        for key in ("values", "rates", "accelerations")
+    }
+    return dataclasses.replace(a, outputs=tuple(common), coordinate_count=len(common), **tables)
+
+
+def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
+    """Columns of table (n, k), given at t, at other times; NaN outside them."""
+    if np.array_equal(times, t):
+        return table
+    if np.any(np.diff(t) <= 0.0):
+        raise LogError(
+            "the runs have different times, and those of B do not increase, so that it cannot be interpolated"
+        )
+    return np.column_stack([np.interp(times, t, column, left=np.nan, right=np.nan) for column in table.T])
+
+
+def _named(group: Group, run: str) -> Group:
+    """The group with its curves named after the run, B's in lighter colours."""
+    colours = group.colours if run == "A" else tuple(palette.lighter(colour) for colour in group.colours)
+    return dataclasses.replace(group, names=tuple(f"{run} {name}" for name in group.names), colours=colours)
+
+
+def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes: list[str]) -> str:
+    lines = [
+        "### B - A",
+        "",
+        f"**A**, orange: {plain(names[0])}. {sentence(a)}.",
+        "",
+        f"**B**, blue: {plain(names[1])}. {sentence(b)}.",
+        "",
+        *[plain(note) for note in notes],
+    ]
+    if difference is None:
+        return "\n".join([*lines, "", "The runs have no coordinates in common.", ""])
+    if not np.array_equal(a.t, b.t):
+        lines += ["The times differ: B is interpolated linearly at those of A.", ""]
+    lines += ["| largest difference | position | velocity | acceleration |", "|---|---:|---:|---:|"]
+    for k, name in enumerate(difference.outputs):
+        tables = (difference.values, difference.rates, difference.accelerations)
+        lines.append(f"| {plain(name)} | " + " | ".join(_largest(table[:, k]) for table in tables) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _largest(column: FloatArray) -> str:
+    known = np.abs(column[np.isfinite(column)])
+    return f"{known.max():.2g}" if len(known) else "-"

@@ -1,0 +1,162 @@
+"""A Rerun viewer without a window: pictures of recordings, and what its views complain about."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO, TYPE_CHECKING
+
+from kinfmu.errors import LogError
+from kinfmu.log.blocks import TIMELINE
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
+
+START_TIME, SETTLE_TIME = 30.0, 25.0  # [s], at most
+NO_DRIVER = (
+    "no graphics driver for a picture without a display; on Debian: apt-get install mesa-vulkan-drivers libvulkan1"
+)
+_POLL = 0.05  # [s]
+_PROBE_SIZE = 640  # [pixels]; small pictures suffice to see that nothing changes any more
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture of a recording: PNG bytes, the names of its views, and their complaints as 'view: text'."""
+
+    png: bytes
+    views: tuple[str, ...]
+    reports: tuple[str, ...]
+
+
+def shoot(path: str | Path, at: float | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
+    """Show a recording in an invisible viewer, at time `at` [s] if given, and take a picture once it stands still.
+
+    A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
+    """
+    with _viewer(size) as (client, deadline):
+        client.open(str(Path(path).resolve()))
+        while not client.get_state().views and time.monotonic() < deadline:
+            time.sleep(_POLL)
+        if at is not None:
+            client.set_time(TIMELINE, play_state="paused", duration=at)
+        _settle(client, deadline)
+        views = client.get_state().views
+        reports = tuple(
+            f"{view.name}: {report.severity}: {report.summary}" for view in views for report in view.reports
+        )
+        return Shot(client.take_screenshot(), tuple(view.name for view in views), reports)
+
+
+def executable() -> str:
+    """The viewer itself. The `rerun` script starts it as a child, which would outlive an end of the script."""
+    import rerun_cli  # type: ignore[import-untyped]
+
+    name = "rerun.exe" if os.name == "nt" else "rerun"
+    found = Path(rerun_cli.__file__).with_name(name)
+    if not found.exists():
+        raise LogError(
+            f"the Rerun viewer is not at '{found}'; install it again: pip install --force-reinstall rerun-sdk"
+        )
+    return str(found)
+
+
+def last_words(stream: IO[bytes]) -> str:
+    """The last line with an error in what a viewer wrote, or its last line."""
+    stream.seek(0)
+    lines = [line.strip() for line in stream.read().decode(errors="replace").splitlines() if line.strip()]
+    telling = [line for line in lines if "error" in line.lower() or "adapter" in line.lower()]
+    return (telling or lines or ["no reason given"])[-1]
+
+
+@contextmanager
+def _viewer(size: tuple[int, int]) -> Iterator[tuple[ViewerClient, float]]:
+    """A viewer of our own on the loopback interface, ended with the block, and when to stop waiting for it."""
+    from rerun.experimental import ViewerClient
+
+    port = _free_port()
+    arguments = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
+    arguments += ["--memory-limit", "2GB", "--window-size", f"{size[0]}x{size[1]}"]
+    with TemporaryFile() as complaints:
+        process = subprocess.Popen(  # noqa: S603  # our own arguments
+            [executable(), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=complaints,
+            start_new_session=True,
+            env=os.environ | {"CI": "1"},  # no usage statistics from pictures and tests
+        )
+        try:
+            _await_port(process, port, complaints)
+            with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
+                _await_answer(process, client, complaints)
+                yield client, time.monotonic() + SETTLE_TIME
+        finally:
+            _end(process)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _await_port(process: subprocess.Popen[bytes], port: int, complaints: IO[bytes]) -> None:
+    deadline = time.monotonic() + START_TIME
+    while time.monotonic() < deadline:
+        _still_there(process, complaints)
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=0.5):
+            return
+        time.sleep(_POLL)
+    raise LogError(f"the viewer did not start within {START_TIME:.0f} s")
+
+
+def _await_answer(process: subprocess.Popen[bytes], client: ViewerClient, complaints: IO[bytes]) -> None:
+    """The port opens before the viewer can answer, and before it looks for a graphics driver."""
+    deadline = time.monotonic() + START_TIME
+    while True:
+        try:
+            client.get_state()
+        except Exception as error:  # whatever the transport raises, until the viewer answers
+            _still_there(process, complaints)
+            if time.monotonic() > deadline:
+                raise LogError(f"the viewer does not answer: {error}") from error
+            time.sleep(_POLL)
+        else:
+            return
+
+
+def _still_there(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> None:
+    if process.poll() is None:
+        return
+    words = last_words(complaints)
+    if "adapter" in words.lower():
+        raise LogError(NO_DRIVER, no_graphics=True)
+    raise LogError(f"the viewer ended at once: {words}")
+
+
+def _settle(client: ViewerClient, deadline: float) -> None:
+    """Wait for three equal pictures in a row: plots load one by one, and notices fade."""
+    last, same = b"", 0
+    while same < 2 and time.monotonic() < deadline:
+        picture = client.take_screenshot(max_size=_PROBE_SIZE)
+        same = same + 1 if picture == last else 0
+        last = picture
+        time.sleep(5 * _POLL)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ask the viewer to end, then make it."""
+    process.terminate()
+    try:
+        process.wait(5.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

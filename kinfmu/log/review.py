@@ -1,0 +1,130 @@
+"""Look at a run: open it in the Rerun viewer, save the recording, or take a picture."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
+
+from kinfmu.errors import LogError
+from kinfmu.log.headless import executable, last_words, shoot
+from kinfmu.log.mcap_file import read
+from kinfmu.log.rerun_file import write_rrd
+from kinfmu.log.target import replacing
+
+FAILS_WITHIN = 1.5  # [s]; a viewer that cannot open a window ends sooner
+POSTER = 1 / 3  # of the run's time: where a picture is taken if no time is given; ends are often singular
+_VIEWERS: list[subprocess.Popen[bytes]] = []  # kept, for Python warns of processes that it forgets
+
+
+def review(
+    run: str | Path,
+    other: str | Path | None = None,
+    *,
+    save: str | Path | None = None,
+    screenshot: str | Path | None = None,
+    at: float | None = None,
+) -> Path | None:
+    """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
+
+    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s].
+    Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
+    recording is, None if there was only a picture.
+    """
+    run = Path(run)
+    for path in (run, *([Path(other)] if other else [])):
+        if path.suffix not in (".mcap", ".rrd"):
+            raise LogError(f"{path}: a run to review is an .mcap or .rrd file")
+        if not path.is_file():
+            raise LogError(f"{path}: there is no such file")
+    if not save and not screenshot:
+        _need_display(run)
+    if run.suffix == ".rrd":
+        return _review_recording(run, other, save, screenshot, at)
+    if screenshot and not save:
+        with TemporaryDirectory() as folder:
+            recording = Path(folder) / f"{run.stem}.rrd"
+            _shoot(recording, screenshot, _record(run, other, recording, at))
+        return None
+    recording = Path(save) if save else run.with_name(_beside(run, other))
+    moment = _record(run, other, recording, at)
+    if screenshot:
+        _shoot(recording, screenshot, moment)
+    if not save:
+        _open(recording)
+    return recording
+
+
+def _review_recording(
+    recording: Path,
+    other: str | Path | None,
+    save: str | Path | None,
+    screenshot: str | Path | None,
+    at: float | None,
+) -> Path:
+    """The same for a recording that is there already."""
+    if other or save:
+        what = "compared" if other else "saved as another"
+        raise LogError(f"{recording}: a recording cannot be {what}; give the run's .mcap file")
+    if screenshot:
+        _shoot(recording, screenshot, at)
+    else:
+        _open(recording)
+    return recording
+
+
+def _beside(run: Path, other: str | Path | None) -> str:
+    return f"{run.stem}-{Path(other).stem}.rrd" if other else f"{run.stem}.rrd"
+
+
+def _record(run: Path, other: str | Path | None, recording: Path, at: float | None) -> float | None:
+    """Write the recording; returns the time [s] at which a picture of it shows something."""
+    first = read(run)
+    if other is None:
+        write_rrd(first, recording)
+    else:
+        from kinfmu.log.comparison import write_comparison
+
+        write_comparison(first, read(other), recording, (Path(run).name, Path(other).name))
+    times = first.t[first.good] if first.good.any() else first.t
+    if at is not None or not len(times):
+        return at
+    return float(times[int(POSTER * (len(times) - 1))])
+
+
+def _shoot(recording: Path, screenshot: str | Path, at: float | None) -> None:
+    """A picture of the recording; a view that cannot show its data is an error."""
+    with replacing(screenshot) as temporary:
+        shot = shoot(recording, at)
+        temporary.write_bytes(shot.png)
+    if shot.reports:
+        raise LogError(f"{screenshot}: the viewer complains: {'; '.join(shot.reports)}")
+
+
+def _need_display(run: Path) -> None:
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise LogError(
+            f"{run}: there is no display to open the viewer on; save a recording for another machine (--save F.rrd) "
+            "or take a picture (--screenshot F.png)"
+        )
+
+
+def _open(recording: Path) -> None:
+    """Start the viewer and leave it running; a viewer that is open already takes the recording over."""
+    with TemporaryFile() as complaints:
+        viewer = subprocess.Popen(  # noqa: S603  # our own arguments
+            [executable(), "--bind", "127.0.0.1", str(recording.resolve())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=complaints,
+            start_new_session=True,
+        )
+        try:
+            code = viewer.wait(FAILS_WITHIN)
+        except subprocess.TimeoutExpired:
+            _VIEWERS.append(viewer)
+            return
+        if code:
+            raise LogError(f"{recording}: the viewer could not be opened: {last_words(complaints)}")

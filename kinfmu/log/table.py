@@ -1,0 +1,70 @@
+"""Tables of a run for everything else: CSV, Parquet and numpy's npz, one column for each name of the contract."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.errors import LogError, MissingPackageError, listed
+from kinfmu.log.record import description
+from kinfmu.log.target import replacing
+from kinfmu.run import Run
+
+
+def write_table(run: Run, path: str | Path) -> None:
+    """Write all columns of `run` to a .csv, .parquet or .npz file.
+
+    CSV: one line of names, then one a sample; numbers read back to the same bits, a sample without numbers says nan.
+    Nothing but names and numbers, so that `pandas.read_csv(path)` does; Parquet (metadata of fields and table) and npz
+    (`kinfmu.units` beside `kinfmu.columns`) carry the units and the mechanism too.
+    """
+    writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
+    suffix = Path(path).suffix.lower()
+    if suffix not in writers:
+        raise LogError(f"{path}: '{suffix}' is no table that can be written; known: {listed(writers)}")
+    with replacing(path) as temporary:
+        writers[suffix](run, temporary)
+
+
+def _write_csv(run: Run, path: Path) -> None:
+    columns = list(run.columns())
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(_quoted(column.name) for column in columns) + "\n")
+        rows = zip(*(column.values.tolist() for column in columns), strict=True)
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)  # repr: shortest text of the same bits
+
+
+def _quoted(name: str) -> str:
+    """A name as a CSV field."""
+    return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n\r') else name
+
+
+def _write_parquet(run: Run, path: Path) -> None:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
+
+    columns = list(run.columns())
+    about = description(run) | {"mechanism": run.mechanism_text} | {f"info.{k}": v for k, v in run.info.items()}
+    schema = pa.schema(
+        [
+            pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), False, {"unit": column.unit})
+            for column in columns
+        ],
+        metadata={f"kinfmu.{key}": value for key, value in about.items()},
+    )
+    table = pa.table([pa.array(column.values) for column in columns], schema=schema)
+    pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+
+
+def _write_npz(run: Run, path: Path) -> None:
+    columns = list(run.columns())
+    texts = {
+        "kinfmu.columns": np.array([column.name for column in columns]),
+        "kinfmu.units": np.array([column.unit for column in columns]),
+        "kinfmu.mechanism": np.array(run.mechanism_text),
+    }
+    np.savez_compressed(path, allow_pickle=False, **{column.name: column.values for column in columns}, **texts)
