@@ -8,7 +8,8 @@ along the numbers, nothing recurses.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.joints.arithmetic import cos, sin, sqrt
@@ -187,6 +188,32 @@ def reachable(targets: Iterable[Node]) -> list[Node]:
             found[node.id] = node
             stack.extend(node.args)
     return [found[number] for number in sorted(found)]
+
+
+def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float]:
+    """Numbers for the targets, given a number for each symbol by name. For plans, not for run time."""
+    at: dict[Node, float] = {}
+    for node in reachable(targets):
+        args = [at[arg] for arg in node.args]
+        if node.op == "constant":
+            at[node] = float(node.constant or 0.0)
+        elif node.op == "symbol":
+            at[node] = values[node.name]
+        else:
+            at[node] = _OPERATIONS[node.op](*args)
+    return [at[target] for target in targets]
+
+
+_OPERATIONS: dict[str, Callable[..., float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "neg": operator.neg,
+    "sin": math.sin,
+    "cos": math.cos,
+    "sqrt": math.sqrt,
+}
 
 
 def symbols(targets: Iterable[Node]) -> list[Node]:

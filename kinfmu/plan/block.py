@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from kinfmu.equations.graph import Node
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.equations.graph import Node, evaluate
 from kinfmu.equations.system import System
 from kinfmu.naming import derivative_name
 from kinfmu.plan.structure import BlockStructure, RowTracer, given_value
 from kinfmu.plan.trace import Tracer
+
+_DETERMINANT_SAMPLES = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +38,7 @@ class Block:
     jacobian: tuple[tuple[Node, ...], ...]
     velocity: tuple[Node, ...]
     acceleration: tuple[Node, ...]
+    determinant_scale: float  # the largest |determinant| of J met over random poses: what counts as far from singular
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -72,9 +78,10 @@ class Rates:
 
 
 def build_block(
-    system: System, tracer: Tracer, row: RowTracer, rates: Rates, structure: BlockStructure, fixed: Mapping[str, Node]
+    system: System, tracer: Tracer, row: RowTracer, rates: Rates, structure: BlockStructure, fixed: Mapping[str, Node],
+    anchor: Mapping[str, float],
 ) -> Block:
-    """Trace the rows of a block once and take everything from that trace."""
+    """Trace the rows of a block once and take everything from that trace. anchor: all coordinates, by name."""
     known = dict(fixed)
     assigned = []
     for name, index in structure.assigned:
@@ -89,6 +96,7 @@ def build_block(
     residuals = [row(index, known) for index in solved]
     one = tracer.graph.constant(1.0)
     columns = [tracer.graph.derivative(residuals, {unknown: one}) for unknown in unknowns]
+    jacobian = tuple(zip(*columns, strict=True)) if columns else ()
     return Block(
         assigned=tuple(assigned),
         unknowns=structure.unknowns,
@@ -96,7 +104,37 @@ def build_block(
         assigned_by=tuple(system.rows[index].name for _, index in structure.assigned),
         row_scales=tuple(float(system.rows[index].scale * system.size) for index in solved),
         residuals=tuple(residuals),
-        jacobian=tuple(zip(*columns, strict=True)) if columns else (),
+        jacobian=jacobian,
         velocity=tuple(rates.of(residuals, at_rest=unknowns)),
         acceleration=tuple(rates.second(residuals, unaccelerated=unknowns)),
+        determinant_scale=_determinant_scale(jacobian, anchor, system.size),
     )
+
+
+def block_determinant(jacobian: NDArray[np.float64]) -> float:
+    """What the run time watches as the determinant of a block: for one and two unknowns det J itself; from three on that
+    of the rows scaled to unit length; for tall J the product of R's diagonal over the column lengths.
+    """
+    m, k = jacobian.shape
+    if m > k:
+        lengths = np.linalg.norm(jacobian, axis=0)
+        return float(np.prod(np.abs(np.diag(np.linalg.qr(jacobian, mode="r"))) / np.where(lengths > 0.0, lengths, 1.0)))
+    if k > 2:
+        jacobian = jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
+    return float(np.linalg.det(jacobian))
+
+
+def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], size: float) -> float:
+    if not jacobian:
+        return 1.0
+    rng = np.random.default_rng(1989)
+    largest = 0.0
+    for sample in range(_DETERMINANT_SAMPLES):
+        turned = {
+            name: value if sample == 0 else rng.uniform(-np.pi, np.pi) if name.endswith(".phi")
+            else value + size * rng.uniform(-0.5, 0.5)
+            for name, value in anchor.items()
+        }
+        entries = evaluate([entry for row in jacobian for entry in row], turned)
+        largest = max(largest, abs(block_determinant(np.reshape(entries, (len(jacobian), -1)))))
+    return largest or 1.0

@@ -96,7 +96,7 @@ class SolvePlan:
         for node, k in number.items():
             lines.append(f"{k} = {node.op} {node.value if not node.args else ' '.join(str(number[a]) for a in node.args)}")
         for block in self.blocks:
-            lines.append(f"block {block.unknowns} {block.row_names} {block.row_scales} {[number[n] for n in _nodes(block)]}")
+            lines.append(f"block {block.unknowns} {block.row_names} {block.row_scales} {block.determinant_scale!r} {[number[n] for n in _nodes(block)]}")
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"{list(self.fixed.items())} {self.law_constants} {self.drivers} {self.coordinate_count}"]
@@ -163,8 +163,9 @@ def plan_from(system: System, redundancy: Redundancy, outputs: Sequence[str] | N
     motions, coordinate_count, fixed = _outputs(mechanism, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
+    at_anchor = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
     blocks = _needed(
-        [build_block(system, tracer, row, rates, part, known) for part in structure.blocks],
+        [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
         [motion.position for motion in motions],
     )
     solved = {name for block in blocks for name in block.coordinates}

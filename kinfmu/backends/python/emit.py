@@ -1,0 +1,397 @@
+"""SolvePlan -> Python source: one module of plain arithmetic on the standard library, the `model` of a Solver.
+
+The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
+
+    drive(t, constants)                            -> u, ud, udd
+    position(u, z, held)                           -> z, determinants, residual, iterations, values
+    velocity(values, ud, given, held)              -> zd
+    acceleration(values, ud, udd, zd, given, held) -> zdd
+    outputs(values)                                -> positions of the outputs
+    rates(values, ud, zd)                          -> their rates
+    accelerations(values, ud, udd, zd, zdd)        -> their accelerations
+    watches(values)                                -> rows set aside, relative to the size
+    jacobians(values)                              -> one matrix a block
+
+z are the unknowns of all blocks; `held` is a bit a block: set, its z is taken as given instead of solved for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from kinfmu.backends.python.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.naming import derivative_name
+from kinfmu.plan import Block, SolvePlan
+
+ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
+SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
+ITERATIONS = 12
+
+
+def emit(plan: SolvePlan) -> str:
+    """Source text of the model module; equal plans give equal text."""
+    return _Emitter(plan).module()
+
+
+class _Emitter:
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        self.solved = [block for block in plan.blocks if block.unknowns]
+        self.number = {id(block): k for k, block in enumerate(self.solved)}
+        self.names = Names()
+        self.position_nodes: list[Node] = []
+        for block in plan.blocks:
+            for name, motion in block.assigned:
+                self.names.assign(motion[0], name)
+            self.position_nodes += [motion[0] for _, motion in block.assigned]
+            self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+        self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
+        self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
+
+    def module(self) -> str:
+        later = [
+            self._velocity(),
+            self._acceleration(),
+            self._stage("outputs", "Positions of the outputs.", ["values"], 0),
+            self._stage("rates", "Rates of the outputs.", ["values", "ud", "zd"], 1),
+            self._stage("accelerations", "Accelerations of the outputs.", ["values", "ud", "udd", "zd", "zdd"], 2),
+            self._watches(),
+            self._jacobians(),
+        ]
+        position = self._position()  # after the later stages, which say what it has to hand on
+        parts = [*self._header(), *self._drive(), *position]
+        for lines in later:
+            parts += [line.replace(_VALUES, self._unpacked()) for line in lines]
+        return "\n".join(parts) + "\n"
+
+    def _header(self) -> list[str]:
+        plan = self.plan
+        anchor_u, anchor_z = plan.anchor_values
+        starts = []
+        count = 0
+        for block in self.solved:
+            starts.append((count, count + len(block.unknowns)))
+            count += len(block.unknowns)
+        large = [block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)]
+        imports = ["from math import cos, inf, sin, sqrt"]
+        if large:
+            imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
+        kinds = tuple(driver.quantity.kind for driver in plan.drivers)
+        return [
+            f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
+            "",
+            *imports,
+            "",
+            f"NAME = {plan.mechanism.name!r}",
+            f"SIZE = {plan.size!r}",
+            f"LENGTH_UNIT = {plan.mechanism.length_unit!r}",
+            f"DRIVERS = {tuple(driver.name for driver in plan.drivers)!r}",
+            f"DRIVER_KINDS = {kinds!r}",
+            f"OUTPUTS = {plan.outputs!r}",
+            f"COORDINATE_COUNT = {plan.coordinate_count!r}",
+            f"FIXED = {dict(plan.fixed)!r}",
+            f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
+            f"WATCHES = {plan.watch_names!r}",
+            f"UNKNOWNS = {plan.unknowns!r}",
+            f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
+            f"BLOCKS = {tuple(starts)!r}",
+            f"ANCHOR = {(anchor_u, anchor_z)!r}",
+            "",
+        ]
+
+    def _drive(self) -> list[str]:
+        writer = Writer(Names(), ())
+        orders = [[getattr(law, order) for law in self.plan.laws] for order in ("position", "rate", "acceleration")]
+        flat = [node for nodes in orders for node in nodes]
+        body = writer.statements(flat)
+        constants = [identifier(constant.name) for constant in self.plan.law_constants]
+        returned = ", ".join(_tuple(writer.expression(node) for node in nodes) for nodes in orders)
+        return [
+            "",
+            "def drive(time, constants):",
+            '    """Driver values, speeds and accelerations at a time, by the laws."""',
+            *_unpack(constants, "constants"),
+            *_indented(body),
+            f"    return {returned}",
+            "",
+        ]
+
+    def _position(self) -> list[str]:
+        keep = [node for node in self.exports.values() if node is not None]
+        writer = Writer(self.names, (), keep)
+        lines = [
+            "",
+            "def position(u, z, held=0):",
+            '    """Unknowns by Newton from the guess z, block after block; ArithmeticError(block, residual) if it fails."""',
+            *_unpack(map(identifier, self.inputs[0]), "u"),
+            *_unpack([identifier(name) for name in self.plan.unknowns], "z"),
+        ]
+        if self.solved:
+            lines += ["    residual, iterations = 0.0, 0"]
+        for block in self.plan.blocks:
+            lines += self._newton(writer, block) if block.unknowns else self._assigned(writer, block, "    ")
+        z = _tuple(identifier(name) for name in self.plan.unknowns)
+        determinants = _tuple(
+            f"det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
+        )
+        values = _tuple(self.exports)
+        summary = "residual, iterations" if self.solved else "0.0, 0"
+        return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
+
+    def _assigned(self, writer: Writer, block: Block, indent: str) -> list[str]:
+        lines = []
+        for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
+            new = writer.statements([motion[0]])
+            given = writer.expression(motion[0])
+            if given != identifier(name):
+                new.append(f"{identifier(name)} = {given}")
+            lines += [f"{indent}{line}" for line in new[:-1]]
+            lines += [f"{indent}{line}  # {row}" for line in new[-1:]]
+        return lines
+
+    def _newton(self, writer: Writer, block: Block) -> list[str]:
+        k = self.number[id(block)] + 1
+        entries = [entry for row in block.jacobian for entry in row]
+        unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
+        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
+        before = writer.statements(writer.independent(looped, unknowns))
+        inside = self._assigned(writer, block, "")
+        inside += writer.statements([*block.residuals, *entries])
+        r = [f"r{i}" for i in range(len(block.residuals))]
+        inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
+        inside.append(f"error = {_largest(r, block.row_scales)}")
+        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        z = [identifier(name) for name in block.unknowns]
+        inside += _determinant(k, jacobian)
+        return [
+            f"    # block {k}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}",
+            *_indented(before),
+            "    last = inf",
+            f"    for iteration in range({ITERATIONS}):",
+            *_indented(inside, 8),
+            f"        if error <= {ROUND_OFF} or held & {1 << (k - 1)} or (error <= {SETTLED} and 4.0 * error > last):",
+            "            break",
+            "        last = error",
+            *_indented(_correction(k, jacobian, r, z), 8),
+            "    else:",
+            f"        raise ArithmeticError({k - 1}, error)",
+            "    iterations += iteration",
+            "    if error > residual:",
+            "        residual = error",
+        ]
+
+    def _velocity(self) -> list[str]:
+        lines = ["", "def velocity(values, ud, given=(), held=0):", '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""']
+        lines += [_VALUES, *_unpack(map(identifier, self.inputs[1]), "ud")]
+        return lines + self._linear(1, lambda block: block.velocity)
+
+    def _acceleration(self) -> list[str]:
+        lines = ["", "def acceleration(values, ud, udd, zd, given=(), held=0):", '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""']
+        lines += [_VALUES, *_unpack(map(identifier, self.inputs[1]), "ud"), *_unpack(map(identifier, self.inputs[2]), "udd")]
+        lines += _unpack([identifier(derivative_name(name, 1)) for name in self.plan.unknowns], "zd")
+        return lines + self._linear(2, lambda block: block.acceleration)
+
+    def _linear(self, order: int, right: _Right) -> list[str]:
+        """Linear solves of one order, block after block, with the definitions that they need on the way."""
+        writer = Writer(self.names, reachable(self.position_nodes))
+        definitions = self._definitions([node for block in self.solved for node in right(block)])
+        lines, count = [], 0
+        done: set[str] = set()
+        for block in self.plan.blocks:
+            if block.unknowns:
+                lines += self._defined(writer, right(block), definitions, done)
+                k = self.number[id(block)] + 1
+                entries = [entry for row in block.jacobian for entry in row]
+                lines += writer.statements([*right(block), *entries])
+                b = [f"b{i}" for i in range(len(right(block)))]
+                lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, right(block), strict=True)]
+                z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+                jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+                self.exports.setdefault(f"det{k}" if _is_small(block) else f"factors{k}", None)
+                lines.append(f"if held & {1 << (k - 1)}:")
+                lines.append(f"    {_tuple(z)} = given[{count}:{count + len(z)}]")
+                lines += ["else:", *_indented(_solution(k, jacobian, b, z), 4)]
+                count += len(z)
+        self._import(writer)
+        result = _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns)
+        return [*_indented(lines), f"    return {result}", ""]
+
+    def _stage(self, name: str, docstring: str, arguments: Sequence[str], order: int) -> list[str]:
+        """A function that returns all outputs at one order of derivative."""
+        targets = [motion[1 + order] for motion in self.plan.outputs_motion]
+        unpacked = {
+            "ud": self.inputs[1],
+            "udd": self.inputs[2],
+            "zd": [derivative_name(unknown, 1) for unknown in self.plan.unknowns],
+            "zdd": [derivative_name(unknown, 2) for unknown in self.plan.unknowns],
+        }
+        lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
+        for argument in arguments[1:]:
+            lines += _unpack(map(identifier, unpacked[argument]), argument)
+        writer = Writer(self.names, reachable(self.position_nodes))
+        body = self._defined(writer, targets, self._definitions(targets), set()) + writer.statements(targets)
+        returned = _tuple(writer.expression(node) for node in targets)
+        self._import(writer)
+        return [*lines, *_indented(body), f"    return {returned}", ""]
+
+    def _watches(self) -> list[str]:
+        writer = Writer(self.names, reachable(self.position_nodes))
+        targets = [node for _, node in self.plan.watches]
+        body = writer.statements(targets)
+        returned = _tuple(writer.expression(node) for node in targets)
+        self._import(writer)
+        return [
+            "",
+            "def watches(values):",
+            '    """Rows set aside as redundant, relative to the size: zero as long as they hold."""',
+            _VALUES,
+            *_indented(body),
+            f"    return {returned}",
+            "",
+        ]
+
+    def _jacobians(self) -> list[str]:
+        writer = Writer(self.names, reachable(self.position_nodes))
+        matrices = []
+        body: list[str] = []
+        for block in self.solved:
+            body += writer.statements([entry for row in block.jacobian for entry in row])
+            rows = ", ".join("[" + ", ".join(writer.expression(entry) for entry in row) + "]" for row in block.jacobian)
+            matrices.append(f"[{rows}]")
+        self._import(writer)
+        return [
+            "",
+            "def jacobians(values):",
+            '    """Jacobian of each block."""',
+            _VALUES,
+            *_indented(body),
+            f"    return {_tuple(matrices)}",
+            "",
+        ]
+
+    def _definitions(self, targets: Sequence[Node]) -> dict[str, Node]:
+        """Rates and accelerations of assigned coordinates behind the targets, by name, in the order of evaluation."""
+        all_of_them: dict[str, Node] = {}
+        for block in self.plan.blocks:
+            for name, motion in block.assigned:
+                for order in (1, 2):
+                    all_of_them[derivative_name(name, order)] = motion[order]
+        needed: set[str] = set()
+        stack = [symbol.name for symbol in symbols(targets)]
+        while stack:
+            name = stack.pop()
+            if name in all_of_them and name not in needed:
+                needed.add(name)
+                stack += [symbol.name for symbol in symbols([all_of_them[name]])]
+        return {name: node for name, node in all_of_them.items() if name in needed}
+
+    def _defined(
+        self, writer: Writer, targets: Sequence[Node], definitions: dict[str, Node], done: set[str]
+    ) -> list[str]:
+        """Statements for the definitions that the targets need and that are not done yet."""
+        lines = []
+        for name in self._definitions(targets):
+            if name not in done:
+                done.add(name)
+                lines += writer.statements([definitions[name]])
+                lines.append(f"{identifier(name)} = {writer.expression(definitions[name])}")
+        return lines
+
+    def _import(self, writer: Writer) -> None:
+        """Note what a later stage takes from the position stage."""
+        coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
+        for node in writer.used:
+            if node.op != "symbol":
+                self.exports.setdefault(self.names.of(node), node)
+            elif node.name in coordinates:
+                self.exports.setdefault(identifier(node.name), None)
+
+    def _unpacked(self) -> str:
+        return "\n".join(_unpack(self.exports, "values")) or "    # nothing is handed on"
+
+
+_VALUES = "    <values>"
+_Right = Callable[[Block], tuple[Node, ...]]
+
+
+def _is_small(block: Block) -> bool:
+    return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
+
+
+def _determinant(k: int, jacobian: Sequence[Sequence[str]]) -> list[str]:
+    m, n = len(jacobian), len(jacobian[0])
+    if m == n == 1:
+        return [f"det{k} = {jacobian[0][0]}"]
+    if m == n == 2:
+        (a, b), (c, d) = jacobian
+        return [f"det{k} = {_product(a, d)} - {_product(b, c)}"]
+    factor = "factor" if m == n else "qr_factor"
+    return [f"factors{k} = {factor}({_matrix(jacobian)})", f"det{k} = factors{k}.determinant"]
+
+
+def _correction(k: int, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
+    """z -= J^-1 r."""
+    m, n = len(jacobian), len(z)
+    if m == n == 1:
+        return [f"{z[0]} -= {r[0]} / det{k}"]
+    if m == n == 2:
+        (a, b), (c, d) = jacobian
+        return [
+            f"{z[0]} -= ({_product(d, r[0])} - {_product(b, r[1])}) / det{k}",
+            f"{z[1]} -= ({_product(a, r[1])} - {_product(c, r[0])}) / det{k}",
+        ]
+    solve = "lu_solve" if m == n else "qr_solve"
+    steps = [f"d{i}" for i in range(n)]
+    lines = [f"{_tuple(steps)} = {solve}(factors{k}, [{', '.join(r)}])"]
+    return lines + [f"{name} -= {step}" for name, step in zip(z, steps, strict=True)]
+
+
+def _solution(k: int, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]) -> list[str]:
+    """Z = -J^-1 b."""
+    m, n = len(jacobian), len(z)
+    if m == n == 1:
+        return [f"{z[0]} = -{b[0]} / det{k}"]
+    if m == n == 2:
+        (a, c), (d, e) = jacobian
+        return [
+            f"{z[0]} = ({_product(c, b[1])} - {_product(e, b[0])}) / det{k}",
+            f"{z[1]} = ({_product(d, b[0])} - {_product(a, b[1])}) / det{k}",
+        ]
+    solve = "lu_solve" if m == n else "qr_solve"
+    return [f"{_tuple(z)} = {solve}(factors{k}, [{', '.join(f'-{name}' for name in b)}])"]
+
+
+def _product(a: str, b: str) -> str:
+    return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
+
+
+def _matrix(rows: Sequence[Sequence[str]]) -> str:
+    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
+
+
+def _largest(r: Sequence[str], scales: Sequence[float]) -> str:
+    """Largest residual relative to the size; equal scales are divided out once."""
+    sizes = [f"abs({name})" for name in r]
+    if len(set(scales)) == 1:
+        largest = f"max({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
+        return largest if scales[0] == 1.0 else f"{largest} * {1.0 / scales[0]!r}"
+    weighted = [f"{size} * {1.0 / scale!r}" for size, scale in zip(sizes, scales, strict=True)]
+    return f"max({', '.join(weighted)})"
+
+
+def _tuple(items: Iterable[str]) -> str:
+    items = list(items)
+    return f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+
+
+def _unpack(names: Iterable[str], source: str) -> list[str]:
+    names = list(names)
+    return [f"    {_tuple(names)} = {source}"] if names else []
+
+
+def _indented(lines: Iterable[str], spaces: int = 4) -> list[str]:
+    return [f"{' ' * spaces}{line}" for line in lines]
+
+
+__all__ = ["emit"]

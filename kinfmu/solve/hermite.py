@@ -1,0 +1,44 @@
+"""Two-sided Hermite interpolation of a function from its value and two derivatives at several nodes."""
+
+from __future__ import annotations
+
+Samples = tuple[float, float, float]  # f, f', f'' at a node
+
+
+class Hermite:
+    """The polynomial of degree 3 n - 1 with given f, f', f'' at n nodes, in Newton's form on repeated nodes.
+
+        p(x) = sum_i c_i prod_{j<i} (x - x_j),   every node three times
+
+    c by divided differences, where a difference over equal nodes is the derivative over its factorial.
+    """
+
+    __slots__ = ("coefficients", "nodes")
+
+    def __init__(self, nodes: tuple[float, ...], samples: tuple[Samples, ...]) -> None:
+        repeated = [x for x in nodes for _ in range(3)]
+        known = [sample for sample in samples for _ in range(3)]
+        column = [sample[0] for sample in known]
+        coefficients = [column[0]]
+        for order in range(1, len(repeated)):
+            new = []
+            for i in range(len(repeated) - order):
+                a, b = repeated[i], repeated[i + order]
+                if a == b:  # three equal nodes at most: order 1 or 2
+                    new.append(known[i][1] if order == 1 else 0.5 * known[i][2])
+                else:
+                    new.append((column[i + 1] - column[i]) / (b - a))
+            column = new
+            coefficients.append(column[0])
+        self.nodes = repeated
+        self.coefficients = coefficients
+
+    def __call__(self, x: float) -> Samples:
+        """p, p', p'' at x."""
+        value = slope = curve = 0.0
+        for coefficient, node in zip(reversed(self.coefficients), reversed(self.nodes), strict=True):
+            d = x - node
+            curve = curve * d + 2.0 * slope
+            slope = slope * d + value
+            value = value * d + coefficient
+        return value, slope, curve
