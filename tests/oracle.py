@@ -17,13 +17,27 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-DIGITS = 50  # of every result
-mp = mpmath.MPContext()  # a context of our own: nobody else's setting of digits reaches it
-mp.dps = DIGITS + 30  # near a singular point each derivative costs up to four digits; 16 for a double next to one
+from tests.power_series import DIGITS, Real, Series, asin, atan2, cos, mp, sin, sin_cos, sqrt
+
+__all__ = [
+    "Motion",
+    "Series",
+    "cos",
+    "follow",
+    "fourbar",
+    "guided_double_pendulum",
+    "largest_error",
+    "mp",
+    "reference_fourbar",
+    "sin",
+    "sin_cos",
+    "slider_crank",
+    "solve",
+    "sqrt",
+]
 
 SINGULAR = mp.mpf("2e-4")  # 1 / condition below which a pose is interpolated, not solved
 GAP = mp.mpf("0.01")  # [rad or length]; nodes of an interpolation lie this far off, up to twice as far
@@ -31,109 +45,7 @@ NODES = 16  # on either side: the error is about (1.45 GAP / radius of convergen
 PREDICTOR_ORDER = 10
 LOST = mp.mpf("1e-3")  # a correction this large means that the prediction was no prediction
 
-Real = Any  # an mpmath number
 Input = float | str | Real | Iterable[float | str | Real]
-
-
-class Series:
-    """A power series c[0] + c[1] t + c[2] t^2 + ..., cut off after len(c) terms."""
-
-    __slots__ = ("c",)
-
-    def __init__(self, coefficients: Iterable[Any]) -> None:
-        self.c: list[Real] = [mp.mpf(value) for value in coefficients]
-
-    def _like(self, other: Any) -> Series:
-        """`other` as a series: a number is a constant."""
-        return other if isinstance(other, Series) else Series([other] + [0] * (len(self.c) - 1))
-
-    def __neg__(self) -> Series:
-        return Series(-a for a in self.c)
-
-    def __add__(self, other: Any) -> Series:
-        return Series(a + b for a, b in zip(self.c, self._like(other).c, strict=True))
-
-    def __sub__(self, other: Any) -> Series:
-        return Series(a - b for a, b in zip(self.c, self._like(other).c, strict=True))
-
-    def __rsub__(self, other: Any) -> Series:
-        return self._like(other) - self
-
-    def __mul__(self, other: Any) -> Series:
-        b = self._like(other).c
-        return Series(mp.fdot((self.c[i], b[k - i]) for i in range(k + 1)) for k in range(len(b)))
-
-    def __truediv__(self, other: Any) -> Series:
-        b = self._like(other).c
-        quotient: list[Real] = []
-        for k, a in enumerate(self.c):
-            quotient.append((a - mp.fdot((quotient[i], b[k - i]) for i in range(k))) / b[0])
-        return Series(quotient)
-
-    def __rtruediv__(self, other: Any) -> Series:
-        return self._like(other) / self
-
-    __radd__ = __add__
-    __rmul__ = __mul__
-
-    def derivative(self) -> Series:
-        """The series of the derivative; its last term is not known any more and is cut off."""
-        return Series(k * a for k, a in enumerate(self.c[1:], start=1))
-
-    def integral(self, constant: Real) -> Series:
-        """The series of the integral that starts at `constant`, one term longer."""
-        return Series([constant, *(a / k for k, a in enumerate(self.c, start=1))])
-
-    def at(self, t: Real) -> Real:
-        """The sum of its terms at t."""
-        return mp.fdot((a, t**k) for k, a in enumerate(self.c))
-
-    def cut(self, count: int) -> Series:
-        """The first `count` terms."""
-        return Series(self.c[:count])
-
-
-def sin_cos(x: Series) -> tuple[Series, Series]:
-    """Sine and cosine of x, from s' = c x' and c' = -s x'."""
-    s, c = [mp.sin(x.c[0])], [mp.cos(x.c[0])]
-    for k in range(1, len(x.c)):
-        s.append(mp.fdot((i * x.c[i], c[k - i]) for i in range(1, k + 1)) / k)
-        c.append(-mp.fdot((i * x.c[i], s[k - i]) for i in range(1, k + 1)) / k)
-    return Series(s), Series(c)
-
-
-def sin(x: Series) -> Series:
-    """Sine of an angle."""
-    return sin_cos(x)[0]
-
-
-def cos(x: Series) -> Series:
-    """Cosine of an angle."""
-    return sin_cos(x)[1]
-
-
-def sqrt(x: Series) -> Series:
-    """The positive square root, from r r = x."""
-    root = [mp.sqrt(x.c[0])]
-    for k in range(1, len(x.c)):
-        root.append((x.c[k] - mp.fdot((root[i], root[k - i]) for i in range(1, k))) / (2 * root[0]))
-    return Series(root)
-
-
-def asin(x: Series) -> Series:
-    """The inverse sine in [-pi/2, pi/2], from its derivative x' / sqrt(1 - x^2)."""
-    rate = x.derivative() / sqrt(1 - x * x).cut(len(x.c) - 1)
-    return rate.integral(mp.asin(x.c[0]))
-
-
-def atan2(y: Series, x: Series) -> Series:
-    """The angle of (x, y) in (-pi, pi], from its derivative (x y' - y x') / (x^2 + y^2)."""
-    short = len(x.c) - 1
-    xs, ys = x.cut(short), y.cut(short)
-    rate = (xs * y.derivative() - ys * x.derivative()) / (xs * xs + ys * ys)
-    return rate.integral(mp.atan2(y.c[0], x.c[0]))
-
-
 Residual = Callable[[Sequence[Series], Any], Sequence[Any]]  # (q, u) -> m rows; u one Series, or a list of them
 
 
@@ -150,7 +62,12 @@ class Motion(NamedTuple):
 
 
 def largest_error(values: ArrayLike, exact: NDArray[Any], *, modulo_turns: bool = False) -> float:
-    """The largest |values - exact|, subtracted in full precision; modulo_turns: angles 2 pi k apart are equal."""
+    """The largest |values - exact|, subtracted in full precision; NaN if there is one among the values.
+
+    modulo_turns: angles 2 pi k apart are equal.
+    """
+    if np.isnan(np.asarray(values, dtype=float)).any():
+        return float("nan")
     gaps = [mp.mpf(float(a)) - b for a, b in zip(np.ravel(values), np.ravel(exact), strict=True)]
     if modulo_turns:
         gaps = [gap - 2 * mp.pi * mp.nint(gap / (2 * mp.pi)) for gap in gaps]
