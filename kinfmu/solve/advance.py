@@ -1,0 +1,217 @@
+"""Advance: from a good pose to other driver values, along one continuous branch."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .bridge import HALF_WIDTH, REGULAR, Bridge, build, secant_zero, zero_near
+from .pose import Model, Pose, Vector, corrected, failed, predicted
+from .status import Status
+
+LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
+TRUSTED = 0.1  # largest correction of a prediction, over the determinant: other branches lie about a determinant away
+FALL = 0.3  # a step may not bring a determinant below this part of what it was
+SHORTEST_STEP = 1e-9  # [rad, sizes]; where steps get shorter, a limit is near and its place is extrapolated
+NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
+_GIVE_UP = 1e-15  # [rad, sizes]; nothing lies between such steps
+_BRIDGES_KEPT = 4
+
+
+class Limit(NamedTuple):
+    """Driver values where a way ends, and the block whose determinant vanishes there (-1: none)."""
+
+    u: Vector
+    block: int
+
+
+class Blocked(NamedTuple):
+    """A place that no bridge leads over: a dead centre, or branches that only come close."""
+
+    low: float
+    high: float
+
+
+def advance(model: Model, start: Pose, target: Vector) -> Pose:
+    """The pose at `target`, followed from `start` in a straight line of the driver values.
+
+    Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
+    residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
+    With one driver, singular points on the way are bridged. A target that cannot be reached gives a pose of status
+    OUTSIDE with the limit in its message; `start` stays as it was.
+    """
+    direction, distance = _course(model, start.u, target)
+    one = len(target) == 1
+    pose, step, iterations = start, LONGEST_STEP, 0
+    before, limit = start, None
+    while True:
+        if one:
+            bridge = _in_the_way(pose, target[0])
+            if bridge is not None:
+                if bridge.covers(target[0]):
+                    return _across(model, direction, bridge, pose, target)
+                pose = _carried(bridge.exit(target[0]), pose.bridges)
+            distance = (target[0] - pose.u[0]) / direction[0]
+            if distance == 0.0:
+                return pose
+        whole = abs(distance) <= step
+        s = distance if whole else step if distance > 0.0 else -step
+        u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
+        trial = _step(model, pose, direction, s, u)
+        if trial is not None:
+            iterations += trial.iterations
+            if one and trial.margin() < REGULAR:
+                bridges = _bridged(model, direction, pose, trial)
+                if bridges is not None:
+                    pose = _carried(pose, bridges)
+                    continue
+            if whole:
+                trial.iterations = iterations
+                if trial.margin() < NEAR_SINGULAR:
+                    trial.status = Status.NEAR_SINGULAR
+                return trial
+            before, pose = pose, trial
+            distance -= s
+            step = min(2.0 * step, LONGEST_STEP)
+            continue
+        step = 0.5 * abs(s)
+        if step < SHORTEST_STEP:
+            limit = limit or _limit(before, pose)
+            if step < _GIVE_UP or _beyond(target, limit.u, direction, s):
+                return failed(start, target, Status.OUTSIDE, _limit_message(model, limit, target))
+
+
+def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:
+    """Direction and signed distance of a straight way: with one driver always the same direction."""
+    reach = [1.0 if kind == "angle" else model.SIZE for kind in model.DRIVER_KINDS]
+    if len(target) == 1:
+        return (reach[0],), (target[0] - start[0]) / reach[0]
+    length = max(abs(b - a) / r for a, b, r in zip(start, target, reach, strict=True))
+    return tuple((b - a) / length for a, b in zip(start, target, strict=True)), length
+
+
+def _step(model: Model, pose: Pose, direction: Vector, s: float, u: Vector) -> Pose | None:
+    """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
+    guess = predicted(model, pose, direction, s)
+    trial = corrected(model, u, guess, pose.bridges)
+    if trial is None:
+        return None
+    smallest = 1.0
+    for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
+        if before * after <= 0.0 or abs(after) < FALL * abs(before):
+            return None
+        smallest = min(smallest, abs(before), abs(after))
+    allowed = TRUSTED * smallest
+    for z, expected, scale in zip(trial.z, guess, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all three
+        if abs(z - expected) > allowed * scale:
+            return None
+    return trial
+
+
+def _in_the_way(pose: Pose, target: float) -> Bridge | None:
+    """The nearest known bridge on the way from a pose to the target, or the one that the pose stands on."""
+    if pose.bridge is not None:
+        return pose.bridge if pose.bridge.covers(pose.u[0]) else None
+    ahead = [b for b in pose.bridges if isinstance(b, Bridge) and b.between(pose.u[0], target)]
+    return min(ahead, key=lambda bridge: abs(bridge.centre - pose.u[0]), default=None) if ahead else None
+
+
+def _across(model: Model, direction: Vector, bridge: Bridge, pose: Pose, target: Vector) -> Pose:
+    try:
+        found = bridge.pose(model, direction, target)
+    except (ArithmeticError, ValueError):
+        return failed(pose, target, Status.NOT_CONVERGED, f"{place(model, target)}: the bridge there does not hold")
+    found.bridges = pose.bridges
+    return found
+
+
+def _carried(pose: Pose, bridges: tuple[Bridge | Blocked, ...]) -> Pose:
+    """A pose with the bridges known on its way."""
+    other = Pose(pose.u, (pose.z, pose.determinants, pose.residual, pose.iterations, pose.values), bridges)
+    other._tangent = pose._tangent
+    return other
+
+
+def _bridged(
+    model: Model, direction: Vector, pose: Pose, trial: Pose
+) -> tuple[Bridge | Blocked, ...] | None:
+    """Known bridges and a new one, if the trial pose has come into the window of a singular point; None if not.
+
+    A place where no bridge holds is remembered as blocked, so that it is tried once.
+    """
+
+    def walk(start: Pose, u: float) -> Pose | None:
+        return _plainly(model, direction, start, u)
+
+    block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
+    known = trial.bridges
+    if any(_knows(place, trial.u[0]) for place in known):
+        return None
+    far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * direction[0]
+    zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk)
+    if zero is None or abs(zero - trial.u[0]) > HALF_WIDTH * 1.05 * direction[0]:
+        return None
+    if any(_knows(place, zero) for place in known):
+        return None
+    bridge = build(model, direction, pose, block, walk)
+    if bridge is None:
+        room = 2.0 * HALF_WIDTH * direction[0]
+        trial.bridges = (*known, Blocked(zero - room, zero + room))[-_BRIDGES_KEPT:]
+        return None
+    return (*known, bridge)[-_BRIDGES_KEPT:]
+
+
+def _knows(place: Bridge | Blocked, u: float) -> bool:
+    if isinstance(place, Blocked):
+        return place.low <= u <= place.high
+    return abs(u - place.centre) <= place.half * 1.2
+
+
+def _plainly(model: Model, direction: Vector, start: Pose, u: float) -> Pose | None:
+    """From a pose to a driver value by trusted steps only, or None."""
+    pose, step = start, LONGEST_STEP
+    while pose.u[0] != u:
+        distance = (u - pose.u[0]) / direction[0]
+        whole = abs(distance) <= step
+        s = distance if whole else step if distance > 0.0 else -step
+        trial = _step(model, pose, direction, s, (u,) if whole else (pose.u[0] + s * direction[0],))
+        if trial is not None:
+            pose = trial
+        else:
+            step = 0.5 * abs(s)
+            if step < 1e-4:
+                return None
+    return pose
+
+
+def _limit(before: Pose, pose: Pose) -> Limit:
+    """Where the way ends, just beyond a pose that steps cannot leave.
+
+    Near a dead centre determinant^2 falls linearly along the way: the secant rule on the last two poses gives its zero.
+    """
+    if not pose.determinants:
+        return Limit(pose.u, -1)
+    block = min(range(len(pose.determinants)), key=lambda k: abs(pose.determinants[k]))
+    near, far = pose.determinants[block] ** 2, before.determinants[block] ** 2
+    if far <= near:
+        return Limit(pose.u, block)
+    beyond = near / (far - near)
+    return Limit(tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True)), block)
+
+
+def _beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
+    """True if the target lies past the limit on the way that s goes."""
+    return sum((a - b) * d * s for a, b, d in zip(target, limit, direction, strict=True)) > 0.0
+
+
+def _limit_message(model: Model, limit: Limit, target: Vector) -> str:
+    names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
+    return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {names} would part"
+
+
+def place(model: Model, u: Vector) -> str:
+    """'crank = 1.0472 rad (60 deg)': driver values for a message."""
+    said = []
+    for name, kind, value in zip(model.DRIVERS, model.DRIVER_KINDS, u, strict=True):
+        degrees = f" ({value * 57.29577951308232:.10g} deg)" if kind == "angle" else ""
+        said.append(f"{name} = {value:.12g} {'rad' if kind == 'angle' else model.LENGTH_UNIT}{degrees}")
+    return ", ".join(said)

@@ -1,0 +1,141 @@
+"""Solver: poses, rates and accelerations of one generated model."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+from .advance import Blocked, advance, place
+from .bridge import restored
+from .linear import reciprocal_condition
+from .pose import Model, Pose, Vector, failed
+from .status import Status
+
+TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
+EPS = 2.220446049250313e-16
+
+
+class Solver:
+    """Follows the branch of a mechanism that its anchor lies on. All methods are pure: state is in the poses.
+
+    model: a module generated from a SolvePlan; tolerance: residual relative to the size above which the status of a
+    sample is not ok (Newton always goes to round-off).
+    """
+
+    def __init__(self, model: Model, tolerance: float = TOLERANCE) -> None:
+        self.model = model
+        self.tolerance = tolerance
+        u, z = model.ANCHOR
+        self.anchor = Pose(u, model.position(u, z))
+        self._one = len(u) == 1
+        self._unit: Vector = (1.0 if model.DRIVER_KINDS[:1] == ("angle",) else model.SIZE,)
+
+    def solve(self, start: Pose, u: Vector) -> Pose:
+        """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
+        if u == start.u:
+            return start
+        if not all(map(isfinite, u)):
+            return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
+        pose = advance(self.model, start, u)
+        if pose.status <= Status.BRIDGED:
+            self._judge(pose)
+        return pose
+
+    def _judge(self, pose: Pose) -> None:
+        """A pose counts only if its rows close and the rows set aside as redundant hold too."""
+        if not pose.residual <= self.tolerance:
+            pose.status = Status.NOT_CONVERGED
+            pose.message = f"{place(self.model, pose.u)}: residual {pose.residual:.2g} of the size is left"
+        for name, value in zip(self.model.WATCHES, self.model.watches(pose.values), strict=True):
+            if not abs(value) <= self.tolerance:
+                pose.status = Status.INCONSISTENT
+                gap = abs(value) * self.model.SIZE
+                pose.message = (
+                    f"{place(self.model, pose.u)}: the redundant row {name} is open by {gap:.3g} {self.model.LENGTH_UNIT}"
+                )
+
+    def _unknown_rates(self, pose: Pose, ud: Vector) -> Vector:
+        if self._one:
+            scale = ud[0] / self._unit[0]
+            return tuple([d * scale for d in pose.tangent(self.model, self._unit)[0]])
+        return tuple(self.model.velocity(pose.values, ud))
+
+    def outputs(self, pose: Pose) -> Vector:
+        """Positions of the model's OUTPUTS."""
+        return tuple(self.model.outputs(pose.values))
+
+    def rates(self, pose: Pose, ud: Vector) -> Vector:
+        """Rates of the OUTPUTS at driver speeds ud."""
+        return tuple(self.model.rates(pose.values, ud, self._unknown_rates(pose, ud)))
+
+    def accelerations(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
+        """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd.
+
+        With one driver the tangent serves all: zdd = z'' ud^2 + z' udd.
+        """
+        zd = self._unknown_rates(pose, ud)
+        if self._one:
+            first, second = pose.tangent(self.model, self._unit)
+            speed, more = ud[0] / self._unit[0], udd[0] / self._unit[0]
+            zdd = tuple([dd * speed * speed + d * more for d, dd in zip(first, second, strict=True)])
+        else:
+            zdd = tuple(self.model.acceleration(pose.values, ud, udd, zd))
+        return tuple(self.model.accelerations(pose.values, ud, udd, zd, zdd))
+
+    def watch(self, pose: Pose) -> Vector:
+        """Rows set aside as redundant, relative to the size."""
+        return tuple(self.model.watches(pose.values))
+
+    def diagnostics(self, pose: Pose) -> tuple[int, float, int, float]:
+        """Status, residual relative to the size, Newton iterations, and margin: the smallest 1 / cond over blocks."""
+        margins = [reciprocal_condition(matrix) for matrix in self.model.jacobians(pose.values)]
+        return pose.status, pose.residual, pose.iterations, min(margins, default=1.0)
+
+    def errors(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
+        """Estimated errors of q, qd, qdd, relative to the size for lengths and in radians.
+
+        Newton: eps / m, eps / m^2, eps / m^3 times the rates, with the determinant m as the distance from singular.
+        Bridge: the difference of two widths, and what rounding leaves of the nodes.
+        """
+        zd = self._unknown_rates(pose, ud)
+        speed = max([abs(v) for v in ud] + [abs(v) for v in zd])
+        more = max(abs(v) for v in udd) if udd else 0.0
+        if pose.bridge is not None:
+            e0, e1, e2 = pose.bridge.disagreement(pose.u[0], self._unit)
+            rate = abs(ud[0] / self._unit[0])
+            floor = 8.0 * EPS / pose.bridge.half
+            error_q = e0 + 8.0 * EPS
+            error_qd = (e1 + floor) * rate
+            error_qdd = (e2 + floor / pose.bridge.half) * rate * rate + (e1 + floor) * more
+            return error_q, error_qd, error_qdd
+        m = max(pose.margin(), EPS)
+        error_q = 4.0 * (EPS + pose.residual) / m
+        error_qd = error_q * speed / m
+        return error_q, error_qd, (error_qd * speed + error_q * more) / m
+
+    def dump(self, pose: Pose) -> list[Any]:
+        """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
+        bridges = [
+            ["blocked", list(bridge)] if isinstance(bridge, Blocked) else ["bridge", bridge.dump()]
+            for bridge in pose.bridges
+        ]
+        standing = next((k for k, bridge in enumerate(pose.bridges) if bridge is pose.bridge), -1)
+        own = pose.bridge.dump() if pose.bridge is not None and standing < 0 else None
+        return [list(pose.u), list(pose.z), pose.iterations, pose.status, pose.message, bridges, standing, own]
+
+    def restore(self, data: list[Any]) -> Pose:
+        """The pose that was dumped."""
+        u, z, iterations, status, message, dumped, standing, own = data
+        bridges = tuple(
+            Blocked(*content) if kind == "blocked" else restored(self.model, self._unit, content)
+            for kind, content in dumped
+        )
+        if standing >= 0 or own is not None:
+            bridge = bridges[standing] if standing >= 0 else restored(self.model, self._unit, own)
+            pose = bridge.pose(self.model, self._unit, tuple(u))
+        else:
+            everything = (1 << len(self.model.BLOCKS)) - 1
+            pose = Pose(tuple(u), self.model.position(tuple(u), tuple(z), everything))
+        pose.bridges = bridges
+        pose.iterations, pose.status, pose.message = iterations, status, message
+        return pose
