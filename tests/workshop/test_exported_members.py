@@ -23,6 +23,7 @@ def public_members(module: ModuleType) -> set[str]:
         if not name.startswith("_")
         and not inspect.ismodule(value)
         and (getattr(value, "__module__", "").startswith("kinfmu") or name.isupper())
+        and name != "TYPE_CHECKING"
     }
 
 
