@@ -127,6 +127,8 @@ def reciprocal_condition(matrix: Matrix) -> float:
     For a tall matrix that of R in A = QR.
     """
     m, k = len(matrix), len(matrix[0])
+    if m == k == 2:
+        return _reciprocal_condition_of_two(matrix)
     rows = []
     for row in matrix:
         length = sqrt(sum(entry * entry for entry in row))
@@ -148,3 +150,19 @@ def reciprocal_condition(matrix: Matrix) -> float:
     norm = max(sum(abs(row[j]) for row in rows) for j in range(k))
     inverse_norm = max(sum(abs(entry) for entry in column) for column in inverse)
     return 1.0 / (norm * inverse_norm)
+
+
+def _reciprocal_condition_of_two(matrix: Matrix) -> float:
+    """The same for 2 x 2, where the inverse is at hand."""
+    (a, b), (c, d) = matrix
+    p, q = sqrt(a * a + b * b), sqrt(c * c + d * d)
+    if not (p > 0.0 and q > 0.0):
+        return 0.0
+    a, b, c, d = a / p, b / p, c / q, d / q
+    p, q = sqrt(a * a + c * c), sqrt(b * b + d * d)
+    if not (p > 0.0 and q > 0.0):
+        return 0.0
+    a, b, c, d = a / p, b / q, c / p, d / q
+    norm = max(abs(a) + abs(c), abs(b) + abs(d))
+    inverse_norm = max(abs(d) + abs(c), abs(b) + abs(a))  # over |det|
+    return abs(a * d - b * c) / (norm * inverse_norm)

@@ -87,9 +87,16 @@ class Solver:
         return tuple(self.model.watches(pose.values))
 
     def diagnostics(self, pose: Pose) -> tuple[int, float, int, float]:
-        """Status, residual relative to the size, Newton iterations, and margin: the smallest 1 / cond over blocks."""
-        margins = [reciprocal_condition(matrix) for matrix in self.model.jacobians(pose.values)]
-        return pose.status, pose.residual, pose.iterations, min(margins, default=1.0)
+        """Status, residual relative to the size, Newton iterations, and margin.
+
+        margin: the smallest over the blocks of 1 / cond of the equilibrated block; for one unknown, where that says
+        nothing, of |determinant| over the largest that it can be.
+        """
+        margin = 1.0
+        for matrix, determinant in zip(self.model.jacobians(pose.values), pose.determinants, strict=True):
+            small = abs(determinant) if len(matrix) == 1 else reciprocal_condition(matrix)
+            margin = min(margin, small)
+        return pose.status, pose.residual, pose.iterations, margin
 
     def errors(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Estimated errors of q, qd, qdd, relative to the size for lengths and in radians.

@@ -1,0 +1,45 @@
+"""The gallery: mechanisms that come with kinfmu, and finding a mechanism by name or file."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_file import read, text
+
+
+def folder() -> Path:
+    """Where the gallery lies: `fmus/` of a checkout, or inside the installed package."""
+    package = Path(str(files("kinfmu")))
+    installed, checkout = package / "fmus", package.parent / "fmus"
+    return installed if installed.is_dir() else checkout
+
+
+def names() -> list[str]:
+    """Names of the gallery's mechanisms."""
+    return sorted(path.parent.name for path in folder().glob("*/mechanism.toml"))
+
+
+def load(mechanism: str | Path) -> Mechanism:
+    """A mechanism by its gallery name or from a .toml file."""
+    if isinstance(mechanism, str) and not mechanism.endswith(".toml") and "/" not in mechanism:
+        known = names()
+        if mechanism not in known:
+            raise MechanismError(
+                f"'{mechanism}' is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
+                f"files end in .toml"
+            )
+        return read(folder() / mechanism / "mechanism.toml")
+    return read(mechanism)
+
+
+def save(mechanism: Mechanism, path: str | Path) -> Path:
+    """Write a mechanism file; `load` gives the same mechanism back."""
+    path = Path(path)
+    try:
+        path.write_text(text(mechanism), encoding="utf-8")
+    except OSError as error:
+        raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
+    return path

@@ -1,0 +1,187 @@
+"""solve(): a mechanism over many samples, as a Run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.backends.python import load_model
+from kinfmu.errors import KinfmuError, listed, suggestion
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_file import text
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.run import Event, FloatArray, Run
+from kinfmu.solve import Solver
+from kinfmu.solve.pose import Vector
+
+_GAP = float("nan")
+
+
+def solve(
+    mechanism: Mechanism | SolvePlan,
+    t: ArrayLike | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    outputs: Sequence[str] | None = None,
+    engine: str = "auto",
+    tolerance: float = 1e-9,
+    out: tuple[FloatArray, FloatArray, FloatArray] | None = None,
+    **inputs: ArrayLike,
+) -> Run:
+    """Positions, velocities and accelerations at the given times, or at the given driver values.
+
+    t: (n,) times [s] at which the laws of the file drive; or the inputs by name, such as crank_angle=(n,) with
+    crank_speed= and crank_acceleration=, arrays or numbers (speed 1 and acceleration 0 if not given). parameters: law
+    constants by name, such as {'crank.speed': 2.0}. outputs: names to solve for, all if None; what they do not need is
+    not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take values, rates and accelerations.
+
+    Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
+    last good sample.
+    """
+    if engine not in ("auto", "python"):
+        raise KinfmuError(f"engine '{engine}' is not known; engines: auto, python")
+    plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
+    constants = law_constants(plan, parameters or {})
+    solver = Solver(load_model(plan), tolerance)
+    if t is None:
+        times, u, ud, udd = driven_by_inputs(plan, inputs)
+    else:
+        if inputs:
+            raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
+        times, u, ud, udd = _driven_by_time(solver.model, _column("t", t), constants)
+    return _swept(plan, solver, times, (u, ud, udd), out, constants)
+
+
+def law_constants(plan: SolvePlan, given: Mapping[str, float]) -> dict[str, float]:
+    """Law constants by name, with those given in place of the file's."""
+    constants = {constant.name: constant.value for constant in plan.law_constants}
+    for name, value in given.items():
+        if name not in constants:
+            raise KinfmuError(
+                f"parameter '{name}' is not known{suggestion(name, constants)}; parameters: {listed(constants)}"
+            )
+        if not np.isfinite(value):
+            raise KinfmuError(f"parameter '{name}' = {value!r} must be a finite number")
+        constants[name] = float(value)
+    return constants
+
+
+def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike]) -> tuple[FloatArray, ...]:
+    """Sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name."""
+    known = [name for driver in plan.drivers for name in driver.inputs]
+    for name in inputs:
+        if name not in known:
+            raise KinfmuError(f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}")
+    for driver in plan.drivers:
+        if driver.inputs[0] not in inputs:
+            raise KinfmuError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
+    columns = {name: _column(name, value) for name, value in inputs.items()}
+    lengths = {len(column) for column in columns.values() if len(column) > 1}
+    if len(lengths) > 1:
+        sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())
+        raise KinfmuError(f"inputs must have equal lengths or be single numbers: {sizes}")
+    n = lengths.pop() if lengths else min((len(column) for column in columns.values()), default=1)
+    tables = []
+    for order, default in enumerate((0.0, 1.0, 0.0)):
+        given = [columns.get(driver.inputs[order], np.array([default])) for driver in plan.drivers]
+        tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
+    return np.arange(n, dtype=float), *tables
+
+
+def _column(name: str, values: ArrayLike) -> FloatArray:
+    try:
+        column = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise KinfmuError(f"{name} must be numbers") from None
+    if column.ndim != 1:
+        raise KinfmuError(f"{name} must be one-dimensional, not of shape {column.shape}")
+    if not np.isfinite(column).all():
+        raise KinfmuError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
+    return column
+
+
+def _driven_by_time(model: Any, times: FloatArray, constants: Mapping[str, float]) -> tuple[FloatArray, ...]:
+    values = tuple(constants.values())
+    driven = np.array([model.drive(t, values) for t in times.tolist()], dtype=float)  # (n, 3, d)
+    driven = driven.reshape(len(times), 3, len(model.DRIVERS))
+    return times, driven[:, 0], driven[:, 1], driven[:, 2]
+
+
+def _swept(
+    plan: SolvePlan,
+    solver: Solver,
+    times: FloatArray,
+    driven: tuple[FloatArray, FloatArray, FloatArray],
+    out: tuple[FloatArray, FloatArray, FloatArray] | None,
+    constants: Mapping[str, float],
+) -> Run:
+    n, m = len(times), len(plan.outputs)
+    tables = _tables(out, (n, m))
+    gap: Vector = (_GAP,) * m
+    rows: tuple[list[Vector], list[Vector], list[Vector]] = ([], [], [])
+    diagnostics, errors, watches, events = [], [], [], []
+    good, failing = solver.anchor, False
+    samples = zip(times.tolist(), *(map(tuple, table.tolist()) for table in driven), strict=True)
+    for t, u, ud, udd in samples:
+        pose = solver.solve(good, u)
+        diagnostics.append(solver.diagnostics(pose))
+        if pose.good:
+            good, failing = pose, False
+            rows[0].append(solver.outputs(pose))
+            rows[1].append(solver.rates(pose, ud))
+            rows[2].append(solver.accelerations(pose, ud, udd))
+            errors.append(solver.errors(pose, ud, udd))
+            watches.append(solver.watch(pose))
+        else:
+            if not failing:
+                events.append(Event(t, "error", pose.message))
+            failing = True
+            for table in rows:
+                table.append(gap)
+            errors.append((_GAP,) * 3)
+            watches.append((_GAP,) * len(plan.watches))
+    for array, table in zip(tables, rows, strict=True):
+        array[:] = np.array(table, dtype=float).reshape(n, m)
+    told = np.array(diagnostics, dtype=float).reshape(n, 4)
+    inputs = np.stack(driven, axis=2).reshape(n, -1)  # value, speed, acceleration of each driver
+    return Run(
+        t=times,
+        outputs=plan.outputs,
+        coordinate_count=plan.coordinate_count,
+        values=tables[0],
+        rates=tables[1],
+        accelerations=tables[2],
+        fixed=plan.fixed,
+        input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
+        inputs=inputs,
+        status=told[:, 0].astype(np.int64),
+        iterations=told[:, 2].astype(np.int64),
+        residual=told[:, 1],
+        margin=told[:, 3],
+        error=np.array(errors, dtype=float).reshape(n, 3),
+        watch_names=plan.watch_names,
+        watch=np.array(watches, dtype=float).reshape(n, len(plan.watches)),
+        length_unit=plan.mechanism.length_unit,
+        mechanism_text=text(plan.mechanism),
+        info={
+            "name": plan.mechanism.name,
+            "title": plan.mechanism.title,
+            "engine": "python",
+            **{name: repr(value) for name, value in constants.items()},
+        },
+        events=tuple(events),
+    )
+
+
+def _tables(
+    out: tuple[FloatArray, FloatArray, FloatArray] | None, shape: tuple[int, int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    if out is None:
+        return np.empty(shape), np.empty(shape), np.empty(shape)
+    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
+        if array.shape != shape or array.dtype != np.float64:
+            raise KinfmuError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+    return out
