@@ -34,10 +34,20 @@ class Blocked(NamedTuple):
 def advance(model: Model, start: Pose, target: Vector) -> Pose:
     """The pose at `target`, followed from `start` in a straight line of the driver values.
 
+    A target that cannot be reached gives a pose of status OUTSIDE with the limit in its message.
+    """
+    arrived = advance_or_limit(model, start, target)
+    if isinstance(arrived, Limit):
+        return failed(start, target, Status.OUTSIDE, _limit_message(model, arrived, target))
+    return arrived
+
+
+def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
+    """The pose at `target`, or the limit on the way to it.
+
     Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
     residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
-    With one driver, singular points on the way are bridged. A target that cannot be reached gives a pose of status
-    OUTSIDE with the limit in its message; `start` stays as it was.
+    With one driver, singular points on the way are bridged.
     """
     direction, distance = _course(model, start.u, target)
     one = len(target) == 1
@@ -77,7 +87,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose:
         if step < SHORTEST_STEP:
             limit = limit or _limit(before, pose)
             if step < _GIVE_UP or _beyond(target, limit.u, direction, s):
-                return failed(start, target, Status.OUTSIDE, _limit_message(model, limit, target))
+                return limit
 
 
 def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:

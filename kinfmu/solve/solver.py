@@ -28,7 +28,8 @@ class Solver:
         u, z = model.ANCHOR
         self.anchor = Pose(u, model.position(u, z))
         self._one = len(u) == 1
-        self._unit: Vector = (1.0 if model.DRIVER_KINDS[:1] == ("angle",) else model.SIZE,)
+        # direction of a unit of motion with one driver
+        self.unit: Vector = (1.0 if model.DRIVER_KINDS[:1] == ("angle",) else model.SIZE,)
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
@@ -56,8 +57,8 @@ class Solver:
 
     def _unknown_rates(self, pose: Pose, ud: Vector) -> Vector:
         if self._one:
-            scale = ud[0] / self._unit[0]
-            return tuple([d * scale for d in pose.tangent(self.model, self._unit)[0]])
+            scale = ud[0] / self.unit[0]
+            return tuple([d * scale for d in pose.tangent(self.model, self.unit)[0]])
         return tuple(self.model.velocity(pose.values, ud))
 
     def outputs(self, pose: Pose) -> Vector:
@@ -75,8 +76,8 @@ class Solver:
         """
         zd = self._unknown_rates(pose, ud)
         if self._one:
-            first, second = pose.tangent(self.model, self._unit)
-            speed, more = ud[0] / self._unit[0], udd[0] / self._unit[0]
+            first, second = pose.tangent(self.model, self.unit)
+            speed, more = ud[0] / self.unit[0], udd[0] / self.unit[0]
             zdd = tuple([dd * speed * speed + d * more for d, dd in zip(first, second, strict=True)])
         else:
             zdd = tuple(self.model.acceleration(pose.values, ud, udd, zd))
@@ -108,8 +109,8 @@ class Solver:
         speed = max([abs(v) for v in ud] + [abs(v) for v in zd])
         more = max(abs(v) for v in udd) if udd else 0.0
         if pose.bridge is not None:
-            e0, e1, e2 = pose.bridge.disagreement(pose.u[0], self._unit)
-            rate = abs(ud[0] / self._unit[0])
+            e0, e1, e2 = pose.bridge.disagreement(pose.u[0], self.unit)
+            rate = abs(ud[0] / self.unit[0])
             floor = 8.0 * EPS / pose.bridge.half
             error_q = e0 + 8.0 * EPS
             error_qd = (e1 + floor) * rate
@@ -134,12 +135,12 @@ class Solver:
         """The pose that was dumped."""
         u, z, iterations, status, message, dumped, standing, own = data
         bridges = tuple(
-            Blocked(*content) if kind == "blocked" else restored(self.model, self._unit, content)
+            Blocked(*content) if kind == "blocked" else restored(self.model, self.unit, content)
             for kind, content in dumped
         )
         if standing >= 0 or own is not None:
-            bridge = bridges[standing] if standing >= 0 else restored(self.model, self._unit, own)
-            pose = bridge.pose(self.model, self._unit, tuple(u))
+            bridge = bridges[standing] if standing >= 0 else restored(self.model, self.unit, own)
+            pose = bridge.pose(self.model, self.unit, tuple(u))
         else:
             everything = (1 << len(self.model.BLOCKS)) - 1
             pose = Pose(tuple(u), self.model.position(tuple(u), tuple(z), everything))

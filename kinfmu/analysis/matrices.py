@@ -1,0 +1,75 @@
+"""The matrices of the method, as a course report prints them: Jacobians, plain and row-reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinfmu.equations.system import FloatArray, System
+
+_ZERO = 1e-7  # part of the largest entry that counts as zero: a dead centre is a double root, known to half the digits
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A Jacobian at a pose: rows and columns by name, its rank and its row-reduced form."""
+
+    title: str
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    entries: FloatArray  # (m, n)
+
+    @property
+    def reduced(self) -> FloatArray:
+        """Row-reduced echelon form, (m, n)."""
+        return row_reduced(self.entries)
+
+    @property
+    def rank(self) -> int:
+        return int(np.any(np.abs(self.reduced) > 0.0, axis=1).sum())
+
+    def __str__(self) -> str:
+        head = f"{self.title}: {len(self.rows)} x {len(self.columns)}, rank {self.rank}"
+        return "\n".join([head, _table(self.rows, self.columns, self.entries), "row-reduced", _table(None, self.columns, self.reduced)])
+
+
+def moving_jacobian(system: System, q: FloatArray, rows: Sequence[int], columns: Sequence[str], title: str) -> Matrix:
+    """Phi_q of the chosen rows over the chosen coordinates, without rows that do not meet them."""
+    places = [system.coordinates.index(name) for name in columns]
+    entries = system.jacobian(q)[np.ix_(list(rows), places)]
+    meets = [k for k, row in enumerate(entries) if np.abs(row).max(initial=0.0) > 0.0]
+    names = tuple(system.rows[rows[k]].name for k in meets)
+    return Matrix(title, names, tuple(columns), entries[meets])
+
+
+def row_reduced(matrix: FloatArray) -> FloatArray:
+    """Reduced row echelon form by Gauss-Jordan with partial pivoting; what rounding leaves of a zero is a zero."""
+    a = np.array(matrix, dtype=float)
+    small = _ZERO * np.abs(a).max(initial=0.0)
+    top = 0
+    for column in range(a.shape[1]):
+        if top == a.shape[0]:
+            break
+        pivot = top + int(np.abs(a[top:, column]).argmax())
+        if abs(a[pivot, column]) <= small:
+            a[top:, column] = 0.0
+            continue
+        a[[top, pivot]] = a[[pivot, top]]
+        a[top] /= a[top, column]
+        others = [k for k in range(a.shape[0]) if k != top]
+        a[others] -= np.outer(a[others, column], a[top])
+        top += 1
+    a[np.abs(a) <= small] = 0.0
+    return a
+
+
+def _table(rows: Sequence[str] | None, columns: Sequence[str], entries: FloatArray) -> str:
+    width = max([10, *(len(name) + 2 for name in columns)])
+    label = max((len(name) for name in rows or ()), default=0) + 2
+    lines = [" " * label + "".join(name.rjust(width) for name in columns)]
+    for k, row in enumerate(entries):
+        name = rows[k] if rows else ""
+        lines.append(name.ljust(label) + "".join(f"{value:{width}.4f}" for value in np.round(row, 4) + 0.0))
+    return "\n".join(lines)
