@@ -21,7 +21,9 @@ EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_ROOM = 0.28  # of the run's time, left free behind the curves for the legend
 
 
-def single(run: Run, scene: Scene | None, curves: Mapping[tuple[str, str], Group], accuracy: Group) -> rrb.Blueprint:
+def single(
+    run: Run, scene: Scene | None, curves: Mapping[tuple[str, str], Group], accuracy: Sequence[Group]
+) -> rrb.Blueprint:
     """One run: what moves on the left, what it measures on the right, one row an order, one column a unit."""
     import rerun.blueprint as rrb
 
@@ -30,14 +32,15 @@ def single(run: Run, scene: Scene | None, curves: Mapping[tuple[str, str], Group
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
             rows.append(rrb.Horizontal(*[plot(one.title, [f"/{one.path}"], len(one.names), [run]) for one in found]))
-    solver = plot(accuracy.title, ["/solver/accuracy", "/solver/error"], len(accuracy.names) + 3, [run])
+    paths = [f"/{group.path}" for group in accuracy]
+    solver = plot(accuracy[0].title, paths, sum(len(group.names) for group in accuracy), [run])
     rows.append(rrb.Horizontal(solver, plot("Newton iterations", ["/solver/iterations"], 1, [run])))
     rows.append(status_view([""], [run]))
     text: list[rrb.View] = [card_view()]
     if happenings(run):
         text.append(log_view([""]))
     left = rrb.Vertical(
-        linkage_view(["/linkage/**"], [scene] if scene else []), rrb.Horizontal(*text), row_shares=[2.2, 1]
+        linkage_view(["/linkage/**"], [scene] if scene else []), rrb.Horizontal(*text), row_shares=[1.7, 1]
     )
     right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.0])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
@@ -65,9 +68,9 @@ def compared(
     if any(happenings(run) for run in runs):
         text.append(log_view(["/a", "/b"]))
     left = rrb.Vertical(
-        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes), rrb.Horizontal(*text), row_shares=[1.6, 1]
+        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes), rrb.Horizontal(*text), row_shares=[1.4, 1]
     )
-    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.2])
+    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
 
 
@@ -84,7 +87,7 @@ def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
             state="collapsed",
             play_state="paused",
             loop_mode="all",
-            playback_speed=length / show or 1.0,
+            playback_speed=float(f"{length / show:.2g}") or 1.0,
         ),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -110,13 +113,12 @@ def plot(title: str, paths: Sequence[str], curves: int, runs: Sequence[Run]) -> 
     """The curves under `paths` over the whole runs, with their names beside them."""
     import rerun.blueprint as rrb
 
-    named = 1 < curves <= MOST_CURVES
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
         contents=list(paths),
-        axis_x=time_axis(runs, LEGEND_ROOM if named else EDGE),
-        plot_legend=rrb.PlotLegend(corner="RightTop", visible=named),
+        axis_x=time_axis(runs, LEGEND_ROOM),
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=curves <= MOST_CURVES),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,23 @@ from kinfmu.log.verdict import sentence
 from kinfmu.run import FloatArray, Run
 
 APPLICATION = "kinfmu_compare"  # its own, for its blueprint is another
-WIDE, NARROW = 4.0, 1.5  # widths of the curves of A and, drawn over them, B
+
+
+class _Look(NamedTuple):
+    """How one of the two runs is drawn: B narrow, over a wide A, so that both show where they agree."""
+
+    name: str
+    root: str
+    colour: palette.Colour
+    bars: float  # width, 1 as for a single run
+    curves: float  # width [points]
+    layer: float
+
+
+_LOOKS = (
+    _Look("A", "/a", palette.RUNS[0], 1.0, 4.0, 0.0),
+    _Look("B", "/b", palette.RUNS[1], 0.5, 1.5, 100.0),
+)
 
 
 def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = ("A", "B")) -> None:
@@ -36,14 +53,12 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     curves = groups(a) or groups(b)
     layout = compared((a, b), [scene for scene in scenes if scene], curves, same=difference is not None)
     with recording(path, f"{names[0]} and {names[1]}", layout, APPLICATION) as rec:
-        for root, run, scene, colour, line in zip(
-            ("/a", "/b"), (a, b), scenes, palette.RUNS, ((1.0, WIDE), (0.5, NARROW)), strict=True
-        ):
+        for run, scene, look in zip((a, b), scenes, _LOOKS, strict=True):
             if scene:
-                log_linkage(rec, f"{root}/linkage", run, scene, colour, line[0])
+                log_linkage(rec, f"{look.root}/linkage", run, scene, look.colour, look.bars, look.layer)
             for group in groups(run).values():
-                log_group(rec, root, run, _named(group, root[1:].upper()), line[1])
-            log_status(rec, root, run)
+                log_group(rec, look.root, run, _named(group, look), look.curves)
+            log_status(rec, look.root, run)
         if difference:
             for group in groups(difference).values():
                 log_group(rec, "/difference", difference, group)
@@ -77,10 +92,10 @@ def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(times, t, column, left=np.nan, right=np.nan) for column in table.T])
 
 
-def _named(group: Group, run: str) -> Group:
+def _named(group: Group, look: _Look) -> Group:
     """The group with its curves named after the run, B's in lighter colours."""
-    colours = group.colours if run == "A" else tuple(palette.lighter(colour) for colour in group.colours)
-    return dataclasses.replace(group, names=tuple(f"{run} {name}" for name in group.names), colours=colours)
+    colours = group.colours if look is _LOOKS[0] else tuple(palette.lighter(colour) for colour in group.colours)
+    return dataclasses.replace(group, names=tuple(f"{look.name} {name}" for name in group.names), colours=colours)
 
 
 def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes: list[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import subprocess
 import time
@@ -14,15 +15,16 @@ from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING
 
 from kinfmu.errors import LogError
-from kinfmu.log.blocks import TIMELINE
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
-START_TIME, SETTLE_TIME = 30.0, 25.0  # [s], at most
+START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
     "no graphics driver for a picture without a display; on Debian: apt-get install mesa-vulkan-drivers libvulkan1"
 )
+_SIGNS_OF_NO_DRIVER = ("No graphics adapter", "render context")  # none at all; one that is too old
+_COLOUR = re.compile("\x1b\\[[0-9;]*m")  # of terminals
 _POLL = 0.05  # [s]
 _PROBE_SIZE = 640  # [pixels]; small pictures suffice to see that nothing changes any more
 
@@ -43,10 +45,14 @@ def shoot(path: str | Path, at: float | None = None, size: tuple[int, int] = (16
     """
     with _viewer(size) as (client, deadline):
         client.open(str(Path(path).resolve()))
-        while not client.get_state().views and time.monotonic() < deadline:
+        while (state := client.get_state()).loading or not state.views:
+            if time.monotonic() > deadline:
+                raise LogError(f"{path}: the viewer shows nothing of it after {SETTLE_TIME:.0f} s")
             time.sleep(_POLL)
-        if at is not None:
-            client.set_time(TIMELINE, play_state="paused", duration=at)
+        if at is None:
+            client.set_time(play_state="paused")
+        else:
+            client.set_time(play_state="paused", duration=at)
         _settle(client, deadline)
         views = client.get_state().views
         reports = tuple(
@@ -69,10 +75,11 @@ def executable() -> str:
 
 
 def last_words(stream: IO[bytes]) -> str:
-    """The last line with an error in what a viewer wrote, or its last line."""
+    """The line in a viewer's complaints that says why it ended."""
     stream.seek(0)
-    lines = [line.strip() for line in stream.read().decode(errors="replace").splitlines() if line.strip()]
-    telling = [line for line in lines if "error" in line.lower() or "adapter" in line.lower()]
+    plain = _COLOUR.sub("", stream.read().decode(errors="replace"))
+    lines = [line.strip() for line in plain.splitlines() if line.strip()]
+    telling = [line for line in lines if line.startswith("Error") or "panicked" in line]
     return (telling or lines or ["no reason given"])[-1]
 
 
@@ -97,7 +104,13 @@ def _viewer(size: tuple[int, int]) -> Iterator[tuple[ViewerClient, float]]:
             _await_port(process, port, complaints)
             with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
                 _await_answer(process, client, complaints)
-                yield client, time.monotonic() + SETTLE_TIME
+                try:
+                    yield client, time.monotonic() + SETTLE_TIME
+                except OSError as error:  # what the client raises when the viewer is gone
+                    with suppress(subprocess.TimeoutExpired):
+                        process.wait(END_TIME)
+                    _still_there(process, complaints)
+                    raise LogError(f"the viewer does not answer any more: {error}") from error
         finally:
             _end(process)
 
@@ -137,7 +150,7 @@ def _still_there(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> Non
     if process.poll() is None:
         return
     words = last_words(complaints)
-    if "adapter" in words.lower():
+    if any(sign in words for sign in _SIGNS_OF_NO_DRIVER):
         raise LogError(NO_DRIVER, no_graphics=True)
     raise LogError(f"the viewer ended at once: {words}")
 
@@ -156,7 +169,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     """Ask the viewer to end, then make it."""
     process.terminate()
     try:
-        process.wait(5.0)
+        process.wait(END_TIME)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

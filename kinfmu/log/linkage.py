@@ -35,8 +35,10 @@ def log_linkage(
     scene: Scene,
     colour: palette.Colour | None = None,
     width: float = 1.0,
+    layer: float = 0.0,
 ) -> None:
-    """The linkage under the entity `root`: all in `colour`, or each body in its own; `width` scales the lines.
+    """The linkage under the entity `root`: all in `colour`, or each body in its own. `width` scales the lines, and what
+    has a higher `layer` covers what has a lower one.
 
     Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
     nothing to draw.
@@ -52,7 +54,7 @@ def log_linkage(
     for body in scene.bodies:
         path, own = f"{root}/bodies/{body.name}", colour or palette.body(body.index)
         look = rr.LineStrips2D.from_fields(
-            radii=[_BODY * size], labels=[body.name], show_labels=named, draw_order=20.0 + body.index / 100
+            radii=[_BODY * size], labels=[body.name], show_labels=named, draw_order=layer + 20.0 + body.index / 100
         )
         rec.log(path, look, static=True)
         corners = [world(body.pose[good], (x, y)) for x, y in body.outline]
@@ -62,7 +64,9 @@ def log_linkage(
         path = f"{root}/bars/{bar.name}"
         rec.log(
             path,
-            rr.LineStrips2D.from_fields(radii=[_BAR * size], labels=[bar.name], show_labels=named, draw_order=10.0),
+            rr.LineStrips2D.from_fields(
+                radii=[_BAR * size], labels=[bar.name], show_labels=named, draw_order=layer + 10.0
+            ),
             static=True,
         )
         _send_strips(rec, path, run.t[good], bar.ends[good])
@@ -72,13 +76,13 @@ def log_linkage(
         f"{root}/pins",
         run,
         scene.pins,
-        rr.Points2D.from_fields(radii=[_PIN * size], colors=[palette.PIN], draw_order=30.0),
+        rr.Points2D.from_fields(radii=[_PIN * size], colors=[palette.PIN], draw_order=layer + 30.0),
     )
     for index, (name, points) in enumerate(scene.paths.items()):
         own = colour or palette.body(len(scene.bodies) + index)
         _log_path(rec, f"{root}/paths/{name}", points, own)
         tip = rr.Points2D.from_fields(
-            radii=[_PIN * size], colors=[own], labels=[name], show_labels=colour is None, draw_order=40.0
+            radii=[_PIN * size], colors=[own], labels=[name], show_labels=colour is None, draw_order=layer + 40.0
         )
         _log_points(rec, f"{root}/points/{name}", run, points[:, None, :], tip)
     _log_notice(rec, f"{root}/notice", run, scene)

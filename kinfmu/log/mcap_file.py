@@ -46,8 +46,9 @@ def write_mcap(run: Run, path: str | Path) -> None:
     """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time."""
     from mcap.writer import CompressionType, Writer
 
+    times = nanoseconds(run.t)
     zero = zero_of(run.t)
-    stamps = nanoseconds(run.t) - zero * NANOSECONDS  # (n,)
+    stamps = times - zero * NANOSECONDS  # (n,)
     scene, reason = drawable(run)
     with replacing(path) as temporary, temporary.open("wb") as file:
         writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)

@@ -47,15 +47,16 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it."""
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     scene, note = drawable(run)
-    curves, solver = groups(run), accuracy(run)
+    curves, solver, errors = groups(run), accuracy(run), error_estimates(run)
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(run, scene, curves, solver)) as rec:
+    with recording(path, name, single(run, scene, curves, [solver, errors] if errors else [solver])) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
             log_linkage(rec, "/linkage", run, scene)
         for group in (*curves.values(), solver):
             log_group(rec, "", run, group)
-        log_group(rec, "", run, error_estimates(run), as_points=True)
+        if errors:
+            log_group(rec, "", run, errors, as_points=True)
         _log_iterations(rec, run)
         log_status(rec, "", run)
         log_card(rec, card(run, note))

@@ -39,38 +39,26 @@ def review(
             raise LogError(f"{path}: a run to review is an .mcap or .rrd file")
         if not path.is_file():
             raise LogError(f"{path}: there is no such file")
+    if run.suffix == ".rrd" and (other or save):
+        what = "compared" if other else "saved as another"
+        raise LogError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
+    if other and Path(other).suffix == ".rrd":
+        raise LogError(f"{other}: a recording cannot be compared; give the run's .mcap file")
     if not save and not screenshot:
         _need_display(run)
     if run.suffix == ".rrd":
-        return _review_recording(run, other, save, screenshot, at)
-    if screenshot and not save:
+        recording, moment = run, at
+    elif screenshot and not save:
         with TemporaryDirectory() as folder:
             recording = Path(folder) / f"{run.stem}.rrd"
             _shoot(recording, screenshot, _record(run, other, recording, at))
         return None
-    recording = Path(save) if save else run.with_name(_beside(run, other))
-    moment = _record(run, other, recording, at)
+    else:
+        recording = Path(save) if save else run.with_name(_beside(run, other))
+        moment = _record(run, other, recording, at)
     if screenshot:
         _shoot(recording, screenshot, moment)
-    if not save:
-        _open(recording)
-    return recording
-
-
-def _review_recording(
-    recording: Path,
-    other: str | Path | None,
-    save: str | Path | None,
-    screenshot: str | Path | None,
-    at: float | None,
-) -> Path:
-    """The same for a recording that is there already."""
-    if other or save:
-        what = "compared" if other else "saved as another"
-        raise LogError(f"{recording}: a recording cannot be {what}; give the run's .mcap file")
-    if screenshot:
-        _shoot(recording, screenshot, at)
-    else:
+    elif not save:
         _open(recording)
     return recording
 
@@ -96,8 +84,8 @@ def _record(run: Path, other: str | Path | None, recording: Path, at: float | No
 
 def _shoot(recording: Path, screenshot: str | Path, at: float | None) -> None:
     """A picture of the recording; a view that cannot show its data is an error."""
+    shot = shoot(recording, at)
     with replacing(screenshot) as temporary:
-        shot = shoot(recording, at)
         temporary.write_bytes(shot.png)
     if shot.reports:
         raise LogError(f"{screenshot}: the viewer complains: {'; '.join(shot.reports)}")

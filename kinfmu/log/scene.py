@@ -188,7 +188,8 @@ def _poses(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[
             left_out[body.name] = missing
         else:
             pose = np.column_stack([columns[name] for name in names])
-            poses[body.name] = np.where(run.good[:, None], pose, np.nan)
+            known = run.good & np.isfinite(pose).all(axis=1)
+            poses[body.name] = np.where(known[:, None], pose, np.nan)
     return poses, left_out
 
 

@@ -57,10 +57,10 @@ def accuracy(run: Run) -> Group:
     return _logarithmic("accuracy", curves, 0, SMALLEST)
 
 
-def error_estimates(run: Run) -> Group:
-    """log10 of the estimated errors of q, qd, qdd, where there are any: they come with samples near singular points."""
+def error_estimates(run: Run) -> Group | None:
+    """log10 of the estimated errors of q, qd, qdd, which samples near singular points have; None if there are none."""
     curves = {f"error of {name}": run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
-    return _logarithmic("error", curves, 2, np.nan)
+    return _logarithmic("error", curves, 2, np.nan) if np.any(run.error > 0.0) else None
 
 
 def _logarithmic(path: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:

@@ -66,7 +66,7 @@ def changes(run: Run) -> Iterator[Change]:
 def happenings(run: Run) -> list[Event]:
     """Changes of status and the run's own events, by time; a run that begins well begins without an entry."""
     found = [
-        Event(change.t, _LEVELS.get(change.status, "error"), f"status: {MEANINGS[change.status]}")
+        Event(change.t, _LEVELS.get(change.status, "error"), MEANINGS[change.status])
         for change in changes(run)
         if change.row or change.status is not Status.OK
     ]

@@ -1,0 +1,264 @@
+"""MCAP: the run comes back bit for bit, and other readers find what they can draw."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from kinfmu.errors import LogError
+from kinfmu.log import read, write_mcap
+from kinfmu.log.headless import executable
+from kinfmu.log.ros2 import field_names
+from kinfmu.run import Event, Run
+from tests.log.runs import fourbar, with_gap
+
+
+def messages(path: Path, topic: str) -> list[tuple[int, bytes]]:
+    """Log time [ns] and payload of every message of a topic, in file order."""
+    with path.open("rb") as file:
+        found = make_reader(file, validate_crcs=True).iter_messages([topic], log_time_order=False)
+        return [(message.log_time, message.data) for _, _, message in found]
+
+
+def numbers_of_joint_state(payload: bytes) -> tuple[list[str], list[np.ndarray]]:
+    """Names and the three arrays of a sensor_msgs/JointState, decoded by hand."""
+    at = 4 + 8
+
+    def align(size: int) -> None:
+        nonlocal at
+        at += -(at - 4) % size
+
+    def count() -> int:
+        nonlocal at
+        align(4)
+        (value,) = struct.unpack_from("<I", payload, at)
+        at += 4
+        return int(value)
+
+    def string() -> str:
+        nonlocal at
+        length = count()
+        at += length
+        return payload[at - length : at - 1].decode()
+
+    string()
+    names = [string() for _ in range(count())]
+    arrays = []
+    for _ in range(3):
+        length = count()
+        if length:
+            align(8)
+        arrays.append(np.frombuffer(payload, "<f8", length, at))
+        at += 8 * length
+    assert at == len(payload)
+    return names, arrays
+
+
+def assert_same(a: Run, b: Run) -> None:
+    """Equal in every field, arrays in type, shape and bits."""
+    for field in dataclasses.fields(Run):
+        x, y = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(x, np.ndarray):
+            assert (x.dtype, x.shape) == (y.dtype, y.shape), field.name
+            assert x.tobytes() == y.tobytes(), field.name
+        else:
+            assert x == y, field.name
+
+
+def test_a_run_reads_back_bit_for_bit(any_run: Run, tmp_path: Path) -> None:
+    write_mcap(any_run, tmp_path / "run.mcap")
+    assert_same(any_run, read(tmp_path / "run.mcap"))
+
+
+def test_a_run_without_samples_reads_back(run: Run, tmp_path: Path) -> None:
+    empty = dataclasses.replace(
+        run,
+        **{
+            f.name: getattr(run, f.name)[:0]
+            for f in dataclasses.fields(run)
+            if isinstance(getattr(run, f.name), np.ndarray)
+        },
+    )
+    write_mcap(empty, tmp_path / "run.mcap")
+    assert_same(empty, read(tmp_path / "run.mcap"))
+
+
+def test_negative_zero_infinity_and_bits_of_nan_survive(run: Run, tmp_path: Path) -> None:
+    values = run.values.copy()
+    values[:4, 0] = [-0.0, np.inf, np.nextafter(0.0, 1.0), np.frombuffer(b"\x01\0\0\0\0\0\xf8\x7f")[0]]
+    odd = dataclasses.replace(run, values=values, fixed={"crank.x": -0.0, "crank.y": 0.1 + 0.2})
+    write_mcap(odd, tmp_path / "run.mcap")
+    assert_same(odd, read(tmp_path / "run.mcap"))
+    assert np.signbit(read(tmp_path / "run.mcap").fixed["crank.x"])
+
+
+def test_times_between_nanoseconds_survive(run: Run, tmp_path: Path) -> None:
+    odd = dataclasses.replace(run, t=run.t + 1e-10 * np.pi, events=(Event(1 / 3, "info", "a third"),))
+    write_mcap(odd, tmp_path / "run.mcap")
+    assert_same(odd, read(tmp_path / "run.mcap"))
+
+
+def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
+    write_mcap(run, tmp_path / "a.mcap")
+    write_mcap(run, tmp_path / "b.mcap")
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def test_rerun_finds_no_fault_with_the_file(any_run: Run, tmp_path: Path) -> None:
+    write_mcap(any_run, tmp_path / "run.mcap")
+    told = subprocess.run(
+        [executable(), "mcap", "check", "--full", str(tmp_path / "run.mcap")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 0, told.stdout + told.stderr
+    rows = [line.split() for line in told.stdout.splitlines() if "/" in line and "ID" not in line]
+    assert {row[0] for row in rows[1:]} == {"ok"}
+
+
+def test_log_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
+    write_mcap(fourbar(np.arange(3000) * 1e-3), tmp_path / "run.mcap")
+    times = [time for time, _ in messages(tmp_path / "run.mcap", "/joint_states")]
+    assert times == [k * 1_000_000 for k in range(3000)]
+
+
+def test_a_run_from_before_zero_is_counted_from_a_whole_second(tmp_path: Path) -> None:
+    write_mcap(fourbar(np.array([-0.5, 0.0, 0.5])), tmp_path / "run.mcap")
+    assert [time for time, _ in messages(tmp_path / "run.mcap", "/sample")] == [500_000_000, 10**9, 1_500_000_000]
+    with (tmp_path / "run.mcap").open("rb") as file:
+        metadata = {one.name: one.metadata for one in make_reader(file).iter_metadata()}
+    assert metadata["kinfmu.about"]["time_zero_s"] == "-1"
+
+
+def test_joint_states_hold_the_coordinates_and_their_rates(run: Run, tmp_path: Path) -> None:
+    write_mcap(run, tmp_path / "run.mcap")
+    found = messages(tmp_path / "run.mcap", "/joint_states")
+    assert len(found) == len(run)
+    names, (position, velocity, effort) = numbers_of_joint_state(found[60][1])
+    assert names == list(run.outputs)
+    np.testing.assert_array_equal(position, run.values[60])
+    np.testing.assert_array_equal(velocity, run.rates[60])
+    assert not len(effort)
+    _, (acceleration, *rest) = numbers_of_joint_state(messages(tmp_path / "run.mcap", "/joint_accelerations")[60][1])
+    np.testing.assert_array_equal(acceleration, run.accelerations[60])
+    assert [len(array) for array in rest] == [0, 0]
+
+
+def test_a_gap_is_one_empty_message_and_no_numbers(run_with_gap: Run, tmp_path: Path) -> None:
+    write_mcap(run_with_gap, tmp_path / "run.mcap")
+    found = messages(tmp_path / "run.mcap", "/joint_states")
+    empty = [time for time, payload in found if not len(numbers_of_joint_state(payload)[1][0])]
+    assert empty == [100 * 10**9]
+    assert {time for time, _ in found} == {k * 10**9 for k in range(181) if not 100 < k <= 120}
+    assert all(np.isfinite(numbers_of_joint_state(payload)[1][0]).all() for _, payload in found)
+    assert len(messages(tmp_path / "run.mcap", "/tf")) == 160
+    assert len(messages(tmp_path / "run.mcap", "/sample")) == 181
+
+
+def test_drawn_lengths_are_metres_and_the_record_keeps_the_unit(run: Run, tmp_path: Path) -> None:
+    text = run.mechanism_text.replace('length = "m"', 'length = "mm"')
+    write_mcap(dataclasses.replace(run, length_unit="mm", mechanism_text=text), tmp_path / "run.mcap")
+    _, (position, *_) = numbers_of_joint_state(messages(tmp_path / "run.mcap", "/joint_states")[60][1])
+    np.testing.assert_allclose(position, run.values[60] * np.where([n.endswith("phi") for n in run.outputs], 1, 1e-3))
+    with (tmp_path / "run.mcap").open("rb") as file:
+        channels = {one.topic: one.metadata for one in make_reader(file).get_summary().channels.values()}
+    assert channels["/sample"]["unit.coupler_vx"] == "mm/s"
+    assert channels["/joint_states"]["units"] == "position: rad, m; velocity: rad/s, m/s"
+    assert read(tmp_path / "run.mcap")["coupler.x"][60] == run["coupler.x"][60]
+
+
+def test_status_and_events_are_in_the_log(run_with_gap: Run, tmp_path: Path) -> None:
+    write_mcap(run_with_gap, tmp_path / "run.mcap")
+    found = [(time // 10**9, payload[12]) for time, payload in messages(tmp_path / "run.mcap", "/log")]
+    assert found == [(0, 20), (1, 20), (100, 40), (100, 40), (121, 20), (180, 20)]
+    assert any(b"the limit is 1.75 rad" in payload for _, payload in messages(tmp_path / "run.mcap", "/log"))
+
+
+def test_the_mechanism_file_is_attached(run: Run, tmp_path: Path) -> None:
+    write_mcap(run, tmp_path / "run.mcap")
+    with (tmp_path / "run.mcap").open("rb") as file:
+        attachments = list(make_reader(file).iter_attachments())
+    assert [one.name for one in attachments] == ["mechanism.toml"]
+    assert attachments[0].data.decode() == run.mechanism_text
+
+
+def test_every_column_has_a_field_of_its_own() -> None:
+    names = field_names(["A.x", "a.x", "watch.Bar 1 - length", "_b.phi", "2", "é"])
+    assert names == ["a_x", "a_x_2", "watch_bar_1_length", "b_phi", "n2", "column"]
+
+
+def test_a_time_that_is_no_number_is_refused_and_the_old_file_stays(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"old")
+    with pytest.raises(LogError, match=r"time of sample 3 is nan s; a log needs a number within \+-2147483647 s"):
+        write_mcap(dataclasses.replace(run, t=np.where(run.t == 3.0, np.nan, run.t)), path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_failure_while_writing_leaves_the_old_file(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_space(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(Writer, "finish", no_space)
+    with pytest.raises(LogError, match=r"run\.mcap: cannot be written \(No space left on device\)"):
+        write_mcap(run, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_missing_folder_is_named(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"run\.mcap: the folder '.*nowhere' does not exist$"):
+        write_mcap(run, tmp_path / "nowhere" / "run.mcap")
+    with pytest.raises(LogError, match=r"is a folder; the name of a file is needed$"):
+        write_mcap(run, tmp_path)
+
+
+def test_a_link_stays_a_link(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "link.mcap").symlink_to(tmp_path / "run.mcap")
+    write_mcap(run, tmp_path / "link.mcap")
+    assert (tmp_path / "link.mcap").is_symlink()
+    assert_same(run, read(tmp_path / "run.mcap"))
+
+
+@pytest.mark.parametrize("kept", [0, 5, 3000, -20])
+def test_a_truncated_file_is_told_in_one_line(run: Run, tmp_path: Path, kept: int) -> None:
+    path = tmp_path / "run.mcap"
+    write_mcap(run, path)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(LogError, match=r"run\.mcap: not a whole MCAP file .*cut off") as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_foreign_file_is_told_from_a_run(tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/camera", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    with pytest.raises(LogError, match=r"no topic /sample, so this is no run of kinfmu; topics: /camera"):
+        read(path)
+    (tmp_path / "text.mcap").write_text("t,x\n0,1\n" * 20)
+    with pytest.raises(LogError, match="not a whole MCAP file"):
+        read(tmp_path / "text.mcap")
+    with pytest.raises(LogError, match=r"nothing\.mcap: cannot be read \(No such file or directory\)"):
+        read(tmp_path / "nothing.mcap")
+
+
+def test_a_gap_of_several_pieces_has_an_empty_message_each(run: Run, tmp_path: Path) -> None:
+    write_mcap(with_gap(with_gap(run, 10, 12), 20, 20), tmp_path / "run.mcap")
+    found = messages(tmp_path / "run.mcap", "/joint_states")
+    assert [time // 10**9 for time, payload in found if not numbers_of_joint_state(payload)[0]] == [10, 20]

@@ -1,0 +1,179 @@
+"""Rerun recordings: whole files, right numbers, views without complaints."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu.errors import LogError
+from kinfmu.log import headless, write_mcap, write_rrd
+from kinfmu.log.comparison import write_comparison
+from kinfmu.log.rerun_file import _check_whole
+from kinfmu.run import Run
+from tests.log.runs import KINDS, fourbar, with_gap
+
+SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
+
+
+def rows(path: Path, entity: str, component: str) -> list[tuple[int, list[object]]]:
+    """Time [ns] and value of every row of an entity's component, static data left out."""
+    import rerun as rr
+
+    found = []
+    for chunk in rr.chunk.RrdReader(path).stream():
+        if chunk.entity_path == entity and not chunk.is_static:
+            batch = chunk.to_record_batch()
+            if component in batch.schema.names:
+                times = batch["sim_time"].cast("int64").to_pylist()
+                found += zip(times, batch[component].to_pylist(), strict=True)
+    return sorted(found, key=lambda row: row[0])
+
+
+def entities(path: Path) -> set[str]:
+    import rerun as rr
+
+    return {chunk.entity_path for chunk in rr.chunk.RrdReader(path).stream()}
+
+
+def verified(path: Path) -> bool:
+    told = subprocess.run(
+        [headless.executable(), "rrd", "verify", str(path)],
+        capture_output=True,
+        check=False,
+        env=os.environ | {"CI": "1"},
+    )
+    return told.returncode == 0
+
+
+def test_rerun_finds_no_fault_with_any_recording(tmp_path: Path) -> None:
+    for name, kind in KINDS.items():
+        path = tmp_path / f"{name}.rrd"
+        write_rrd(kind(), path)
+        assert verified(path), name
+
+
+def test_curves_hold_the_numbers_of_the_run_at_its_times(run: Run, tmp_path: Path) -> None:
+    write_rrd(run, tmp_path / "run.rrd")
+    angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
+    assert [time for time, _ in angles] == [k * 10**9 for k in range(181)]
+    phi = [run["crank.phi"][60], run["coupler.phi"][60], run["rocker.phi"][60]]
+    assert angles[60][1] == phi
+    speeds = rows(tmp_path / "run.rrd", "/velocity/length", SCALARS)
+    assert speeds[60][1] == [run[name][60] for name in ("coupler.vx", "coupler.vy", "A.vx", "A.vy")]
+
+
+def test_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
+    write_rrd(fourbar(np.arange(-500, 2500) * 1e-3), tmp_path / "run.rrd")
+    angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
+    assert [time for time, _ in angles] == [k * 1_000_000 for k in range(-500, 2500)]
+
+
+def test_links_stand_where_the_run_says(run: Run, tmp_path: Path) -> None:
+    write_rrd(run, tmp_path / "run.rrd")
+    ((line,),) = (
+        value for time, value in rows(tmp_path / "run.rrd", "/linkage/bodies/coupler", STRIPS) if time == 60e9
+    )
+    x, y = run["coupler.x"][60], run["coupler.y"][60]
+    np.testing.assert_allclose(line, [[x - 1, y], [x, y], [x + 1, y]], atol=1e-6)
+
+
+def test_a_gap_breaks_the_curves_and_turns_the_linkage_grey(run_with_gap: Run, tmp_path: Path) -> None:
+    path = tmp_path / "run.rrd"
+    write_rrd(run_with_gap, path)
+    broken = [time // 10**9 for time, value in rows(path, "/position/angle", SCALARS) if np.isnan(value).all()]
+    assert broken == list(range(100, 121))
+    drawn = {time // 10**9 for time, _ in rows(path, "/linkage/bodies/crank", STRIPS) if _ is not None}
+    assert drawn == set(range(181)) - set(range(100, 121))
+    colours = [time // 10**9 for time, value in rows(path, "/linkage/bodies/crank", "LineStrips2D:colors") if value]
+    assert colours == [0, 100, 121]
+    notices = [(time // 10**9, value) for time, value in rows(path, "/linkage/notice", "Points2D:labels")]
+    assert notices == [(0, []), (100, ["no pose: the last one that closed, in grey"]), (121, [])]
+
+
+def test_paths_do_not_depend_on_the_run(tmp_path: Path) -> None:
+    write_rrd(fourbar(np.arange(10.0, 20.0)), tmp_path / "a.rrd")
+    write_rrd(fourbar(np.arange(30.0, 33.0)), tmp_path / "b.rrd")
+    named = [{path for path in entities(tmp_path / name) if path != "/log"} for name in ("a.rrd", "b.rrd")]
+    assert named[0] == named[1]
+    assert {"/position/angle", "/acceleration/length", "/solver/status", "/card", "/linkage/bodies/crank"} <= named[0]
+
+
+def test_a_missing_folder_is_named_and_nothing_is_left_behind(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"the folder '.*nowhere' does not exist$"):
+        write_rrd(run, tmp_path / "nowhere" / "run.rrd")
+    with pytest.raises(LogError, match="time of sample 0 is inf s"):
+        write_rrd(dataclasses.replace(run, t=run.t + np.inf), tmp_path / "run.rrd")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_without_its_end_is_told(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "run.rrd"
+    write_rrd(run, path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(LogError, match=r"run\.rrd: the recording could not be written to its end; is the disk full\?"):
+        _check_whole(path, path)
+
+
+def test_differences_are_those_of_b_from_a(run: Run, tmp_path: Path) -> None:
+    shifted = dataclasses.replace(run, values=run.values + 0.25)
+    write_comparison(run, shifted, tmp_path / "compare.rrd")
+    for entity in ("/difference/position/angle", "/difference/position/length"):
+        found = rows(tmp_path / "compare.rrd", entity, SCALARS)
+        assert len(found) == len(run)
+        np.testing.assert_allclose([value for _, value in found], 0.25, rtol=1e-14)
+    assert verified(tmp_path / "compare.rrd")
+
+
+def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -> None:
+    coarse, fine = fourbar(np.arange(0.0, 20.0)), fourbar(np.arange(5.0, 15.0, 0.01))
+    write_comparison(coarse, fine, tmp_path / "compare.rrd")
+    found = rows(tmp_path / "compare.rrd", "/difference/position/length", SCALARS)
+    apart = np.array([value for _, value in found])
+    assert np.isnan(apart[:5]).all()
+    assert np.isnan(apart[15:]).all()
+    assert np.abs(apart[5:15]).max() < 1e-12
+
+
+def test_runs_in_different_units_are_not_compared(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="lengths in m and mm; they need the same unit"):
+        write_comparison(run, dataclasses.replace(run, length_unit="mm"), tmp_path / "compare.rrd")
+
+
+def _single(path: Path) -> None:
+    write_rrd(with_gap(fourbar(np.arange(181.0)), 100, 120), path)
+
+
+def _one_sample(path: Path) -> None:
+    write_rrd(KINDS["one sample"](), path)
+
+
+def _compared(path: Path) -> None:
+    write_comparison(fourbar(np.arange(181.0)), with_gap(fourbar(np.arange(0.0, 181.0, 0.5)), 40, 60), path)
+
+
+def _mcap(path: Path) -> None:
+    write_mcap(with_gap(fourbar(np.arange(181.0)), 100, 120), path)
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "view"),
+    [
+        ("gap.rrd", _single, "angular velocity [rad/s]"),
+        ("one.rrd", _one_sample, "linkage"),
+        ("compared.rrd", _compared, "B - A: position [m]"),
+        ("run.mcap", _mcap, "joint_states/position"),
+    ],
+)
+@pytest.mark.usefixtures("graphics")
+def test_no_view_complains(name: str, write: Callable[[Path], None], view: str, tmp_path: Path) -> None:
+    write(tmp_path / name)
+    shot = headless.shoot(tmp_path / name, size=(800, 600))
+    assert shot.reports == ()
+    assert view in shot.views
+    assert shot.png.startswith(b"\x89PNG")

@@ -1,0 +1,56 @@
+"""How a run is summed up in words."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from kinfmu.log.card import card
+from kinfmu.log.verdict import happenings, sentence
+from kinfmu.run import Event, Run
+from kinfmu.solve.status import Status
+from tests.log.runs import fourbar
+
+
+def test_the_verdict_counts_samples_by_status(run_with_gap: Run) -> None:
+    assert sentence(run_with_gap) == "181 samples: 158 ok, 2 bridged, 21 outside; worst residual 1.1e-16 at 90 s"
+
+
+def test_what_happened_is_told_by_time_with_its_level(run_with_gap: Run) -> None:
+    found = [(event.t, event.level) for event in happenings(run_with_gap)]
+    assert found == [(0, "info"), (1, "info"), (100, "error"), (100, "error"), (121, "info"), (180, "info")]
+
+
+def test_a_run_that_is_well_from_the_start_has_nothing_to_tell() -> None:
+    assert happenings(fourbar(np.arange(10.0, 20.0))) == []
+
+
+def test_near_singular_samples_are_a_warning(run: Run) -> None:
+    near = dataclasses.replace(run, status=np.where(run.t == 5.0, Status.NEAR_SINGULAR, Status.OK))
+    assert [(event.t, event.level) for event in happenings(near)] == [(5.0, "warning"), (6.0, "info")]
+
+
+def test_the_card_tells_mechanism_run_verdict_and_events(run_with_gap: Run) -> None:
+    text = card(run_with_gap, "Not drawn: coupler.")
+    for part in (
+        "### Four-bar crank with a redundant constraint",
+        "181 samples, 0 s to 180 s",
+        "| 21 | outside: ",
+        "Worst residual 1.1e-16",
+        "| 100 | crank\\_angle = 1.9 rad: the limit is 1.75 rad |",
+        "Watched, set aside as redundant: AB.",
+        "Not drawn: coupler.",
+    ):
+        assert part in text
+
+
+def test_text_from_outside_cannot_break_the_card(run: Run) -> None:
+    odd = dataclasses.replace(run, info={"title": "a | b\n# <c>"}, events=(Event(1.0, "info", "x|y\nz"),))
+    assert "### a \\| b \\# \\<c\\>\n" in card(odd)
+    assert "| 1 | x\\|y z |" in card(odd)
+
+
+def test_a_long_story_is_cut_on_the_card(run: Run) -> None:
+    long = dataclasses.replace(run, events=tuple(Event(float(k), "info", f"event {k}") for k in range(100)))
+    assert "| | and 91 more, in the log |" in card(long)
