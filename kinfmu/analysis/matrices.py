@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,17 @@ class Matrix:
     @property
     def rank(self) -> int:
         return int(np.any(np.abs(self.reduced) > 0.0, axis=1).sum())
+
+    def as_json(self) -> dict[str, Any]:
+        """The matrix as plain data."""
+        return {
+            "title": self.title,
+            "rows": list(self.rows),
+            "columns": list(self.columns),
+            "entries": self.entries.tolist(),
+            "reduced": self.reduced.tolist(),
+            "rank": self.rank,
+        }
 
     def __str__(self) -> str:
         head = f"{self.title}: {len(self.rows)} x {len(self.columns)}, rank {self.rank}"

@@ -1,0 +1,25 @@
+"""Ships the gallery, which lies in fmus/ beside the package, inside the wheel as kinfmu/fmus."""
+
+from pathlib import Path
+from shutil import copyfile
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+
+GALLERY = Path("fmus")
+
+
+class BuildWithGallery(build_py):
+    """Also copies fmus/*/mechanism.toml."""
+
+    def run(self):
+        super().run()
+        if self.editable_mode:
+            return
+        for source in sorted(GALLERY.glob("*/mechanism.toml")):
+            target = Path(self.build_lib) / "kinfmu" / source
+            target.parent.mkdir(parents=True, exist_ok=True)
+            copyfile(source, target)
+
+
+setup(cmdclass={"build_py": BuildWithGallery})
