@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from kinfmu.log.mcap_file import read, write_mcap
     from kinfmu.log.rerun_file import write_rrd
-    from kinfmu.log.review import review
+    from kinfmu.log.reviewing import review
     from kinfmu.log.table import write_table
 
 __all__ = ["read", "review", "write_mcap", "write_rrd", "write_table"]
 
 _HOME = {
     "read": "mcap_file",
-    "review": "review",
+    "review": "reviewing",
     "write_mcap": "mcap_file",
     "write_rrd": "rerun_file",
     "write_table": "table",
@@ -30,7 +30,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'kinfmu.log' has no attribute '{name}'")
     found = getattr(import_module(f"kinfmu.log.{_HOME[name]}"), name)
-    globals()[name] = found  # from now on without this detour, also where the module is called like the function
+    globals()[name] = found  # from now on without this detour
     return found
 
 

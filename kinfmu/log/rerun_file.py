@@ -74,11 +74,11 @@ def recording(
         rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
         rec.set_log_tick_enabled(False)
         rec.save(temporary, default_blueprint=layout)
+        rec.send_recording_name(name)
         try:
-            rec.send_recording_name(name)
             yield rec
+            _flush(rec, path)
         finally:
-            rec.flush()
             rec.disconnect()  # writes the footer
         _check_whole(temporary, path)
 
@@ -150,8 +150,15 @@ def _properties(run: Run) -> rr.AnyValues:
     return about
 
 
+def _flush(rec: rr.RecordingStream, path: str | Path) -> None:
+    try:
+        rec.flush()
+    except RuntimeError as error:
+        raise LogError(f"{path}: the recording could not be written to its end ({error}); is the disk full?") from error
+
+
 def _check_whole(file: Path, path: str | Path) -> None:
-    """Rerun writes from a thread that reports a full disk to nobody: look for the footer."""
+    """Look for the footer: what fails after the last flush Rerun tells to the terminal only."""
     with file.open("rb") as stream:
         stream.seek(-min(64, file.stat().st_size), 2)
         if b"RRF" not in stream.read():

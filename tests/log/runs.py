@@ -52,6 +52,12 @@ def with_gap(run: Run, first: int, last: int, status: Status = Status.OUTSIDE) -
     return dataclasses.replace(run, status=np.where(rows, status, run.status), events=(*run.events, event), **blank)
 
 
+def without_samples(run: Run) -> Run:
+    """The run before its first sample."""
+    arrays = {field.name: getattr(run, field.name) for field in dataclasses.fields(run)}
+    return dataclasses.replace(run, **{k: a[:0] for k, a in arrays.items() if isinstance(a, np.ndarray)})
+
+
 def _watched(run: Run) -> Run:
     watch = np.random.default_rng(1).normal(scale=1e-16, size=(len(run), 40))
     return dataclasses.replace(run, watch_names=tuple(f"Bar {k}.length" for k in range(40)), watch=watch)

@@ -17,7 +17,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.log.headless import executable
 from kinfmu.log.ros2 import field_names
 from kinfmu.run import Event, Run
-from tests.log.runs import fourbar, with_gap
+from tests.log.runs import fourbar, with_gap, without_samples
 
 
 def messages(path: Path, topic: str) -> list[tuple[int, bytes]]:
@@ -78,14 +78,7 @@ def test_a_run_reads_back_bit_for_bit(any_run: Run, tmp_path: Path) -> None:
 
 
 def test_a_run_without_samples_reads_back(run: Run, tmp_path: Path) -> None:
-    empty = dataclasses.replace(
-        run,
-        **{
-            f.name: getattr(run, f.name)[:0]
-            for f in dataclasses.fields(run)
-            if isinstance(getattr(run, f.name), np.ndarray)
-        },
-    )
+    empty = without_samples(run)
     write_mcap(empty, tmp_path / "run.mcap")
     assert_same(empty, read(tmp_path / "run.mcap"))
 

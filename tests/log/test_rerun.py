@@ -16,7 +16,7 @@ from kinfmu.log import headless, write_mcap, write_rrd
 from kinfmu.log.comparison import write_comparison
 from kinfmu.log.rerun_file import _check_whole
 from kinfmu.run import Run
-from tests.log.runs import KINDS, fourbar, with_gap
+from tests.log.runs import KINDS, fourbar, with_gap, without_samples
 
 SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
 
@@ -118,6 +118,11 @@ def test_a_recording_without_its_end_is_told(run: Run, tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(LogError, match=r"run\.rrd: the recording could not be written to its end; is the disk full\?"):
         _check_whole(path, path)
+
+
+def test_a_run_without_samples_is_a_recording_too(run: Run, tmp_path: Path) -> None:
+    write_rrd(without_samples(run), tmp_path / "run.rrd")
+    assert verified(tmp_path / "run.rrd")
 
 
 def test_differences_are_those_of_b_from_a(run: Run, tmp_path: Path) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kinfmu.errors import LogError
-from kinfmu.log import headless, review, write_mcap
+from kinfmu.log import headless, palette, review, reviewing, write_mcap
 from kinfmu.run import Run
 from tests.log.runs import fourbar
 
@@ -39,6 +41,7 @@ def test_without_a_display_it_says_what_else_can_be_done(mcap: Path, monkeypatch
     assert [path.name for path in mcap.parent.iterdir()] == ["run.mcap"]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the display has no name to get wrong")
 def test_a_viewer_that_cannot_open_a_window_is_reported(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -46,6 +49,26 @@ def test_a_viewer_that_cannot_open_a_window_is_reported(mcap: Path, monkeypatch:
     with pytest.raises(LogError, match=r"run\.rrd: the viewer could not be opened: ") as caught:
         review(mcap)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in for the viewer is a shell script")
+def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
+    mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer = tmp_path / "viewer"
+    viewer.write_text('#!/bin/sh\necho "$@" >&2\nexec cat "$FIFO"\n')  # waits until somebody writes to the pipe
+    viewer.chmod(0o700)
+    os.mkfifo(tmp_path / "pipe")
+    monkeypatch.setenv("FIFO", str(tmp_path / "pipe"))
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(reviewing, "executable", lambda: str(viewer))
+    monkeypatch.setattr(reviewing, "FAILS_WITHIN", 0.2)
+    assert review(mcap) == mcap.with_suffix(".rrd")
+    process = reviewing._VIEWERS.pop()
+    assert process.poll() is None
+    assert process.args == [str(viewer), "--bind", "127.0.0.1", str(mcap.with_suffix(".rrd"))]
+    process.kill()
+    process.wait()
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
@@ -58,6 +81,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
         review(tmp_path / "run.rrd", mcap)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
 def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
     monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
@@ -68,24 +92,20 @@ def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypa
 
 
 @pytest.mark.usefixtures("graphics")
-def test_a_picture_shows_the_linkage_in_its_colours(mcap: Path, tmp_path: Path) -> None:
+def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
+    mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     image = pytest.importorskip("PIL.Image")
-    assert review(mcap, screenshot=tmp_path / "shot.png") is None
-    with image.open(tmp_path / "shot.png") as picture:
-        width, height = picture.size
-        pixels = np.asarray(picture.convert("RGB"), dtype=int).reshape(-1, 3)
-    assert (width, height) == (1600, 900)
-    for crank, coupler, rocker in [((230, 159, 0), (86, 180, 233), (0, 178, 130))]:
-        for colour in (crank, coupler, rocker):
-            assert (np.abs(pixels - colour).max(axis=1) <= 2).sum() > 500
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "shot.png"]
-
-
-@pytest.mark.usefixtures("graphics")
-def test_the_viewer_is_gone_after_a_picture(mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ended = []
     end = headless._end
     monkeypatch.setattr(headless, "_end", lambda process: (end(process), ended.append(process.poll())))
-    review(mcap, screenshot=tmp_path / "shot.png", at=0.0)
+    assert review(mcap, screenshot=tmp_path / "shot.png") is None
     assert len(ended) == 1
     assert ended[0] is not None
+    with image.open(tmp_path / "shot.png") as picture:
+        size = picture.size
+        pixels = np.asarray(picture.convert("RGB"), dtype=int).reshape(-1, 3)
+    assert size == (1600, 900)
+    for colour in palette.BODIES[:3]:
+        assert (np.abs(pixels - colour).max(axis=1) <= 2).sum() > 500
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "shot.png"]

@@ -1,0 +1,45 @@
+"""When the disk is full: one clear line, the old file stays, nothing is left behind."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import resource, signal, sys
+import numpy as np
+from kinfmu.errors import LogError
+from kinfmu.log import write_mcap, write_rrd, write_table
+from tests.log.runs import fourbar
+
+run, path = fourbar(np.arange(0.0, 180.0, 0.02)), sys.argv[1]
+write = {"mcap": write_mcap, "rrd": write_rrd}.get(path.rpartition(".")[2], write_table)
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+try:
+    write(run, path)
+except LogError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
+@pytest.mark.parametrize("suffix", ["mcap", "rrd", "csv", "parquet", "npz"])
+def test_a_file_that_finds_no_room_is_one_clear_line(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run.{suffix}"
+    path.write_bytes(b"old")
+    told = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[2],
+    )
+    assert len(told.stdout.splitlines()) == 1
+    assert told.stdout.startswith(f"{path}: ")
+    assert "written" in told.stdout
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
