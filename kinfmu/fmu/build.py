@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from kinfmu.errors import FmuError, listed, suggestion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.mechanism import Mechanism
 
-if TYPE_CHECKING:
-    from kinfmu.plan import SolvePlan
-
 FLAVOURS = ("python",)
 
 
 def build(
-    mechanism: Mechanism | SolvePlan, path: str | Path | None = None, *, flavour: str = "python", drive: Drive = "time"
+    mechanism: Mechanism,
+    path: str | Path | None = None,
+    *,
+    flavour: str = "python",
+    drive: Drive = "time",
+    outputs: Sequence[str] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
     path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. drive: what drives at first,
-    'time' (the law in the file) or 'inputs'. The same mechanism gives the same bytes. A plan that is at hand already
-    may be given in place of the mechanism.
+    'time' (the law in the file) or 'inputs'. outputs: coordinates such as 'coupler.x' that the FMU shall have, all if
+    nothing is said; what no output needs is not solved. The same mechanism gives the same bytes.
     """
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}")
@@ -33,9 +35,8 @@ def build(
     from kinfmu.fmu.python_flavour import archive
     from kinfmu.plan import compile_plan
 
-    plan = compile_plan(mechanism) if isinstance(mechanism, Mechanism) else mechanism
-    path = _file(path, plan.mechanism.name)
-    data = archive(plan, drive, VERSION)
+    path = _file(path, mechanism.name)
+    data = archive(compile_plan(mechanism, outputs), drive, VERSION)
     unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

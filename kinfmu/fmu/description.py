@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import cast
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
 from kinfmu.errors import FmuError
@@ -71,8 +71,8 @@ def write(description: Description, capabilities: Mapping[str, bool]) -> bytes:
     for variable in interface:
         _variable(variables, variable, references)
     _structure(root, interface, references)
-    ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n"
+    ET.indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
 
 
 def _text(value: float | bool) -> str:
@@ -121,9 +121,7 @@ def _experiment(root: Element, experiment: RunSettings) -> None:
 
 def _annotation(root: Element, interface: Interface) -> None:
     tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
-    parts = SubElement(
-        tool, "Parts", coordinates=str(interface.coordinate_count), lengthUnit=interface.length_unit
-    )
+    parts = SubElement(tool, "Parts", coordinates=str(interface.coordinate_count), lengthUnit=interface.length_unit)
     for part in interface.parts:
         SubElement(parts, "Part", name=part.name, variables=str(len(part.variables)))
 
@@ -177,8 +175,8 @@ def _structure(root: Element, interface: Interface, references: Mapping[str, int
 def read(text: bytes, where: str) -> Description:
     """The description in modelDescription.xml of one of our FMUs; `where` names the file in messages."""
     try:
-        root = ElementTree.fromstring(text)  # noqa: S314  # the stdlib parser loads no external entities
-    except ElementTree.ParseError as error:
+        root = ET.fromstring(text)  # noqa: S314  # the stdlib parser loads no external entities
+    except ET.ParseError as error:
         raise FmuError(f"{where}: modelDescription.xml is not XML ({error})") from None
     version = root.get("fmiVersion", "unknown")
     if version != "2.0":

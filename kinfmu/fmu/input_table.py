@@ -58,7 +58,8 @@ def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> Input
 def _from_csv(path: Path, known: Sequence[str]) -> InputTable:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [(reader.line_num, row) for reader in [csv.reader(file)] for row in reader if any(map(str.strip, row))]
+            reader = csv.reader(file)
+            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except UnicodeDecodeError:
         raise FmuError(f"{path}: is not a text file") from None
     except OSError as error:

@@ -110,7 +110,8 @@ def interface(plan: SolvePlan, drive: Drive = "time") -> Interface:
         Part("values", tuple(_output(plan, name, 0, depends[name]) for name in plan.outputs)),
         Part("rates", tuple(_output(plan, name, 1, depends[name]) for name in plan.outputs)),
         Part("accelerations", tuple(_output(plan, name, 2, depends[name]) for name in plan.outputs)),
-        Part("diagnostics", tuple(_diagnostics(plan, every))),
+        Part("residual", (_residual(plan, every),)),
+        Part("margin", (_margin(plan, every),)),
         Part("errors", tuple(_errors(plan, every))),
         Part("watch", tuple(_watches(plan, every))),
         Part("driven", tuple(_driven(plan))),
@@ -217,7 +218,9 @@ def _input_names(plan: SolvePlan, drivers: tuple[int, ...], order: int) -> tuple
     return tuple(name for k in drivers for name in plan.drivers[k].inputs[: order + 1])
 
 
-def _initial_names(plan: SolvePlan, drivers: tuple[int, ...], order: int, *, tolerance: bool = False) -> tuple[str, ...]:
+def _initial_names(
+    plan: SolvePlan, drivers: tuple[int, ...], order: int, *, tolerance: bool = False
+) -> tuple[str, ...]:
     """The same at initialization, where parameters are known quantities too: the law's constants may drive."""
     if not drivers:
         return ()
@@ -253,16 +256,19 @@ def _solver_output(
     )
 
 
-def _diagnostics(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
-    yield _solver_output(plan, every, "solver.residual", "Largest residual relative to the mechanism's size", minimum=0)
-    yield _solver_output(
-        plan, every, "solver.margin", "1 / condition, smallest over the blocks: 0 at a singular point", minimum=0
-    )
+def _residual(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
+    text = "Largest residual relative to the mechanism's size"
+    return _solver_output(plan, every, "solver.residual", text, minimum=0.0)
+
+
+def _margin(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
+    text = "1 / condition, smallest over the blocks: 0 at a singular point"
+    return _solver_output(plan, every, "solver.margin", text, minimum=0.0)
 
 
 def _errors(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
     for order, suffix in enumerate(("q", "qd", "qdd")):
-        yield _solver_output(plan, every, f"solver.error_{suffix}", f"Estimated error of {suffix}", order, minimum=0)
+        yield _solver_output(plan, every, f"solver.error_{suffix}", f"Estimated error of {suffix}", order, minimum=0.0)
 
 
 def _watches(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
-_REALS = ("values", "rates", "accelerations", "driven", "diagnostics", "errors", "watch")
+_REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of fmi2OK, Warning, Discard, Error, Fatal, Pending
 _DISCARD = 2
 
@@ -148,7 +148,7 @@ def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) ->
             modelIdentifier=about.model_identifier,
             unzipDirectory=str(folder),
         )
-        slave.instantiate(callbacks=_callbacks(logged), loggingOn=True)
+        _instantiate(slave, folder, _callbacks(logged))
     except Exception as error:  # fmpy raises bare exceptions
         sys.path[:] = path_before
         raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
@@ -157,6 +157,25 @@ def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) ->
     finally:
         slave.freeInstance()
         sys.path[:] = path_before  # pythonfmu puts the FMU's resources there for good
+
+
+def _instantiate(slave: Any, folder: Path, callbacks: Any) -> None:
+    """What fmpy's `instantiate` does, with the resources' address unquoted.
+
+    pythonfmu's binary turns back no quoted sign but a blank, and takes the process down when it finds no folder there.
+    """
+    from ctypes import byref
+
+    from fmpy.fmi2 import fmi2CoSimulation
+
+    path = (folder / "resources").absolute().as_posix()
+    address = f"file://{path}" if path.startswith("/") else f"file:///{path}"
+    slave.callbacks = callbacks  # the binary keeps a pointer to it
+    slave.component = slave.fmi2Instantiate(
+        slave.instanceName.encode(), fmi2CoSimulation, slave.guid.encode(), address.encode(), byref(callbacks), 0, 1
+    )
+    if slave.component is None:
+        raise FmuError("the slave did not start")
 
 
 def _callbacks(log: Callable[[int, str], None]) -> Any:
@@ -283,8 +302,8 @@ class _Samples:
             inputs=part["driven"],
             status=status,
             iterations=self._counts[:n, 1],
-            residual=part["diagnostics"][:, 0],
-            margin=part["diagnostics"][:, 1],
+            residual=part["residual"][:, 0],
+            margin=part["margin"][:, 0],
             error=part["errors"],
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],

@@ -1,8 +1,9 @@
 """The slave of a python FMU. It travels inside the FMU, beside `solve/`: standard library and pythonfmu's base class.
 
 An exception that leaves a slave is Fatal in pythonfmu and by FMI's rules ends every instance of the host. So nothing
-here raises: what cannot be done is logged and the next doStep is Discard. pythonfmu's binary answers fmi2GetBooleanStatus
-with Error whatever is asked, so fmi2Terminated cannot be reported; last successful time is kept by the binary itself.
+here raises: what cannot be done is logged and the next doStep is Discard. The rest is pythonfmu's binary: it keeps the
+last successful time, answers fmi2Terminated with true from the first Discard on (a slave has no say in it; going on is
+possible all the same), shows messages only to hosts that instantiate with loggingOn, and does not compare the guid.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._initialized = False
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
         self._touched = False  # something was set since the last commit
-        self._wired = [False] * len(self._inputs)  # rates seen other than 0
+        self._wired: set[int] = set()  # value references of rates seen other than 0
         self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
         self._stray: str | None = None  # an input that was set although time drives
         self._stray_reported = False
@@ -99,6 +100,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _forget_rates(self) -> None:
         self._drive: tuple[Row, Row, Row] | None = None
+        self._sample: tuple[Pose, Row, Row] | None = None
         self._rates: Row | None = None
         self._accelerations: Row | None = None
         self._errors: Row | None = None
@@ -118,12 +120,13 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _by_inputs(
         self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Sequence[float]
     ) -> tuple[Row, Row, Row]:
-        speeds, accelerations, wired = inputs[1::3], inputs[2::3], self._wired
-        if not all(wired[k] for k in range(len(wired)) if k % 3):
-            ud, udd = estimated_rates(earlier, t, u)
-            speeds = [s if wired[3 * k + 1] else ud[k] for k, s in enumerate(speeds)]
-            accelerations = [a if wired[3 * k + 2] else udd[k] for k, a in enumerate(accelerations)]
-        return tuple(u), tuple(speeds), tuple(accelerations)
+        """u, ud, udd with estimates for the rates that are not wired."""
+        wired = self._wired
+        ud, udd = estimated_rates(earlier, t, u)
+        if wired:
+            ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
+            udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
+        return tuple(u), ud, udd
 
     def _committed_drive(self) -> tuple[Row, Row, Row]:
         """u, ud, udd at the last commit, where the last good values stem from; at rest in the anchor before it."""
@@ -144,12 +147,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _shown(self) -> tuple[Pose, Row, Row]:
         """The pose whose numbers are shown, with ud and udd: the one asked for, or the last good one."""
-        pose = self._asked()
-        if pose.good:
-            _, ud, udd = self._driven()
-            return pose, ud, udd
-        _, ud, udd = self._committed_drive()
-        return self._committed, ud, udd
+        if self._sample is None:
+            pose = self._asked()
+            if pose.good:
+                _, ud, udd = self._driven()
+            else:
+                pose = self._committed
+                _, ud, udd = self._committed_drive()
+            self._sample = pose, ud, udd
+        return self._sample
 
     # Parts of the list of variables, each computed when first read
 
@@ -173,9 +179,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             self._accelerations = self._solver.accelerations(*self._shown())
         return self._accelerations
 
-    def _read_diagnostics(self) -> Row:
-        _, residual, _, margin = self._solver.diagnostics(self._asked())
-        return residual, margin
+    def _read_residual(self) -> Row:
+        return (self._asked().residual,)
+
+    def _read_margin(self) -> Row:
+        return (self._solver.diagnostics(self._asked())[3],)  # a stage of its own: it costs more than a pose
 
     def _read_errors(self) -> Row:
         if self._errors is None:
@@ -244,7 +252,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 if name == "solver.status":
                     values.append(int(self._asked().status))
                 elif name == "solver.iterations":
-                    values.append(int(self._solver.diagnostics(self._asked())[2]))
+                    values.append(int(self._asked().iterations))
                 else:
                     self.log(f"value reference {vr} is not an Integer variable of this FMU", Fmi2Status.error)
                     values.append(0)
@@ -282,7 +290,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                     if vr % 3 == 0:
                         self._pose = self._values = None
                     elif value != 0.0:
-                        self._wired[vr] = True
+                        self._wired.add(vr)
                     if self._driven_by_time:
                         self._stray = self.layout.parts[0].variables[vr]
                 self._touched = True
@@ -305,20 +313,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return
         if kind == "constants":
             self._constants = (*self._constants[:place], float(value), *self._constants[place + 1 :])
-        elif 0.0 < value:
-            self._set_tolerance(float(value))
+        elif value > 0.0:
+            self._tolerance = float(value)
+            self._solver = Solver(self.model, tolerance=value)
         else:
             self._refuse(name, f"= {value!r} must be positive; {self._tolerance!r} stays")
             return
         self._refused.pop(name, None)
         self._touched = True
         self._forget()
-
-    def _set_tolerance(self, value: float) -> None:
-        bridges = self._solver.bridges_dump()
-        self._tolerance = value
-        self._solver = Solver(self.model, tolerance=value)
-        self._solver.bridges_restore(bridges)
 
     def set_boolean(self, vrs: Sequence[int], values: Sequence[bool]) -> None:
         for vr, value in zip(vrs, values, strict=True):
@@ -402,15 +405,17 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return True
 
     def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
-        """The pose at the communication point when time drives: the committed one, unless the host or a set moved it."""
+        """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
         if self._history and not self._touched and abs(current_time - self._history[-1].t) <= SAME_TIME * step_size:
             return self._committed
         u, _, _ = self.model.drive(current_time, self._constants)
         return self._solver.solve(self._committed, u)
 
     def _commit(self, pose: Pose, t: float) -> None:
-        earlier = tuple(sample for sample in self._history if sample.t < t)[-2:]
-        self._history = (*earlier, Sample(t, pose.u))
+        earlier = self._history
+        while earlier and earlier[-1].t >= t:  # the host went back
+            earlier = earlier[:-1]
+        self._history = (*earlier[-2:], Sample(t, pose.u))
         self._committed = pose
         self._committed_inputs = tuple(self._inputs)
         self._touched = False
@@ -431,13 +436,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "initialized": self._initialized,
             "time": self._time,
             "touched": self._touched,
-            "wired": list(self._wired),
+            "wired": sorted(self._wired),
             "refused": dict(self._refused),
             "stray": [self._stray, self._stray_reported],
             "committed": self._solver.dump(self._committed),
             "committed_inputs": list(self._committed_inputs),
             "history": [[sample.t, list(sample.u)] for sample in self._history],
-            "bridges": self._solver.bridges_dump(),
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
@@ -451,11 +455,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._initialized = state["initialized"]
         self._time = state["time"]
         self._touched = state["touched"]
-        self._wired = list(state["wired"])
+        self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
         self._stray, self._stray_reported = state["stray"]
         self._solver = Solver(self.model, tolerance=self._tolerance)
-        self._solver.bridges_restore(state["bridges"])
         self._committed = self._solver.restore(state["committed"])
         self._committed_inputs = tuple(state["committed_inputs"])
         self._history = tuple(Sample(t, tuple(u)) for t, u in state["history"])
