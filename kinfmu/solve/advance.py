@@ -49,13 +49,13 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
     With one driver, singular points on the way are bridged.
     """
-    direction, distance = _course(model, start.u, target)
     one = len(target) == 1
+    direction, distance = (model.REACH, 0.0) if one else _course(model, start.u, target)
     pose, step, iterations = start, LONGEST_STEP, 0
     before, limit = start, None
     while True:
         if one:
-            bridge = _in_the_way(pose, target[0])
+            bridge = _in_the_way(pose, target[0]) if pose.bridges else None
             if bridge is not None:
                 if bridge.covers(target[0]):
                     return _across(model, direction, bridge, pose, target)
@@ -91,11 +91,9 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
 
 
 def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:
-    """Direction and signed distance of a straight way: with one driver always the same direction."""
-    reach = [1.0 if kind == "angle" else model.SIZE for kind in model.DRIVER_KINDS]
-    if len(target) == 1:
-        return (reach[0],), (target[0] - start[0]) / reach[0]
-    length = max(abs(b - a) / r for a, b, r in zip(start, target, reach, strict=True))
+    """Direction and length of a straight way of several drivers, measured by the driver that has most to go."""
+    ways = [(b - a) / reach for a, b, reach in zip(start, target, model.REACH, strict=True)]
+    length = max(map(abs, ways))
     return tuple((b - a) / length for a, b in zip(start, target, strict=True)), length
 
 

@@ -28,14 +28,13 @@ class Solver:
         u, z = model.ANCHOR
         self.anchor = Pose(u, model.position(u, z))
         self._one = len(u) == 1
-        # direction of a unit of motion with one driver
-        self.unit: Vector = (1.0 if model.DRIVER_KINDS[:1] == ("angle",) else model.SIZE,)
+        self.unit: Vector = model.REACH  # direction of a unit of motion with one driver
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
         if u == start.u:
             return start
-        if not all(map(isfinite, u)):
+        if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
         pose = advance(self.model, start, u)
         if pose.status <= Status.BRIDGED:
@@ -47,8 +46,9 @@ class Solver:
         if not pose.residual <= self.tolerance:
             pose.status = Status.NOT_CONVERGED
             pose.message = f"{place(self.model, pose.u)}: residual {pose.residual:.2g} of the size is left"
-        for name, value in zip(self.model.WATCHES, self.model.watches(pose.values), strict=True):
+        for k, value in enumerate(self.model.watches(pose.values)):
             if not abs(value) <= self.tolerance:
+                name = self.model.WATCHES[k]
                 pose.status = Status.INCONSISTENT
                 gap = abs(value) * self.model.SIZE
                 pose.message = (

@@ -78,6 +78,7 @@ class _Emitter:
         if large:
             imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
         kinds = tuple(driver.quantity.kind for driver in plan.drivers)
+        reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
         return [
             f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
             "",
@@ -88,6 +89,7 @@ class _Emitter:
             f"LENGTH_UNIT = {plan.mechanism.length_unit!r}",
             f"DRIVERS = {tuple(driver.name for driver in plan.drivers)!r}",
             f"DRIVER_KINDS = {kinds!r}",
+            f"REACH = {reach!r}  # what counts as a step of one, by driver",
             f"OUTPUTS = {plan.outputs!r}",
             f"COORDINATE_COUNT = {plan.coordinate_count!r}",
             f"FIXED = {dict(plan.fixed)!r}",

@@ -1,0 +1,47 @@
+"""The method as the book writes it, dense and with numpy: readable, and the baseline that everything else is held to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.equations.system import FloatArray, System
+from kinfmu.errors import PoseError
+
+_ITERATIONS = 50
+
+
+class Solution(NamedTuple):
+    """All coordinates with their velocities and accelerations, each (n,), and the Newton iterations it took."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    iterations: int
+
+
+def solve_reference(
+    system: System, rows: Sequence[int], q: FloatArray, u: FloatArray, ud: FloatArray, udd: FloatArray
+) -> Solution:
+    """One sample: Newton from q, then the two linear solves, over all coordinates. Haug (1989), chapter 3.
+
+        Phi_q dq = -Phi,   Phi_q qd = nu,   Phi_q qdd = gamma
+
+    rows: as many independent rows as coordinates, by index into System.rows. Raises PoseError if Newton does not end.
+    """
+    chosen = list(rows)
+    q = np.array(q, dtype=float)
+    for iteration in range(_ITERATIONS):
+        residual = system.residual(q, u)[chosen]
+        jacobian = system.jacobian(q)[chosen]
+        if np.abs(residual).max() <= 1e-14 * system.size:
+            break
+        dq = np.linalg.solve(jacobian, -residual)
+        q += dq
+    else:
+        raise PoseError(f"Newton did not end: residual {np.abs(residual).max():.2g} after {_ITERATIONS} iterations")
+    qd = np.linalg.solve(jacobian, system.nu(q, ud)[chosen])
+    qdd = np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen])
+    return Solution(q, qd, qdd, iteration)
