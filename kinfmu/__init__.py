@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import RunSettings as RunSettings
     from kinfmu.mechanism import Start as Start
     from kinfmu.run import Run as Run
-    from kinfmu.solve.status import Status as Status
+    from kinfmu.solver.status import Status as Status
     from kinfmu.sweep import solve as solve
 
 VERSION = "0.1.0"
@@ -54,7 +54,7 @@ _HOME = {
     "Run": "kinfmu.run",
     "RunSettings": "kinfmu.mechanism",
     "Start": "kinfmu.mechanism",
-    "Status": "kinfmu.solve.status",
+    "Status": "kinfmu.solver.status",
     "build": "kinfmu.fmu",
     "check": "kinfmu.analysis",
     "load": "kinfmu.gallery",

@@ -329,7 +329,7 @@ def steps(start: float, stop: float, step: float) -> Any:
 
 def verdict(run: Run) -> str:
     """'181 samples: 175 ok, 6 bridged; largest residual 1.1e-16'."""
-    from kinfmu.solve.status import Status
+    from kinfmu.solver.status import Status
 
     counts = [(status, int((run.status == status).sum())) for status in Status]
     said = listed(f"{count} {status.name.lower().replace('_', ' ')}" for status, count in counts if count)

@@ -12,7 +12,7 @@ from kinfmu.fmu import build, simulate
 from kinfmu.gallery import load
 from kinfmu.log import write_mcap, write_rrd
 from kinfmu.run import FloatArray, Run
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 
 # The report's printed table (Alzaga 1999): t [s], then phi1, x2, y2, phi2, phi3 to four digits.
 PRINTED = (

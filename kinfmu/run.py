@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import KinfmuError, suggestion
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 from kinfmu.units import unit_of
 
 FloatArray = NDArray[np.float64]

@@ -14,8 +14,8 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import Event, FloatArray, Run
-from kinfmu.solve import Solver
-from kinfmu.solve.pose import Vector
+from kinfmu.solver import Solver
+from kinfmu.solver.pose import Vector
 
 _GAP = float("nan")
 

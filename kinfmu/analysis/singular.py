@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from kinfmu.backends.python import load_model
 from kinfmu.plan import SolvePlan
-from kinfmu.solve import Pose, Solver
-from kinfmu.solve.advance import Limit, advance_or_limit
-from kinfmu.solve.bridge import Bridge
+from kinfmu.solver import Pose, Solver
+from kinfmu.solver.advance import Limit, advance_or_limit
+from kinfmu.solver.bridge import Bridge
 
 _STEP = 0.1  # [rad, sizes] between looks at the determinants
 

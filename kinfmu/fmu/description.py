@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 from kinfmu.errors import FmuError
 from kinfmu.fmu.interface import Interface, Part, Variable
 from kinfmu.mechanism import RunSettings
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 from kinfmu.units import METRES, display_units
 
 TOOL = "kinfmu"  # name of the vendor annotation that tells our FMUs from others

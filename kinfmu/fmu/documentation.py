@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from kinfmu.errors import FmuError
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 from kinfmu.units import Quantity, display_units, unit_of
 
 if TYPE_CHECKING:

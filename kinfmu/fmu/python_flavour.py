@@ -82,7 +82,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
     """Every file, by its path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
-    solver, room = files("kinfmu.solve"), files("kinfmu.fmu")
+    solver, room = files("kinfmu.solver"), files("kinfmu.fmu")
     base = files(pythonfmu)
     contents = {
         "modelDescription.xml": _description(variables, version, token=""),
@@ -95,7 +95,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
         "kinfmu_slave.py": _entry(variables, token="").encode(),
     }
     contents |= {f"kinfmu/fmu/{name}": room.joinpath(name).read_bytes() for name in RUN_TIME}
-    contents |= {f"kinfmu/solve/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
+    contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
     contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
     contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
     licence = distribution("pythonfmu").read_text("licenses/LICENSE")

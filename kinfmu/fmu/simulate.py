@@ -22,7 +22,7 @@ from kinfmu.fmu.description import Description
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
 from kinfmu.run import Event, Run
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

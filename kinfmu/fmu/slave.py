@@ -1,4 +1,4 @@
-"""The slave of a python FMU. It travels inside the FMU, beside `solve/`: standard library and pythonfmu's base class.
+"""The slave of a python FMU. It travels inside the FMU, beside `solver/`: standard library and pythonfmu's base class.
 
 An exception that leaves a slave is Fatal in pythonfmu and by FMI's rules ends every instance of the host. So nothing
 here raises: what cannot be done is logged and the next doStep is Discard. The rest is pythonfmu's binary: it keeps the
@@ -19,7 +19,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import Sample, estimated_rates
-from kinfmu.solve import Pose, Solver
+from kinfmu.solver import Pose, Solver
 
 Row = tuple[float, ...]
 

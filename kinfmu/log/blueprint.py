@@ -22,7 +22,11 @@ LEGEND_ROOM = 0.28  # of the run's time, left free behind the curves for the leg
 
 
 def single(
-    run: Run, scene: Scene | None, curves: Mapping[tuple[str, str], Group], accuracy: Sequence[Group]
+    run: Run,
+    scene: Scene | None,
+    curves: Mapping[tuple[str, str], Group],
+    accuracy: Sequence[Group],
+    iterations: Group,
 ) -> rrb.Blueprint:
     """One run: what moves on the left, what it measures on the right, one row an order, one column a unit."""
     import rerun.blueprint as rrb
@@ -31,44 +35,60 @@ def single(
     for order in ORDERS:
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
-            rows.append(rrb.Horizontal(*[plot(one.title, [f"/{one.path}"], len(one.names), [run]) for one in found]))
-    paths = [f"/{group.path}" for group in accuracy]
-    solver = plot(accuracy[0].title, paths, sum(len(group.names) for group in accuracy), [run])
-    rows.append(rrb.Horizontal(solver, plot("Newton iterations", ["/solver/iterations"], 1, [run])))
+            rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in found]))
+    rows.append(
+        rrb.Horizontal(
+            plot(accuracy[0].title, [("", group) for group in accuracy], [run]),
+            plot(iterations.title, [("", iterations)], [run]),
+        )
+    )
     rows.append(status_view([""], [run]))
     text: list[rrb.View] = [card_view()]
     if happenings(run):
         text.append(log_view([""]))
     left = rrb.Vertical(
-        linkage_view(["/linkage/**"], [scene] if scene else []), rrb.Horizontal(*text), row_shares=[1.7, 1]
+        linkage_view(["/linkage/**"], [scene] if scene else []),
+        rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
+        row_shares=[1.7, 1],
     )
     right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.0])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
 
 
 def compared(
-    runs: tuple[Run, Run], scenes: Sequence[Scene], curves: Mapping[tuple[str, str], Group], same: bool
+    runs: tuple[Run, Run],
+    scenes: Sequence[Scene],
+    curves: Sequence[Mapping[tuple[str, str], Group]],
+    difference: Mapping[tuple[str, str], Group],
 ) -> rrb.Blueprint:
-    """Two runs: overlaid on top, below the differences, `same` being whether there are any coordinates in common."""
+    """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
     import rerun.blueprint as rrb
 
-    def row(roots: Sequence[str], order: str, words: str) -> rrb.Horizontal:
-        plots = []
-        for kind in KINDS:
-            if group := curves.get((order, kind)):
-                paths = [f"{root}/{group.path}" for root in roots]
-                plots.append(plot(words.format(group.title), paths, len(roots) * len(group.names), runs))
-        return rrb.Horizontal(*plots)
-
-    rows: list[rrb.Container | rrb.View] = [row(["/a", "/b"], "position", "{} of A (wide) and B")]
-    if same:
-        rows += [row(["/difference"], order, "B - A: {}") for order in ORDERS]
+    rows: list[rrb.Container | rrb.View] = []
+    overlaid = []
+    for kind in KINDS:
+        pair = [
+            (root, of["position", kind])
+            for root, of in zip(("/a", "/b"), curves, strict=True)
+            if ("position", kind) in of
+        ]
+        if pair:
+            overlaid.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, runs))
+    rows.append(rrb.Horizontal(*overlaid))
+    for order in ORDERS:
+        found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
+        if found:
+            rows.append(
+                rrb.Horizontal(*[plot(f"B - A: {group.title}", [("/difference", group)], runs) for group in found])
+            )
     rows.append(status_view(["/a", "/b"], runs))
     text: list[rrb.View] = [card_view()]
     if any(happenings(run) for run in runs):
         text.append(log_view(["/a", "/b"]))
     left = rrb.Vertical(
-        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes), rrb.Horizontal(*text), row_shares=[1.4, 1]
+        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes),
+        rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
+        row_shares=[1.4, 1],
     )
     right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
@@ -109,16 +129,21 @@ def time_axis(runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
     return rrb.TimeAxis(view_range=shown)
 
 
-def plot(title: str, paths: Sequence[str], curves: int, runs: Sequence[Run]) -> rrb.TimeSeriesView:
-    """The curves under `paths` over the whole runs, with their names beside them."""
+def plot(title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run]) -> rrb.TimeSeriesView:
+    """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group)."""
     import rerun.blueprint as rrb
 
+    ranges = [group.shown for _, group in groups if group.shown]
+    axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
-        contents=list(paths),
+        contents=[f"{root}/{group.path}" for root, group in groups],
         axis_x=time_axis(runs, LEGEND_ROOM),
-        plot_legend=rrb.PlotLegend(corner="RightTop", visible=curves <= MOST_CURVES),
+        axis_y=axis_y,
+        plot_legend=rrb.PlotLegend(
+            corner="RightTop", visible=sum(len(group.names) for _, group in groups) <= MOST_CURVES
+        ),
     )
 
 

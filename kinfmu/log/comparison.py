@@ -50,18 +50,18 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
         nanoseconds(run.t)
     scenes, notes = zip(*(drawable(run) for run in (a, b)), strict=True)
     difference = _difference(a, b)
-    curves = groups(a) or groups(b)
-    layout = compared((a, b), [scene for scene in scenes if scene], curves, same=difference is not None)
+    apart = groups(difference) if difference else {}
+    curves = [groups(run) for run in (a, b)]
+    layout = compared((a, b), [scene for scene in scenes if scene], curves, apart)
     with recording(path, f"{names[0]} and {names[1]}", layout, APPLICATION) as rec:
-        for run, scene, look in zip((a, b), scenes, _LOOKS, strict=True):
+        for run, scene, own, look in zip((a, b), scenes, curves, _LOOKS, strict=True):
             if scene:
                 log_linkage(rec, f"{look.root}/linkage", run, scene, look.colour, look.bars, look.layer)
-            for group in groups(run).values():
+            for group in own.values():
                 log_group(rec, look.root, run, _named(group, look), look.curves)
             log_status(rec, look.root, run)
-        if difference:
-            for group in groups(difference).values():
-                log_group(rec, "/difference", difference, group)
+        for group in apart.values():
+            log_group(rec, "/difference", a, group)
         log_card(rec, _card(a, b, difference, names, [note for note in notes if note]))
 
 

@@ -25,7 +25,7 @@ STATUS: tuple[Colour, ...] = (
     (200, 60, 50),
     (170, 50, 120),
     (120, 40, 40),
-)  # by kinfmu.solve.Status
+)  # by kinfmu.solver.Status
 
 
 def body(index: int) -> Colour:

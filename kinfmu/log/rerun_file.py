@@ -30,11 +30,11 @@ from kinfmu.log.card import card
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.linkage import log_linkage
 from kinfmu.log.scene import drawable
-from kinfmu.log.series import Group, accuracy, error_estimates, groups
+from kinfmu.log.series import Group, accuracy, error_estimates, groups, iterations
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.run import Run
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -47,17 +47,15 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it."""
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     scene, note = drawable(run)
-    curves, solver, errors = groups(run), accuracy(run), error_estimates(run)
+    curves, turns = groups(run), iterations(run)
+    solver = [group for group in (accuracy(run), error_estimates(run)) if group]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(run, scene, curves, [solver, errors] if errors else [solver])) as rec:
+    with recording(path, name, single(run, scene, curves, solver, turns)) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
             log_linkage(rec, "/linkage", run, scene)
-        for group in (*curves.values(), solver):
+        for group in (*curves.values(), *solver, turns):
             log_group(rec, "", run, group)
-        if errors:
-            log_group(rec, "", run, errors, as_points=True)
-        _log_iterations(rec, run)
         log_status(rec, "", run)
         log_card(rec, card(run, note))
 
@@ -83,19 +81,22 @@ def recording(
         _check_whole(temporary, path)
 
 
-def log_group(
-    rec: rr.RecordingStream, root: str, run: Run, group: Group, width: float = 1.5, as_points: bool = False
-) -> None:
-    """The curves of a group, a gap where they are NaN; as points if asked for or if a line would not show."""
+def log_group(rec: rr.RecordingStream, root: str, run: Run, group: Group, width: float = 1.5) -> None:
+    """The curves of a group, a gap where they are NaN; as points where lines would not show, between gaps."""
     import rerun as rr
 
     path = f"{root}/{group.path}"
     names, colours = list(group.names), list(group.colours)
     look: rr.SeriesPoints | rr.SeriesLines
-    if as_points or len(run) == 1:
-        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[3.0] * len(names))
+    if group.is_scattered:
+        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[2.5] * len(names))
     else:
-        look = rr.SeriesLines(names=names, colors=colours, widths=[width] * len(names))
+        look = rr.SeriesLines(
+            names=names,
+            colors=colours,
+            widths=[width] * len(names),
+            interpolation_mode="StepAfter" if group.is_stepped else "Linear",
+        )
     rec.log(path, look, static=True)
     send(rec, path, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(group.values[rows])))
 
@@ -128,16 +129,6 @@ def log_status(rec: rr.RecordingStream, root: str, run: Run) -> None:
             level=[_LEVELS.get(event.level, "INFO") for event in events[rows]],
         ),
     )
-
-
-def _log_iterations(rec: rr.RecordingStream, run: Run) -> None:
-    import rerun as rr
-
-    look = rr.SeriesLines(names="iterations", colors=[palette.body(1)], widths=1.5, interpolation_mode="StepAfter")
-    one = rr.SeriesPoints(names="iterations", colors=[palette.body(1)], marker_sizes=3.0)
-    rec.log("/solver/iterations", one if len(run) == 1 else look, static=True)
-    counts = run.iterations.astype(float)
-    send(rec, "/solver/iterations", run.t, lambda rows: rr.Scalars.columns(scalars=counts[rows]))
 
 
 def _properties(run: Run) -> rr.AnyValues:

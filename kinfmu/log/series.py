@@ -15,38 +15,76 @@ from kinfmu.units import Quantity, unit_of
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
 SMALLEST = 1e-17  # drawn in the place of 0 on a logarithmic axis, below all round-off
+ROUND_OFF = 1e-9  # part of what a motion of this size and duration has, below which curves are noise around 0
+OUTLIERS = 1.0  # [percent] on either side, that may leave the plot if they would flatten all the rest
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Curves of one unit that belong into one plot: values (n, k), NaN in a gap."""
+    """Curves of one unit that belong into one plot: values (n, k), NaN in a gap; shown: range of the axis, or None."""
 
     path: str
     title: str
     names: tuple[str, ...]
     colours: tuple[palette.Colour, ...]
     values: FloatArray
+    shown: tuple[float, float] | None = None
+    is_stepped: bool = False
+
+    @property
+    def is_scattered(self) -> bool:
+        """True where a value has none beside it, so that a line would not show it."""
+        known = np.pad(np.isfinite(self.values).any(axis=1), 1)
+        return bool(np.any(known[1:-1] & ~known[:-2] & ~known[2:]))
 
 
 def groups(run: Run) -> dict[tuple[str, str], Group]:
     """Coordinates and points of interest by (order, kind), such as ('velocity', 'angle'); kinds that occur."""
     colours = _colours(run)
+    duration = float(np.ptp(run.t)) if len(run) else 0.0
     found = {}
-    for order, (word, table) in enumerate(zip(ORDERS, (run.values, run.rates, run.accelerations), strict=True)):
-        for kind in KINDS:
-            columns = [k for k, name in enumerate(run.outputs) if quantity_of(name).kind == kind]
-            if columns:
-                unit = unit_of(Quantity(kind, order), run.length_unit)
-                found[word, kind] = Group(
-                    path=f"{word}/{kind}",
-                    title=f"{'angular ' if kind == 'angle' else ''}{word} [{unit}]".replace(
-                        "angular position", "angle"
-                    ),
-                    names=tuple(derivative_name(run.outputs[k], order) for k in columns),
-                    colours=tuple(colours[run.outputs[k]] for k in columns),
-                    values=np.where(run.good[:, None], table[:, columns], np.nan),
-                )
+    for kind in KINDS:
+        columns = [k for k, name in enumerate(run.outputs) if quantity_of(name).kind == kind]
+        if not columns:
+            continue
+        size = 0.0
+        for order, table in enumerate((run.values, run.rates, run.accelerations)):
+            values = np.where(run.good[:, None], table[:, columns], np.nan)
+            if order == 0:
+                size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+            found[ORDERS[order], kind] = Group(
+                path=f"{ORDERS[order]}/{kind}",
+                title=_title(kind, order, run.length_unit),
+                names=tuple(derivative_name(run.outputs[k], order) for k in columns),
+                colours=tuple(colours[run.outputs[k]] for k in columns),
+                values=values,
+                shown=_shown(values, size / (duration or 1.0) ** order),
+            )
     return found
+
+
+def _title(kind: str, order: int, length_unit: str) -> str:
+    """Such as 'angular velocity [rad/s]'."""
+    words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[kind]
+    return f"{words[order]} [{unit_of(Quantity(kind, order), length_unit)}]"
+
+
+def _shown(values: FloatArray, usual: float) -> tuple[float, float] | None:
+    """Range of the axis where the viewer's own choice, from least to greatest, would mislead.
+
+    Curves that are round-off against what is `usual` are a line at 0, not a storm; a few samples beside a singular
+    point, where speeds grow without bound, do not flatten all others. The data hold everything.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return None
+    if np.abs(known).max() < ROUND_OFF * usual:
+        return -usual, usual
+    low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
+    width = high - low
+    if width > 0.0 and (known.min() < low - width or known.max() > high + width):
+        return float(low - width / 2), float(high + width / 2)
+    return None
 
 
 def accuracy(run: Run) -> Group:
@@ -61,6 +99,18 @@ def error_estimates(run: Run) -> Group | None:
     """log10 of the estimated errors of q, qd, qdd, which samples near singular points have; None if there are none."""
     curves = {f"error of {name}": run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
     return _logarithmic("error", curves, 2, np.nan) if np.any(run.error > 0.0) else None
+
+
+def iterations(run: Run) -> Group:
+    """Newton's iterations, a step from sample to sample."""
+    return Group(
+        path="solver/iterations",
+        title="Newton iterations",
+        names=("iterations",),
+        colours=(palette.body(1),),
+        values=run.iterations.astype(float)[:, None],
+        is_stepped=True,
+    )
 
 
 def _logarithmic(path: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.run import Event, Run
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 
 _LEVELS = {Status.OK: "info", Status.BRIDGED: "info", Status.NEAR_SINGULAR: "warning"}  # the others: "error"
 MEANINGS = {

@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.log.card import card
 from kinfmu.log.verdict import happenings, sentence
 from kinfmu.run import Event, Run
-from kinfmu.solve.status import Status
+from kinfmu.solver.status import Status
 from tests.log.runs import fourbar
 
 

@@ -12,9 +12,9 @@ from kinfmu.plan import SolvePlan
 def load_model(plan: SolvePlan) -> ModuleType:
     """The generated module of a plan, ready for a Solver; its source shows in tracebacks."""
     source = emit(plan)
-    name = f"kinfmu.solve.model_{plan.mechanism.name}"  # beside `linear`, as in an FMU
+    name = f"kinfmu.solver.model_{plan.mechanism.name}"  # beside `linear`, as in an FMU
     model = ModuleType(name)
-    model.__package__ = "kinfmu.solve"
+    model.__package__ = "kinfmu.solver"
     model.__file__ = f"<{name}>"
     linecache.cache[model.__file__] = (len(source), None, source.splitlines(keepends=True), model.__file__)
     exec(compile(source, model.__file__, "exec"), model.__dict__)  # noqa: S102  our own generated source

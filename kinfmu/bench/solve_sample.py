@@ -1,0 +1,107 @@
+"""Time a sample: the dense reference beside the Python engine on the four-bar, with the error of both."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from kinfmu.backends.python import load_model
+from kinfmu.demo import closed_form
+from kinfmu.equations.reference import solve_reference
+from kinfmu.equations.system import FloatArray, System
+from kinfmu.gallery import load
+from kinfmu.plan import compile_plan
+from kinfmu.redundancy import find_redundancy
+from kinfmu.solver import Solver
+from kinfmu.sweep import solve
+
+ROUNDS = 9  # the two are timed in turn, so that a drift of the machine's speed meets both
+DEGREES = np.arange(5.0, 176.0)  # away from the singular points, where the dense reference has no answer
+
+
+def run() -> str:
+    """A table: microseconds a sample (median and spread over rounds) and largest error of q, qd, qdd."""
+    u = np.radians(DEGREES)
+    ways = {
+        "dense numpy Newton, 9 coordinates, warm start": _reference(u),
+        "python engine, q, qd, qdd": _engine(u),
+        "kinfmu.solve, with status and error estimates": _solve(u),
+    }
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    errors: dict[str, float] = {}
+    for _ in range(ROUNDS):
+        for name, way in ways.items():
+            start = time.perf_counter()
+            results = way()
+            times[name].append((time.perf_counter() - start) / len(u) * 1e6)
+            errors[name] = _error(results)
+    base = statistics.median(next(iter(times.values())))
+    lines = [f"four-bar, {len(u)} samples of 1 degree, {ROUNDS} rounds in turn; us a sample"]
+    lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
+    for name, measured in times.items():
+        median = statistics.median(measured)
+        lines.append(
+            f"{name:48}{median:9.2f}{min(measured):9.2f}{max(measured):9.2f}{base / median:14.1f}{errors[name]:15.1e}"
+        )
+    return "\n".join(lines)
+
+
+Results = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _reference(u: FloatArray) -> Callable[[], Results]:
+    system = System(load("fourbar"))
+    kept = [*find_redundancy(system).kept, system.joint_row_count]
+    five = [system.coordinates.index(name) for name in ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")]
+    q0 = np.array([0, 0, u[0], 1 + np.cos(u[0]), np.sin(u[0]), 0, 1, 0, u[0]])
+
+    def way() -> Results:
+        q, rows = q0, []
+        one, none = np.ones(1), np.zeros(1)
+        for value in u:
+            solution = solve_reference(system, kept, q, np.array([value]), one, none)
+            q = solution.q
+            rows.append((solution.q[five], solution.qd[five], solution.qdd[five]))
+        return _stacked(rows)
+
+    return way
+
+
+def _engine(u: FloatArray) -> Callable[[], Results]:
+    mechanism = load("fourbar")
+    solver = Solver(load_model(compile_plan(mechanism, ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"])))
+
+    def way() -> Results:
+        pose, rows = solver.anchor, []
+        for value in u.tolist():
+            pose = solver.solve(pose, (value,))
+            rows.append((solver.outputs(pose), solver.rates(pose, (1.0,)), solver.accelerations(pose, (1.0,), (0.0,))))
+        return _stacked(rows)
+
+    return way
+
+
+def _solve(u: FloatArray) -> Callable[[], Results]:
+    plan = compile_plan(load("fourbar"))
+
+    def way() -> Results:
+        result = solve(plan, crank_angle=u)
+        return result.q, result.qd, result.qdd
+
+    return way
+
+
+def _stacked(rows: list[tuple[object, object, object]]) -> Results:
+    q, qd, qdd = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    return q, qd, qdd
+
+
+def _error(results: Results) -> float:
+    """Largest difference from the closed form in q, qd and qdd at a crank speed of 1 rad/s."""
+    w = np.pi / 180.0
+    q, qd, qdd = closed_form(DEGREES)
+    exact = (q, qd / w, qdd / w**2)
+    return max(float(np.abs(ours - theirs).max()) for ours, theirs in zip(results, exact, strict=True))

@@ -1,0 +1,60 @@
+"""FMUs of the gallery's mechanisms, built once, and slaves of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from kinfmu.fmu import build
+from kinfmu.fmu.interface import Drive
+from kinfmu.mechanism import Mechanism, toml_file
+from tests.fmu.host import Host
+
+GALLERY = Path(__file__).parents[2] / "fmus"
+
+
+def mechanism(name: str) -> Mechanism:
+    return toml_file.read(GALLERY / name / "mechanism.toml")
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Drive], Path]:
+    """`built(name, drive)`: path of the FMU of a gallery mechanism."""
+    folder = tmp_path_factory.mktemp("fmus")
+    paths: dict[tuple[str, str], Path] = {}
+
+    def get(name: str, drive: Drive = "time") -> Path:
+        if (name, drive) not in paths:
+            paths[name, drive] = build(mechanism(name), folder / f"{name}_{drive}.fmu", drive=drive)
+        return paths[name, drive]
+
+    return get
+
+
+@pytest.fixture
+def fourbar(built: Callable[..., Path]) -> Path:
+    return built("fourbar", "time")
+
+
+@pytest.fixture
+def pendulum(built: Callable[..., Path]) -> Path:
+    return built("double_pendulum", "time")
+
+
+@pytest.fixture
+def start(built: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
+    """`start(name, drive)`: a slave, initialized at time 0 unless told otherwise; freed in the end."""
+    hosts: list[Host] = []
+
+    def get(name: str = "fourbar", drive: Drive = "inputs", *, initialize: bool = True) -> Host:
+        host = Host(built(name, drive), tmp_path / f"slave_{len(hosts)}")
+        hosts.append(host)
+        if initialize:
+            host.initialize(0.0)
+        return host
+
+    yield get
+    for host in hosts:
+        host.free()

@@ -1,0 +1,107 @@
+"""Building: reproducible, self-contained, and clear about what it cannot do."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from kinfmu.errors import FmuError
+from kinfmu.fmu import build
+from tests.fmu.conftest import GALLERY, mechanism
+
+ROOT = GALLERY.parent
+BUILD = """
+import sys
+from kinfmu.fmu import build
+from kinfmu.mechanism import toml_file
+build(toml_file.read(sys.argv[1]), sys.argv[2])
+"""
+STEP = """
+import sys
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+about = read_model_description(sys.argv[1])
+slave = FMU2Slave(guid=about.guid, modelIdentifier=about.coSimulation.modelIdentifier, unzipDirectory=extract(sys.argv[1]))
+slave.instantiate()
+slave.setupExperiment(startTime=0.0)
+slave.enterInitializationMode()
+slave.exitInitializationMode()
+before = set(sys.modules)
+slave.doStep(0.0, 60.0)
+references = {v.name: v.valueReference for v in about.modelVariables}
+x, vx = slave.getReal([references["coupler.x"], references["coupler.vx"]])
+foreign = [m for m in sys.modules if m.partition(".")[0] in ("kinfmu", "pythonfmu", "scipy")]
+assert not foreign, foreign
+assert set(sys.modules) == before, set(sys.modules) - before
+print(repr(x))
+"""
+
+
+@pytest.mark.parametrize("name", ["fourbar", "double_pendulum"])
+def test_two_builds_under_two_hash_seeds_are_the_same_bytes(name: str, tmp_path: Path) -> None:
+    built = []
+    for seed in ("1", "2"):
+        path = tmp_path / f"{seed}.fmu"
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, "-c", BUILD, str(GALLERY / name / "mechanism.toml"), str(path)]
+        subprocess.run(command, env=environment, check=True)
+        built.append(path.read_bytes())
+    assert built[0] == built[1]
+
+
+def test_fmu_runs_in_a_fresh_process_that_has_never_seen_kinfmu(fourbar: Path, tmp_path: Path) -> None:
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", STEP, str(fourbar)], env=environment, cwd=tmp_path, check=True, capture_output=True
+    )
+    assert float(done.stdout) == pytest.approx(1.5, abs=1e-12)
+
+
+def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_after_their_content(fourbar: Path) -> None:
+    with zipfile.ZipFile(fourbar) as zipped:
+        names = zipped.namelist()
+        entry = zipped.read("resources/slavemodule.txt").decode()
+    assert names[0] == "modelDescription.xml"
+    assert {"resources/mechanism.toml", "documentation/index.html", "binaries/linux64/fourbar.so"} <= set(names)
+    package = entry.removesuffix("_slave")
+    assert package.startswith("kinfmu_fourbar_")
+    modules = [name for name in names if name.endswith(".py")]
+    assert all(name.startswith((f"resources/{package}/", f"resources/{package}_slave.py")) for name in modules)
+
+
+def test_token_changes_with_the_content(built: object, fourbar: Path, tmp_path: Path) -> None:
+    from fmpy import read_model_description
+
+    other = build(mechanism("fourbar"), tmp_path / "other.fmu", drive="inputs")
+    assert read_model_description(str(fourbar)).guid != read_model_description(str(other)).guid
+
+
+def test_outputs_can_be_chosen(tmp_path: Path) -> None:
+    from kinfmu.fmu import simulate
+
+    run = simulate(build(mechanism("fourbar"), tmp_path, outputs=["coupler.x"]), stop=3.0)
+    assert run.outputs == ("coupler.x",)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"flavour": "natve"}, "flavour 'natve' is not known; flavours: python"),
+        ({"drive": "input"}, "drive = 'input' is not known; did you mean 'inputs'"),
+        ({"path": "fourbar.zip"}, r"fourbar\.zip: the file of an FMU ends in \.fmu"),
+    ],
+)
+def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, str], words: str) -> None:
+    with pytest.raises(FmuError, match=words):
+        build(mechanism("fourbar"), **arguments)  # type: ignore[arg-type]
+
+
+def test_folder_takes_the_name_of_the_mechanism_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = build(mechanism("fourbar"), tmp_path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.name == "fourbar.fmu"
