@@ -74,7 +74,7 @@ def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_a
     assert all(name.startswith((f"resources/{package}/", f"resources/{package}_slave.py")) for name in modules)
 
 
-def test_token_changes_with_the_content(built: object, fourbar: Path, tmp_path: Path) -> None:
+def test_token_changes_with_the_content(fourbar: Path, tmp_path: Path) -> None:
     from fmpy import read_model_description
 
     other = build(mechanism("fourbar"), tmp_path / "other.fmu", drive="inputs")
