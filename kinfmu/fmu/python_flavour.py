@@ -5,8 +5,8 @@
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, as they are
     resources/slavemodule.txt                     names the module that holds the slave class
     resources/<package>_slave.py                  the class, with its model and layout
-    resources/<package>/model.py                  the emitted model
-    resources/<package>/{solve,fmu,pythonfmu}/    run time; pythonfmu's own base class
+    resources/<package>/solver/                   the run time, with the emitted model beside it
+    resources/<package>/{fmu,pythonfmu}/          the slave; pythonfmu's own base class
     resources/mechanism.toml
 
 Hosts keep imported modules for the life of the process, and pythonfmu runs a slave's module twice. So every module
@@ -50,8 +50,8 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
-from {package} import model
 from {package}.fmu.slave import Layout, MechanismSlave, PartLayout, hold
+from {package}.solver import model
 
 hold(globals())
 
@@ -91,7 +91,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
         "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
         "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
         "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',
-        "kinfmu/model.py": emit(plan).encode(),
+        "kinfmu/solver/model.py": emit(plan).encode(),
         "kinfmu_slave.py": _entry(variables, token="").encode(),
     }
     contents |= {f"kinfmu/fmu/{name}": room.joinpath(name).read_bytes() for name in RUN_TIME}

@@ -1,0 +1,86 @@
+"""With only the angle wired, speed and acceleration are estimated: how fast the error falls with the step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinfmu.fmu.estimated_rates import Sample, estimated_rates
+from tests.fmu.host import Host
+
+
+def _errors(host: Host, h: float) -> tuple[float, float]:
+    """Largest error of coupler.vx and coupler.ax over 1 s of u = 1 + 0.3 sin 2 t, the first samples aside."""
+    speed = acceleration = 0.0
+    for k in range(round(1.0 / h) + 1):
+        t = k * h
+        u, ud, udd = 1 + 0.3 * math.sin(2 * t), 0.6 * math.cos(2 * t), -1.2 * math.sin(2 * t)
+        host.set({"crank_angle": u})
+        vx, ax = host.get("coupler.vx", "coupler.ax")
+        if k > 2:
+            speed = max(speed, abs(vx + math.sin(u) * ud))
+            acceleration = max(acceleration, abs(ax + math.sin(u) * udd + math.cos(u) * ud * ud))
+        assert host.step(t, h)
+    return speed, acceleration
+
+
+def test_error_of_speed_falls_as_h_squared_and_of_acceleration_as_h(start: Callable[..., Host]) -> None:
+    coarse = _errors(start(), 0.01)
+    fine = _errors(start(), 0.005)
+    assert 3.5 < coarse[0] / fine[0] < 4.5
+    assert 1.7 < coarse[1] / fine[1] < 2.3
+
+
+def test_rate_counts_as_wired_from_its_first_value_other_than_zero(start: Callable[..., Host]) -> None:
+    host = start()
+    for k in range(4):
+        host.set({"crank_angle": 1.0 + 0.1 * k, "crank_speed": 0.0})
+        host.step(0.1 * k, 0.1)
+    host.set({"crank_angle": 1.4, "crank_speed": 0.0})
+    assert host.get("crank.omega") == pytest.approx([1.0])
+    host.set({"crank_speed": 3.0})
+    assert host.get("crank.omega", "driven.crank_speed") == [3.0, 3.0]
+    host.set({"crank_speed": 0.0})
+    assert host.get("crank.omega") == [0.0]
+    host.slave.reset()
+    host.initialize(0.0)
+    host.set({"crank_angle": 1.0, "crank_speed": 0.0})
+    host.step(0.0, 0.1)
+    host.set({"crank_angle": 1.1})
+    assert host.get("crank.omega") == pytest.approx([1.0])
+
+
+def test_held_angle_comes_to_rest_and_reading_after_a_step_shows_the_committed_sample(
+    start: Callable[..., Host],
+) -> None:
+    host = start()
+    for k in range(4):
+        host.set({"crank_angle": 1.0 + 0.1 * k})
+        host.step(0.1 * k, 0.1)
+    assert host.get("crank.omega") == pytest.approx([1.0])
+    for k in range(4, 7):
+        host.step(0.1 * k, 0.1)
+    assert host.get("crank.omega", "crank.alpha") == [0.0, 0.0]
+
+
+times = st.floats(0.01, 2.0)
+coefficients = st.floats(-5.0, 5.0)
+
+
+@given(times, times, coefficients, coefficients, coefficients)
+def test_parabola_is_met_exactly_on_any_grid(h1: float, h2: float, a: float, b: float, c: float) -> None:
+    t = (0.0, h1, h1 + h2)
+    u = [a + b * x + c * x * x for x in t]
+    (speed,), (acceleration,) = estimated_rates([Sample(t[0], (u[0],)), Sample(t[1], (u[1],))], t[2], (u[2],))
+    assert speed == pytest.approx(b + 2 * c * t[2], abs=1e-9)
+    assert acceleration == pytest.approx(2 * c, abs=1e-7)
+
+
+def test_one_sample_gives_rest_two_give_a_slope_and_samples_of_the_future_do_not_count() -> None:
+    assert estimated_rates([], 1.0, (3.0,)) == ((0.0,), (0.0,))
+    assert estimated_rates([Sample(0.5, (2.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
+    assert estimated_rates([Sample(0.5, (2.0,)), Sample(1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))

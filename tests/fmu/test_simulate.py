@@ -1,0 +1,171 @@
+"""`simulate`: a Run from nothing but the FMU, and what happens where it cannot go on."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu.errors import FmuError
+from kinfmu.fmu import simulate
+from kinfmu.mechanism import toml_file
+from kinfmu.solver.status import Status
+
+
+def test_fourbar_meets_its_closed_form_at_every_second_both_ends_included(fourbar: Path) -> None:
+    run = simulate(fourbar)
+    phi, w = np.radians(run.t), np.radians(1.0)
+    c, s, o = np.cos(phi), np.sin(phi), 0.0 * phi
+    assert np.array_equal(run.t, np.arange(181.0))
+    assert run.names == ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
+    assert run.q == pytest.approx(np.column_stack([phi, 1 + c, s, o, phi]), abs=1e-12)
+    assert run.qd == pytest.approx(np.column_stack([o + w, -s * w, c * w, o, o + w]), abs=1e-12)
+    assert run.qdd == pytest.approx(np.column_stack([o, -c * w * w, -s * w * w, o, o]), abs=1e-12)
+    assert list(run.status[[0, -1]]) == [Status.BRIDGED, Status.BRIDGED]
+    assert run.good.all()
+    assert np.abs(run.watch).max() < 1e-12
+    assert run.events == ()
+
+
+def test_run_carries_the_mechanism_fixed_coordinates_driver_values_and_who_made_it(fourbar: Path) -> None:
+    run = simulate(fourbar, start=10, stop=12, parameters={"crank.speed": 0.5})
+    assert toml_file.parse(run.mechanism_text).name == "fourbar"
+    assert run.fixed == {"crank.x": 0.0, "crank.y": 0.0, "rocker.x": 1.0, "rocker.y": 0.0}
+    assert run.input_names == ("crank_angle", "crank_speed", "crank_acceleration")
+    assert run.inputs == pytest.approx(np.array([[5.0, 0.5, 0.0], [5.5, 0.5, 0.0], [6.0, 0.5, 0.0]]))
+    assert run.watch_names == ("AB.length",)
+    assert run.info["name"] == "fourbar"
+    assert run.info["parameters"] == "crank.speed = 0.5"
+    assert run["A.x"] == pytest.approx(2 + np.cos(run["crank.phi"]))
+
+
+def test_last_sample_is_at_stop_even_if_no_step_leads_there(fourbar: Path) -> None:
+    assert list(simulate(fourbar, stop=1.0, step=0.3).t) == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.0])
+    assert simulate(fourbar, stop=0.7, step=0.1).t[-1] == 0.7
+    assert len(simulate(fourbar, stop=0.7, step=0.1)) == 8
+    assert len(simulate(fourbar, start=3.0, stop=3.0)) == 1
+
+
+def test_progress_is_told_after_every_sample(fourbar: Path) -> None:
+    told: list[tuple[int, int]] = []
+    simulate(fourbar, stop=3.0, progress=lambda done, total: told.append((done, total)))
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_law_past_the_limit_ends_the_run_with_a_sample_without_numbers_and_an_event(pendulum: Path) -> None:
+    run = simulate(pendulum, stop=3.0, step=0.1)
+    assert run.t[-1] == pytest.approx(2.1)
+    assert run.status[-1] == Status.OUTSIDE
+    assert run.good[:-1].all()
+    assert np.isnan(run.values[-1]).all()
+    assert np.isnan(run.accelerations[-1]).all()
+    assert np.degrees(run.inputs[-1, 0]) == pytest.approx(363.0)
+    (event,) = run.events
+    assert event.level == "error"
+    assert event.text.startswith("at t = 2.1 s: crank = 6.33")
+    assert "360 deg" in event.text
+
+
+@pytest.mark.parametrize("stop", [0.7, 1.0])  # the sample that fails is the last one, or not
+def test_inputs_past_the_limit_end_the_run_at_the_sample_that_asked_for_it(pendulum: Path, stop: float) -> None:
+    run = simulate(pendulum, stop=stop, step=0.1, inputs={"time": [0.0, 1.0], "crank_angle": [5.0, 7.0]})
+    assert run.t[-1] == pytest.approx(0.7)
+    assert run.status[-1] == Status.OUTSIDE
+    assert run.inputs[-1, 0] == pytest.approx(6.4)
+    assert len(run.events) == 1
+    assert "360 deg" in run.events[0].text
+
+
+def test_csv_inputs_drive_rows_are_met_exactly_and_what_lies_between_is_linear(fourbar: Path, tmp_path: Path) -> None:
+    table = tmp_path / "crank.csv"
+    table.write_text("time, crank_angle, crank_speed\n0, 0.1, 2\n\n1, 0.7, 3\n3, 1.5, 4\n")
+    run = simulate(fourbar, stop=3.0, step=0.5, inputs=table)
+    assert run["crank.phi"] == pytest.approx([0.1, 0.4, 0.7, 0.9, 1.1, 1.3, 1.5])
+    assert run["crank.phi"][2] == 0.7
+    assert run["crank.omega"] == pytest.approx([2.0, 2.5, 3.0, 3.25, 3.5, 3.75, 4.0])
+    assert "driven_by_time = False" in run.info["parameters"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time,crank_angel\n0,1\n", r"'crank_angel' is no input of this FMU; did you mean 'crank_angle'\?"),
+        ("crank_angle\n0\n", "the column 'time' is missing"),
+        ("time\n0\n", "no input beside 'time'; inputs: crank_angle, crank_speed, crank_acceleration"),
+        ("time,time,crank_angle\n0,0,0\n", "the column 'time' is there twice"),
+        ("time,crank_angle\n0,1\n1,1\n1,2\n", "line 4: time = 1 s does not lie after 1 s; time must increase"),
+        ("time,crank_angle\n0,1\n5,nan\n", "line 3: crank_angle = nan is not a finite number"),
+        ("time,crank_angle\n0,1\n5,x\n", "line 3: crank_angle = 'x' is not a number"),
+        ("time,crank_angle\n0,1\n5\n", "line 3: 1 values, the header names 2 columns"),
+        ("time,crank_angle\n0,1\n2,1\n", "holds 0 to 2 s, the run goes from 0 to 3 s"),
+        ("time,crank_angle\n", "holds no samples"),
+        ("", "is empty; its first line must name the columns: time, crank_angle"),
+        ("\udcff", "is not a text file"),
+    ],
+)
+def test_faults_of_a_csv_are_named_with_file_and_line(fourbar: Path, tmp_path: Path, text: str, words: str) -> None:
+    table = tmp_path / "in.csv"
+    table.write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(FmuError, match=words) as caught:
+        simulate(fourbar, stop=3.0, inputs=table)
+    assert "in.csv" in str(caught.value)
+
+
+def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
+    with pytest.raises(FmuError, match=r"'crank_angle' has shape \(3,\), 'time' has 2 values"):
+        simulate(fourbar, inputs={"time": [0.0, 180.0], "crank_angle": [0.0, 1.0, 2.0]})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"parameters": {"crank.sped": 1.0}}, "'crank.sped' is no parameter of this FMU; did you mean 'crank.speed'"),
+        ({"parameters": {"crank.speed": float("nan")}}, "crank.speed = nan must be a finite number"),
+        ({"parameters": {"driven_by_time": 2}}, "driven_by_time = 2 must be true or false"),
+        ({"step": 0.0}, "a positive step"),
+        ({"start": 9.0, "stop": 1.0}, "start <= stop"),
+        ({"inputs": "nowhere.csv"}, r"nowhere\.csv: cannot be read"),
+    ],
+)
+def test_faults_of_a_call_are_named(fourbar: Path, arguments: dict[str, object], words: str) -> None:
+    with pytest.raises(FmuError, match=words):
+        simulate(fourbar, **arguments)  # type: ignore[arg-type]
+
+
+def test_what_is_no_fmu_is_refused(tmp_path: Path) -> None:
+    text, empty = tmp_path / "text.fmu", tmp_path / "empty.fmu"
+    text.write_text("no archive")
+    with zipfile.ZipFile(empty, "w") as zipped:
+        zipped.writestr("readme.txt", "")
+    with pytest.raises(FmuError, match="not a zip archive"):
+        simulate(text)
+    with pytest.raises(FmuError, match=r"modelDescription\.xml is missing"):
+        simulate(empty)
+    with pytest.raises(FmuError, match="No such file"):
+        simulate(tmp_path / "missing.fmu")
+
+
+def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
+    pendulum: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "ä +% b"  # pythonfmu's binary knows no quoted sign but a blank
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    before = list(sys.path)
+    simulate(pendulum, stop=3.0)
+    with pytest.raises(FmuError, match="range|holds"):
+        simulate(pendulum, inputs={"time": [0.0], "crank_angle": [5.0]})
+    assert list(folder.iterdir()) == []
+    assert sys.path == before
+    assert capfd.readouterr() == ("", "")
+
+
+def test_inputs_flavour_without_inputs_stays_at_its_start(built: Callable[..., Path]) -> None:
+    run = simulate(built("double_pendulum", "inputs"), stop=0.3, step=0.1)
+    assert run["upper.phi"] == pytest.approx(np.full(4, np.radians(300.0)))
+    assert run["upper.omega"] == pytest.approx(np.zeros(4))
