@@ -13,7 +13,8 @@ Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full 
 
 from __future__ import annotations
 
-import struct
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,9 +38,11 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 CHUNK_SIZE = 64 * 1024  # [bytes]; a truncated file loses at most its last chunk
+MOST_REASON = 160  # characters of a foreign error in a message
 SAMPLE_TOPIC = "/sample"
 MECHANISM_FILE = "mechanism.toml"
 _RECORD, _INFO = "kinfmu.record", "kinfmu.info"  # names of metadata records
+_CHECKSUM = "checksum"  # in the record; readers of MCAP check the chunks, but neither metadata nor attachments
 
 
 def write_mcap(run: Run, path: str | Path) -> None:
@@ -54,8 +57,9 @@ def write_mcap(run: Run, path: str | Path) -> None:
         writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="kinfmu")
         about = {"verdict": sentence(run), "time_base": "simulation", "time_zero_s": str(zero)}
-        writer.add_metadata(_RECORD, description(run))
-        writer.add_metadata(_INFO, dict(run.info))
+        texts, info = description(run), dict(run.info)
+        writer.add_metadata(_RECORD, texts | {_CHECKSUM: _checksum(texts, info, run.mechanism_text)})
+        writer.add_metadata(_INFO, info)
         writer.add_metadata("kinfmu.about", about | ({"linkage": reason} if reason else {}))
         if run.mechanism_text:
             writer.add_attachment(0, 0, MECHANISM_FILE, "application/toml", run.mechanism_text.encode())
@@ -75,18 +79,20 @@ def write_mcap(run: Run, path: str | Path) -> None:
 
 def read(path: str | Path) -> Run:
     """The run that `write_mcap` wrote to `path`, equal in every bit."""
-    from mcap.exceptions import McapError
     from mcap.reader import make_reader
 
     try:
         with Path(path).open("rb") as file:
             reader = make_reader(file, validate_crcs=True)
             return _run_in(reader, str(path))
+    except LogError:
+        raise
     except OSError as error:
         raise LogError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (McapError, struct.error, EOFError) as error:
+    except Exception as error:  # damaged bytes make readers, decompressors and decoders raise whatever they meet
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:MOST_REASON]
         raise LogError(
-            f"{path}: not a whole MCAP file ({type(error).__name__}: {error}); it was cut off, or is something else"
+            f"{path}: not a whole MCAP file ({reason}); it was cut off or damaged, or is something else"
         ) from error
 
 
@@ -99,15 +105,25 @@ def _run_in(reader: McapReader, where: str) -> Run:
     metadata = {record.name: record.metadata for record in reader.iter_metadata()}
     if _RECORD not in metadata:
         raise LogError(f"{where}: metadata record {_RECORD} is missing; records: {listed(metadata)}")
-    texts = [one.data.decode() for one in reader.iter_attachments() if one.name == MECHANISM_FILE]
+    mechanisms = [one.data.decode() for one in reader.iter_attachments() if one.name == MECHANISM_FILE]
     payloads, order = [], []
     for _, _, message in reader.iter_messages(topics=[SAMPLE_TOPIC], log_time_order=False):
         payloads.append(message.data)
         order.append(message.sequence)
-    template = _sample_template(len(column_names(metadata[_RECORD])))
+    texts, info = metadata[_RECORD], metadata.get(_INFO, {})
+    mechanism_text = mechanisms[0] if mechanisms else ""
+    if texts.pop(_CHECKSUM, "") != _checksum(texts, info, mechanism_text):
+        raise LogError(f"{where}: metadata or mechanism are damaged (their checksum does not fit)")
+    template = _sample_template(len(column_names(texts)))
     messages = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), template.length)
     table = template.read(messages[np.argsort(order, kind="stable")])
-    return run_of(metadata[_RECORD], table, metadata.get(_INFO, {}), texts[0] if texts else "", where)
+    return run_of(texts, table, info, mechanism_text, where)
+
+
+def _checksum(texts: Mapping[str, str], info: Mapping[str, str], mechanism_text: str) -> str:
+    """CRC-32 of all names and texts, in hexadecimal."""
+    parts = [part for table in (texts, info) for entry in table.items() for part in entry]
+    return f"{zlib.crc32(chr(0).join([*parts, mechanism_text]).encode()):08x}"
 
 
 class _Topics:

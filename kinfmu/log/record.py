@@ -24,6 +24,7 @@ _DIAGNOSTICS = 7  # columns of Run.columns() between the accelerations and the w
 def description(run: Run) -> dict[str, str]:
     """The run without its columns, its info and its mechanism, as texts."""
     lists: dict[str, Any] = {
+        "samples": len(run),
         "columns": [column.name for column in run.columns()],
         "units": {column.name: column.unit for column in run.columns()},
         "outputs": run.outputs,
@@ -62,6 +63,8 @@ def run_of(
     about = {key: json.loads(text) for key, text in texts.items() if key != "format"}
     if table.shape[1] != len(about["columns"]):
         raise LogError(f"{where}: {table.shape[1]} columns of data, but {len(about['columns'])} names")
+    if len(table) != about["samples"]:
+        raise LogError(f"{where}: holds {len(table)} of {about['samples']} samples; it was cut off or damaged")
     outputs, inputs, watches = (tuple(about[key]) for key in ("outputs", "input_names", "watch_names"))
 
     def block(start: int, count: int, dtype: str = "<f8") -> NDArray[Any]:

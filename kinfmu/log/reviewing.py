@@ -44,15 +44,21 @@ def review(
         raise LogError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
     if other and Path(other).suffix == ".rrd":
         raise LogError(f"{other}: a recording cannot be compared; give the run's .mcap file")
+    for target, suffix in ((save, ".rrd"), (screenshot, ".png")):
+        if target and Path(target).suffix != suffix:
+            raise LogError(f"{target}: the name must end in {suffix}")
     if not save and not screenshot:
         _need_display(run)
+    if screenshot and not save:
+        with TemporaryDirectory() as folder:
+            recording = run
+            if run.suffix == ".mcap":
+                recording = Path(folder) / f"{run.stem}.rrd"
+                at = _record(run, other, recording, at)
+            _shoot(recording, screenshot, at)
+        return None
     if run.suffix == ".rrd":
         recording, moment = run, at
-    elif screenshot and not save:
-        with TemporaryDirectory() as folder:
-            recording = Path(folder) / f"{run.stem}.rrd"
-            _shoot(recording, screenshot, _record(run, other, recording, at))
-        return None
     else:
         recording = Path(save) if save else run.with_name(_beside(run, other))
         moment = _record(run, other, recording, at)

@@ -234,6 +234,23 @@ def test_a_truncated_file_is_told_in_one_line(run: Run, tmp_path: Path, kept: in
     assert "\n" not in str(caught.value)
 
 
+def test_a_damaged_file_is_told_or_reads_back_as_it_was(run_with_gap: Run, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    write_mcap(run_with_gap, path)
+    whole, random = path.read_bytes(), np.random.default_rng(1)
+    told: list[str] = []
+    for place in random.integers(len(whole), size=150):
+        damaged = bytearray(whole)
+        damaged[place] ^= int(random.integers(1, 256))
+        path.write_bytes(damaged)
+        try:
+            assert_same(run_with_gap, read(path))
+        except LogError as error:
+            told.append(str(error))
+    assert len(told) > 50
+    assert all(text.startswith(f"{path}: ") and "\n" not in text for text in told)
+
+
 def test_a_foreign_file_is_told_from_a_run(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as file:

@@ -74,6 +74,8 @@ def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
 def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
     with pytest.raises(LogError, match=r"run\.csv: a run to review is an \.mcap or \.rrd file"):
         review(tmp_path / "run.csv")
+    with pytest.raises(LogError, match=r"shot\.jpg: the name must end in \.png"):
+        review(mcap, screenshot=tmp_path / "shot.jpg")
     with pytest.raises(LogError, match=r"none\.mcap: there is no such file"):
         review(mcap, tmp_path / "none.mcap")
     review(mcap, save=tmp_path / "run.rrd")
