@@ -179,9 +179,10 @@ def _instantiate(slave: Any, folder: Path, callbacks: Any) -> None:
 
 
 def _callbacks(log: Callable[[int, str], None]) -> Any:
-    """FMI's callbacks: messages go to `log`, nothing to the terminal."""
-    from ctypes import byref
+    """FMI's callbacks: messages go to `log`, nothing to the terminal.
 
+    Without fmpy's proxy for printf-like messages: it serves one logger in a process, and our FMUs send finished text.
+    """
     from fmpy import calloc, free
     from fmpy.fmi2 import (
         fmi2CallbackAllocateMemoryTYPE,
@@ -189,7 +190,6 @@ def _callbacks(log: Callable[[int, str], None]) -> Any:
         fmi2CallbackFunctions,
         fmi2CallbackLoggerTYPE,
     )
-    from fmpy.logging import addLoggerProxy
 
     def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
         log(status, (message or b"").decode("utf-8", errors="replace"))
@@ -198,7 +198,6 @@ def _callbacks(log: Callable[[int, str], None]) -> Any:
     callbacks.logger = fmi2CallbackLoggerTYPE(logger)
     callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
     callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    addLoggerProxy(byref(callbacks))
     return callbacks
 
 

@@ -62,7 +62,9 @@ def test_fmu_runs_in_a_fresh_process_that_has_never_seen_kinfmu(fourbar: Path, t
     assert float(done.stdout) == pytest.approx(1.5, abs=1e-12)
 
 
-def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_after_their_content(fourbar: Path) -> None:
+def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_after_their_content(
+    fourbar: Path,
+) -> None:
     with zipfile.ZipFile(fourbar) as zipped:
         names = zipped.namelist()
         entry = zipped.read("resources/slavemodule.txt").decode()

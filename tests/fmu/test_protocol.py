@@ -21,13 +21,16 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     (solver,) = {
         module.Solver
         for name, module in sys.modules.items()
-        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}") and name.endswith(".fmu.slave")
+        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}")
+        and name.endswith(".fmu.slave")
     }
     assert solver is not Solver
     calls: dict[str, int] = {}
     for method in ("solve", "outputs", "rates", "accelerations", "errors", "diagnostics"):
 
-        def counting(self: object, *args: object, _run: Callable[..., object] = getattr(solver, method), _name: str = method) -> object:
+        def counting(
+            self: object, *args: object, _run: Callable[..., object] = getattr(solver, method), _name: str = method
+        ) -> object:
             calls[_name] = calls.get(_name, 0) + 1
             return _run(self, *args)
 
