@@ -93,7 +93,7 @@ def _block(bridge: Bridge) -> int:
 
 
 def _determinant(solver: Solver, bridge: Bridge, u: float, block: int) -> float:
-    pose: Pose = bridge.pose(solver.model, solver.unit, (u,))
+    pose: Pose = bridge.pose(solver.model, (u,))
     return float(pose.determinants[block])
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, REGULAR, Bridge, build, secant_zero, zero_near
-from .pose import Model, Pose, Vector, corrected, failed, predicted
+from .pose import ALONE, Model, Pose, Vector, corrected, failed
 from .status import Status
 
 LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
 TRUSTED = 0.1  # largest correction of a prediction, over the determinant: other branches lie about a determinant away
 FALL = 0.3  # a step may not bring a determinant below this part of what it was
-SHORTEST_STEP = 1e-9  # [rad, sizes]; where steps get shorter, a limit is near and its place is extrapolated
+SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near and its place is extrapolated
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
-_GIVE_UP = 1e-15  # [rad, sizes]; nothing lies between such steps
+_GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
+_ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
 _BRIDGES_KEPT = 4
 
 
@@ -50,17 +51,18 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     With one driver, singular points on the way are bridged.
     """
     one = len(target) == 1
-    direction, distance = (model.REACH, 0.0) if one else _course(model, start.u, target)
-    pose, step, iterations = start, LONGEST_STEP, 0
+    direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
+    longest = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
+    pose, step, iterations = start, longest, 0
     before, limit = start, None
     while True:
         if one:
             bridge = _in_the_way(pose, target[0]) if pose.bridges else None
             if bridge is not None:
                 if bridge.covers(target[0]):
-                    return _across(model, direction, bridge, pose, target)
+                    return _across(model, bridge, pose, target)
                 pose = _carried(bridge.exit(target[0]), pose.bridges)
-            distance = (target[0] - pose.u[0]) / direction[0]
+            distance = target[0] - pose.u[0]
             if distance == 0.0:
                 return pose
         whole = abs(distance) <= step
@@ -70,7 +72,7 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         if trial is not None:
             iterations += trial.iterations
             if one and trial.margin() < REGULAR:
-                bridges = _bridged(model, direction, pose, trial)
+                bridges = _bridged(model, pose, trial)
                 if bridges is not None:
                     pose = _carried(pose, bridges)
                     continue
@@ -81,12 +83,12 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
                 return trial
             before, pose = pose, trial
             distance -= s
-            step = min(2.0 * step, LONGEST_STEP)
+            step = min(2.0 * step, longest)
             continue
         step = 0.5 * abs(s)
-        if step < SHORTEST_STEP:
+        if step < SHORTEST_STEP * longest:
             limit = limit or _limit(before, pose)
-            if step < _GIVE_UP or _beyond(target, limit.u, direction, s):
+            if step < _GIVE_UP * longest or _beyond(target, limit.u, direction, s):
                 return limit
 
 
@@ -99,18 +101,13 @@ def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]
 
 def _step(model: Model, pose: Pose, direction: Vector, s: float, u: Vector) -> Pose | None:
     """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
-    guess = predicted(model, pose, direction, s)
-    trial = corrected(model, u, guess, pose.bridges)
+    trial = corrected(model, u, pose, direction, s)
     if trial is None:
         return None
-    smallest = 1.0
+    allowed = trial.moved / TRUSTED
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
-        if before * after <= 0.0 or abs(after) < FALL * abs(before):
-            return None
-        smallest = min(smallest, abs(before), abs(after))
-    allowed = TRUSTED * smallest
-    for z, expected, scale in zip(trial.z, guess, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all three
-        if abs(z - expected) > allowed * scale:
+        falls = abs(after) < FALL * abs(before)
+        if before * after <= 0.0 or falls or allowed > abs(before) or allowed > abs(after):
             return None
     return trial
 
@@ -123,9 +120,9 @@ def _in_the_way(pose: Pose, target: float) -> Bridge | None:
     return min(ahead, key=lambda bridge: abs(bridge.centre - pose.u[0]), default=None) if ahead else None
 
 
-def _across(model: Model, direction: Vector, bridge: Bridge, pose: Pose, target: Vector) -> Pose:
+def _across(model: Model, bridge: Bridge, pose: Pose, target: Vector) -> Pose:
     try:
-        found = bridge.pose(model, direction, target)
+        found = bridge.pose(model, target)
     except (ArithmeticError, ValueError):
         return failed(pose, target, Status.NOT_CONVERGED, f"{place(model, target)}: the bridge there does not hold")
     found.bridges = pose.bridges
@@ -134,35 +131,34 @@ def _across(model: Model, direction: Vector, bridge: Bridge, pose: Pose, target:
 
 def _carried(pose: Pose, bridges: tuple[Bridge | Blocked, ...]) -> Pose:
     """A pose with the bridges known on its way."""
-    other = Pose(pose.u, (pose.z, pose.determinants, pose.residual, pose.iterations, pose.values), bridges)
+    other = Pose(pose.u, pose.found(), bridges)
     other._tangent = pose._tangent
     return other
 
 
-def _bridged(
-    model: Model, direction: Vector, pose: Pose, trial: Pose
-) -> tuple[Bridge | Blocked, ...] | None:
+def _bridged(model: Model, pose: Pose, trial: Pose) -> tuple[Bridge | Blocked, ...] | None:
     """Known bridges and a new one, if the trial pose has come into the window of a singular point; None if not.
 
     A place where no bridge holds is remembered as blocked, so that it is tried once.
     """
 
     def walk(start: Pose, u: float) -> Pose | None:
-        return _plainly(model, direction, start, u)
+        return _plainly(model, start, u)
 
+    reach: float = model.REACH[0]
     block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
     known = trial.bridges
     if any(_knows(place, trial.u[0]) for place in known):
         return None
-    far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * direction[0]
-    zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk)
-    if zero is None or abs(zero - trial.u[0]) > HALF_WIDTH * 1.05 * direction[0]:
+    far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * reach
+    zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk, reach)
+    if zero is None or abs(zero - trial.u[0]) > 1.05 * HALF_WIDTH * reach:
         return None
     if any(_knows(place, zero) for place in known):
         return None
-    bridge = build(model, direction, pose, block, walk)
+    bridge = build(model, pose, block, walk)
     if bridge is None:
-        room = 2.0 * HALF_WIDTH * direction[0]
+        room = 2.0 * HALF_WIDTH * reach
         trial.bridges = (*known, Blocked(zero - room, zero + room))[-_BRIDGES_KEPT:]
         return None
     return (*known, bridge)[-_BRIDGES_KEPT:]
@@ -174,19 +170,20 @@ def _knows(place: Bridge | Blocked, u: float) -> bool:
     return abs(u - place.centre) <= place.half * 1.2
 
 
-def _plainly(model: Model, direction: Vector, start: Pose, u: float) -> Pose | None:
-    """From a pose to a driver value by trusted steps only, or None."""
-    pose, step = start, LONGEST_STEP
+def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
+    """From a pose to a value of the only driver by trusted steps, without bridges; or None."""
+    longest: float = LONGEST_STEP * model.REACH[0]
+    pose, step = start, longest
     while pose.u[0] != u:
-        distance = (u - pose.u[0]) / direction[0]
+        distance = u - pose.u[0]
         whole = abs(distance) <= step
         s = distance if whole else step if distance > 0.0 else -step
-        trial = _step(model, pose, direction, s, (u,) if whole else (pose.u[0] + s * direction[0],))
+        trial = _step(model, pose, ALONE, s, (u,) if whole else (pose.u[0] + s,))
         if trial is not None:
             pose = trial
         else:
             step = 0.5 * abs(s)
-            if step < 1e-4:
+            if step < _ROUGHEST * longest:
                 return None
     return pose
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from typing import Any
 
 from .hermite import Hermite
-from .pose import Model, Pose, Vector
+from .pose import ALONE, AT_REST, Model, Pose, Vector, evaluated
 from .status import Status
 
-HALF_WIDTH = 0.05  # [rad]; twice as wide loses four digits on the antiparallelogram
-NARROWEST = 1e-3  # [rad]; nodes closer than this have lost the digits that a bridge would win
+HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
+NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would win
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
 AGREED = 1e-9  # largest difference of two widths in z
 REGULAR = 0.25  # determinant from which a block inside a window is solved as elsewhere
@@ -34,7 +34,7 @@ class Bridge:
 
     __slots__ = ("centre", "half", "held", "inner", "nodes", "outer")
 
-    def __init__(self, model: Model, direction: Vector, centre: float, half: float, nodes: list[Pose]) -> None:
+    def __init__(self, model: Model, centre: float, half: float, nodes: list[Pose]) -> None:
         self.centre = centre
         self.half = half
         self.nodes = nodes
@@ -42,8 +42,8 @@ class Bridge:
         for block in range(len(model.BLOCKS)):
             if min(abs(nodes[2].determinants[block]), abs(nodes[3].determinants[block])) < REGULAR:
                 self.held |= 1 << block
-        self.inner = _interpolants(model, direction, half, _NODES[1:5], nodes[1:5])
-        self.outer = _interpolants(model, direction, half, (*_NODES[:2], *_NODES[4:]), nodes[:2] + nodes[4:])
+        self.inner = _interpolants(model, half, _NODES[1:5], nodes[1:5])
+        self.outer = _interpolants(model, half, (*_NODES[:2], *_NODES[4:]), nodes[:2] + nodes[4:])
 
     def covers(self, u: float) -> bool:
         """True inside the window, where the bridge is used."""
@@ -60,24 +60,22 @@ class Bridge:
         node = (4 if away >= 2.0 else 3) if away > 0.0 else (1 if away <= -2.0 else 2)
         return self.nodes[node]
 
-    def pose(self, model: Model, direction: Vector, u: Vector) -> Pose:
+    def pose(self, model: Model, u: Vector) -> Pose:
         """The interpolated pose inside the window; blocks that are regular are solved from it."""
         x = (u[0] - self.centre) / self.half
-        z, zd, zdd = _read(self.inner, x, self.half, direction)
-        pose = Pose(u, model.position(u, z, self.held))
+        z, zd, zdd = _read(self.inner, x, self.half)
+        pose = Pose(u, evaluated(model, u, z, self.held))
         pose.held = self.held
         pose.bridge = self
         pose.status = Status.BRIDGED
-        if pose.held:
-            at_rest = (0.0,) * len(direction)
-            zd = model.velocity(pose.values, direction, zd, self.held)
-            zdd = model.acceleration(pose.values, direction, at_rest, zd, zdd, self.held)
-        return pose.with_tangent(direction, zd, zdd)
+        zd = model.velocity(pose.values, ALONE, zd, self.held)
+        zdd = model.acceleration(pose.values, ALONE, AT_REST, zd, zdd, self.held)
+        return pose.with_tangent(ALONE, zd, zdd)
 
-    def disagreement(self, u: float, direction: Vector) -> tuple[float, float, float]:
-        """Largest difference of the two widths in z, zd, zdd: the error estimate."""
+    def disagreement(self, u: float) -> tuple[float, float, float]:
+        """Largest difference of the two widths in z and its two derivatives: the error estimate."""
         x = (u - self.centre) / self.half
-        a, b = _read(self.inner, x, self.half, direction), _read(self.outer, x, self.half, direction)
+        a, b = _read(self.inner, x, self.half), _read(self.outer, x, self.half)
         largest = [max((abs(p - q) for p, q in zip(v, w, strict=True)), default=0.0) for v, w in zip(a, b, strict=True)]
         return largest[0], largest[1], largest[2]
 
@@ -86,31 +84,31 @@ class Bridge:
         return [self.centre, self.half, [[list(node.u), list(node.z)] for node in self.nodes]]
 
 
-def restored(model: Model, direction: Vector, data: list[Any]) -> Bridge:
+def restored(model: Model, data: list[Any]) -> Bridge:
     """The bridge that was dumped."""
     centre, half, nodes = data
-    everything = (1 << len(model.BLOCKS)) - 1
-    poses = [Pose(tuple(u), model.position(tuple(u), tuple(z), everything)) for u, z in nodes]
-    return Bridge(model, direction, centre, half, poses)
+    poses = [Pose(tuple(u), evaluated(model, tuple(u), tuple(z))) for u, z in nodes]
+    return Bridge(model, centre, half, poses)
 
 
-def build(model: Model, direction: Vector, pose: Pose, block: int, walk: Walk) -> Bridge | None:
+def build(model: Model, pose: Pose, block: int, walk: Walk) -> Bridge | None:
     """A bridge over the zero of a block's determinant near a regular pose, or None if none proves itself.
 
     The zero is found by the secant rule on the determinant along the branch, on the near side only. A dead centre gives
     no bridge: the far side cannot be reached, or the interpolated pose does not close.
     """
-    half = HALF_WIDTH
-    while half >= NARROWEST:
-        bridge = _spanned(model, direction, pose, block, half, walk)
+    reach: float = model.REACH[0]
+    half = HALF_WIDTH * reach
+    while half >= NARROWEST * reach:
+        bridge = _spanned(model, pose, block, half, walk)
         if bridge is not None:
             return bridge
         half *= 0.5
     return None
 
 
-def _spanned(model: Model, direction: Vector, pose: Pose, block: int, half: float, walk: Walk) -> Bridge | None:
-    centre = zero_near(pose, block, walk)
+def _spanned(model: Model, pose: Pose, block: int, half: float, walk: Walk) -> Bridge | None:
+    centre = zero_near(pose, block, walk, model.REACH[0])
     if centre is None:
         return None
     side = 1.0 if centre > pose.u[0] else -1.0
@@ -124,26 +122,25 @@ def _spanned(model: Model, direction: Vector, pose: Pose, block: int, half: floa
         better = secant_zero(near[-2], near[-1], block)
         if better is None or abs(better - centre) > 2.0 * half:
             return None
-        settled = abs(better - centre) <= 0.2 * half
-        if settled:
+        if abs(better - centre) <= 0.2 * half:
             break
         centre = better
     else:
         return None
     near = near[1:]
-    far = _crossed(model, direction, centre, half, side, near)
+    far = _crossed(model, centre, half, side, near)
     if far is None:
         return None
     if near[-1].determinants[block] * far[0].determinants[block] >= 0.0:
         return None  # touched, not crossed: no change point of two smooth branches
     nodes = near + far if side > 0.0 else (near + far)[::-1]
-    bridge = Bridge(model, direction, centre, half, nodes)
-    return bridge if _proved(model, direction, bridge) else None
+    bridge = Bridge(model, centre, half, nodes)
+    return bridge if _proved(model, bridge) else None
 
 
-def zero_near(pose: Pose, block: int, walk: Walk) -> float | None:
+def zero_near(pose: Pose, block: int, walk: Walk, reach: float) -> float | None:
     """Driver value near a pose where a block's determinant seems to vanish, by its slope on the regular side."""
-    for offset in (0.02, -0.02):
+    for offset in (0.02 * reach, -0.02 * reach):
         other = walk(pose, pose.u[0] + offset)
         if other is not None and abs(other.determinants[block]) > abs(pose.determinants[block]):
             return secant_zero(other, pose, block)
@@ -157,51 +154,49 @@ def secant_zero(a: Pose, b: Pose, block: int) -> float | None:
 
 
 def _crossed(
-    model: Model, direction: Vector, centre: float, half: float, side: float, near: list[Pose]
+    model: Model, centre: float, half: float, side: float, near: list[Pose]
 ) -> list[Pose] | None:
     """Poses at 1, 2, 4 half widths on the far side: each extrapolated from all that is known, then corrected."""
     places = [-4.0 * side, -2.0 * side, -1.0 * side]
     poses = list(near)
     for distance in (1.0, 2.0, 4.0):
-        ahead = _interpolants(model, direction, half, tuple(places[-4:]), poses[-4:])
+        ahead = _interpolants(model, half, tuple(places[-4:]), poses[-4:])
         u = (centre + side * distance * half,)
-        guess, _, _ = _read(ahead, side * distance, half, direction)
+        guess, _, _ = _read(ahead, side * distance, half)
         try:
-            pose = Pose(u, model.position(u, guess))
+            pose = Pose(u, evaluated(model, u, guess, held=0))
         except (ArithmeticError, ValueError):
             return None
-        moved = max(abs(a - b) / scale for a, b, scale in zip(pose.z, guess, model.UNKNOWN_SCALES, strict=True))
-        if moved > 0.1 * pose.margin():
+        if pose.moved > 0.1 * pose.margin():
             return None
         places.append(side * distance)
         poses.append(pose)
     return poses[3:]
 
 
-def _proved(model: Model, direction: Vector, bridge: Bridge) -> bool:
+def _proved(model: Model, bridge: Bridge) -> bool:
     """True if interpolated poses close and both widths agree, at the centre and half way to both ends."""
     for x in (-0.5, 0.0, 0.5):
         u = bridge.centre + x * bridge.half
         try:
-            pose = bridge.pose(model, direction, (u,))
+            pose = bridge.pose(model, (u,))
         except (ArithmeticError, ValueError):
             return False
-        if pose.residual > CLOSED or bridge.disagreement(u, direction)[0] > AGREED:
+        if pose.residual > CLOSED or bridge.disagreement(u)[0] > AGREED:
             return False
     return True
 
 
 def _interpolants(
-    model: Model, direction: Vector, half: float, places: tuple[float, ...], poses: list[Pose]
+    model: Model, half: float, places: tuple[float, ...], poses: list[Pose]
 ) -> list[Hermite]:
     """One polynomial an unknown, over x = (u - centre) / half; the derivatives are with respect to x."""
-    per_x = half / direction[0]
-    tangents = [pose.tangent(model, direction) for pose in poses]
+    tangents = [pose.tangent(model, ALONE) for pose in poses]
     return [
         Hermite(
             places,
             tuple(
-                (pose.z[k], zd[k] * per_x, zdd[k] * per_x * per_x)
+                (pose.z[k], zd[k] * half, zdd[k] * half * half)
                 for pose, (zd, zdd) in zip(poses, tangents, strict=True)
             ),
         )
@@ -209,9 +204,9 @@ def _interpolants(
     ]
 
 
-def _read(polynomials: list[Hermite], x: float, half: float, direction: Vector) -> tuple[Vector, Vector, Vector]:
-    """z and its derivatives along the direction at x."""
-    per_x = direction[0] / half
+def _read(polynomials: list[Hermite], x: float, half: float) -> tuple[Vector, Vector, Vector]:
+    """z and its two derivatives with respect to the driver at x."""
+    per_x = 1.0 / half
     values = [polynomial(x) for polynomial in polynomials]
     return (
         tuple(value for value, _, _ in values),

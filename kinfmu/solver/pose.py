@@ -7,6 +7,8 @@ from typing import Any
 from .status import Status
 
 Vector = tuple[float, ...]
+ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
+AT_REST: Vector = (0.0,)
 Model = Any  # a generated module: see kinfmu.backends.python.emit
 
 
@@ -14,8 +16,9 @@ class Pose:
     """A value; what is derived from it is computed when first asked for.
 
     u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular; residual: largest,
-    relative to the size; values: numbers of the position stage that later stages use; held: bit a block whose z was
-    interpolated; bridges: singular stretches met on the way here. status and message: see Status.
+    relative to the size; moved: largest correction of the prediction, in radians and sizes; values: numbers of the
+    position stage that later stages use; held: bit a block whose z was interpolated; bridges: singular stretches met on
+    the way here. status and message: see Status.
     """
 
     __slots__ = (
@@ -26,6 +29,7 @@ class Pose:
         "held",
         "iterations",
         "message",
+        "moved",
         "residual",
         "status",
         "u",
@@ -35,7 +39,7 @@ class Pose:
 
     def __init__(self, u: Vector, found: tuple[Any, ...], bridges: tuple[Any, ...] = ()) -> None:
         self.u = u
-        self.z, self.determinants, self.residual, self.iterations, self.values = found
+        self.z, self.determinants, self.residual, self.iterations, self.moved, self.values = found
         self.bridges = bridges
         self.bridge: Any = None  # the Bridge that this pose was interpolated by
         self.held = 0
@@ -67,24 +71,32 @@ class Pose:
         return self
 
 
+    def found(self) -> tuple[Any, ...]:
+        """What `position` gave for this pose."""
+        return self.z, self.determinants, self.residual, self.iterations, self.moved, self.values
+
+
 def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
     """A pose without numbers: what could not be reached from `start`, and why."""
-    pose = Pose(u, (start.z, start.determinants, start.residual, start.iterations, start.values), start.bridges)
+    pose = Pose(u, start.found(), start.bridges)
     pose.status = status
     pose.message = message
     return pose
 
 
-def predicted(model: Model, pose: Pose, direction: Vector, s: float) -> Vector:
-    """Taylor's second-order prediction of z after a way s along the direction."""
+def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> tuple[Any, ...]:
+    """What `position` gives for unknowns that are known: held blocks (all, if nothing is said) are not solved for.
+
+    s = -0.0 at rest leaves z as it is, to the bit.
+    """
+    rest = (0.0,) * len(z)
+    return tuple(model.position(u, z, rest, rest, -0.0, held))
+
+
+def corrected(model: Model, u: Vector, pose: Pose, direction: Vector, s: float) -> Pose | None:
+    """The pose that Newton finds at u from the second-order prediction a way s along the direction, or None."""
     zd, zdd = pose.tangent(model, direction)
-    half = 0.5 * s
-    return tuple([z + s * (d + half * dd) for z, d, dd in zip(pose.z, zd, zdd)])  # noqa: B905  equal by construction
-
-
-def corrected(model: Model, u: Vector, guess: Vector, bridges: tuple[Any, ...]) -> Pose | None:
-    """The pose that Newton finds from a guess, or None if it finds none."""
     try:
-        return Pose(u, model.position(u, guess), bridges)
+        return Pose(u, model.position(u, pose.z, zd, zdd, s), pose.bridges)
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None

@@ -8,7 +8,7 @@ from typing import Any
 from .advance import Blocked, advance, place
 from .bridge import restored
 from .linear import reciprocal_condition
-from .pose import Model, Pose, Vector, failed
+from .pose import ALONE, Model, Pose, Vector, evaluated, failed
 from .status import Status
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
@@ -26,9 +26,8 @@ class Solver:
         self.model = model
         self.tolerance = tolerance
         u, z = model.ANCHOR
-        self.anchor = Pose(u, model.position(u, z))
+        self.anchor = Pose(u, evaluated(model, u, z, held=0))
         self._one = len(u) == 1
-        self.unit: Vector = model.REACH  # direction of a unit of motion with one driver
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
@@ -55,33 +54,29 @@ class Solver:
                     f"{place(self.model, pose.u)}: the redundant row {name} is open by {gap:.3g} {self.model.LENGTH_UNIT}"
                 )
 
-    def _unknown_rates(self, pose: Pose, ud: Vector) -> Vector:
+    def _first(self, pose: Pose, ud: Vector) -> Vector:
+        """What the model's rates start from: z' = dz/du with one driver, else zd."""
         if self._one:
-            scale = ud[0] / self.unit[0]
-            return tuple([d * scale for d in pose.tangent(self.model, self.unit)[0]])
+            return pose.tangent(self.model, ALONE)[0]
         return tuple(self.model.velocity(pose.values, ud))
 
     def outputs(self, pose: Pose) -> Vector:
         """Positions of the model's OUTPUTS."""
-        return tuple(self.model.outputs(pose.values))
+        return self.model.outputs(pose.values)  # type: ignore[no-any-return]  # generated code has no types
 
     def rates(self, pose: Pose, ud: Vector) -> Vector:
         """Rates of the OUTPUTS at driver speeds ud."""
-        return tuple(self.model.rates(pose.values, ud, self._unknown_rates(pose, ud)))
+        return self.model.rates(pose.values, ud, self._first(pose, ud))  # type: ignore[no-any-return]
 
     def accelerations(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
-        """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd.
-
-        With one driver the tangent serves all: zdd = z'' ud^2 + z' udd.
-        """
-        zd = self._unknown_rates(pose, ud)
+        """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
+        model = self.model
         if self._one:
-            first, second = pose.tangent(self.model, self.unit)
-            speed, more = ud[0] / self.unit[0], udd[0] / self.unit[0]
-            zdd = tuple([dd * speed * speed + d * more for d, dd in zip(first, second, strict=True)])
+            first, second = pose.tangent(model, ALONE)
         else:
-            zdd = tuple(self.model.acceleration(pose.values, ud, udd, zd))
-        return tuple(self.model.accelerations(pose.values, ud, udd, zd, zdd))
+            first = self._first(pose, ud)
+            second = model.acceleration(pose.values, ud, udd, first)
+        return model.accelerations(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 
     def watch(self, pose: Pose) -> Vector:
         """Rows set aside as redundant, relative to the size."""
@@ -105,17 +100,17 @@ class Solver:
         Newton: eps / m, eps / m^2, eps / m^3 times the rates, with the determinant m as the distance from singular.
         Bridge: the difference of two widths, and what rounding leaves of the nodes.
         """
-        zd = self._unknown_rates(pose, ud)
-        speed = max([abs(v) for v in ud] + [abs(v) for v in zd])
-        more = max(abs(v) for v in udd) if udd else 0.0
+        drive, more = max(map(abs, ud), default=0.0), max(map(abs, udd), default=0.0)
         if pose.bridge is not None:
-            e0, e1, e2 = pose.bridge.disagreement(pose.u[0], self.unit)
-            rate = abs(ud[0] / self.unit[0])
+            e0, e1, e2 = pose.bridge.disagreement(pose.u[0])
+            rate = drive
             floor = 8.0 * EPS / pose.bridge.half
             error_q = e0 + 8.0 * EPS
             error_qd = (e1 + floor) * rate
             error_qdd = (e2 + floor / pose.bridge.half) * rate * rate + (e1 + floor) * more
             return error_q, error_qd, error_qdd
+        speed = max(map(abs, self._first(pose, ud)), default=0.0)
+        speed = drive * max(1.0, speed) if self._one else max(drive, speed)
         m = max(pose.margin(), EPS)
         error_q = 4.0 * (EPS + pose.residual) / m
         error_qd = error_q * speed / m
@@ -135,15 +130,14 @@ class Solver:
         """The pose that was dumped."""
         u, z, iterations, status, message, dumped, standing, own = data
         bridges = tuple(
-            Blocked(*content) if kind == "blocked" else restored(self.model, self.unit, content)
+            Blocked(*content) if kind == "blocked" else restored(self.model, content)
             for kind, content in dumped
         )
         if standing >= 0 or own is not None:
-            bridge = bridges[standing] if standing >= 0 else restored(self.model, self.unit, own)
-            pose = bridge.pose(self.model, self.unit, tuple(u))
+            bridge = bridges[standing] if standing >= 0 else restored(self.model, own)
+            pose = bridge.pose(self.model, tuple(u))
         else:
-            everything = (1 << len(self.model.BLOCKS)) - 1
-            pose = Pose(tuple(u), self.model.position(tuple(u), tuple(z), everything))
+            pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
         pose.bridges = bridges
         pose.iterations, pose.status, pose.message = iterations, status, message
         return pose

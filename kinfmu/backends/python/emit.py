@@ -3,16 +3,18 @@
 The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
 
     drive(t, constants)                            -> u, ud, udd
-    position(u, z, held)                           -> z, determinants, residual, iterations, values
+    position(u, z, zd, zdd, s, held)               -> z, determinants, residual, iterations, moved, values
     velocity(values, ud, given, held)              -> zd
     acceleration(values, ud, udd, zd, given, held) -> zdd
     outputs(values)                                -> positions of the outputs
-    rates(values, ud, zd)                          -> their rates
-    accelerations(values, ud, udd, zd, zdd)        -> their accelerations
+    rates(values, ud, first)                       -> their rates
+    accelerations(values, ud, udd, first, second)  -> their accelerations
     watches(values)                                -> rows set aside, relative to the size
     jacobians(values)                              -> one matrix a block
 
-z are the unknowns of all blocks; `held` is a bit a block: set, its z is taken as given instead of solved for.
+z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; moved is the largest
+correction. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
+with one driver they are the derivatives of z with respect to u, and the chain rule is part of the code.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ class _Emitter:
         self.plan = plan
         self.solved = [block for block in plan.blocks if block.unknowns]
         self.number = {id(block): k for k, block in enumerate(self.solved)}
-        self.names = Names()
+        self.names = Names(name for block in plan.blocks for name in block.coordinates)
         self.position_nodes: list[Node] = []
         for block in plan.blocks:
             for name, motion in block.assigned:
@@ -54,8 +56,8 @@ class _Emitter:
             self._velocity(),
             self._acceleration(),
             self._stage("outputs", "Positions of the outputs.", ["values"], 0),
-            self._stage("rates", "Rates of the outputs.", ["values", "ud", "zd"], 1),
-            self._stage("accelerations", "Accelerations of the outputs.", ["values", "ud", "udd", "zd", "zdd"], 2),
+            self._stage("rates", "Rates of the outputs.", ["values", "ud", "first"], 1),
+            self._stage("accelerations", "Accelerations of the outputs.", ["values", "ud", "udd", "first", "second"], 2),
             self._watches(),
             self._jacobians(),
         ]
@@ -124,13 +126,16 @@ class _Emitter:
         writer = Writer(self.names, (), keep)
         lines = [
             "",
-            "def position(u, z, held=0):",
-            '    """Unknowns by Newton from the guess z, block after block; ArithmeticError(block, residual) if it fails."""',
+            "def position(u, z, zd, zdd, s, held=0):",
+            '    """Unknowns by Newton from a prediction, block after block; ArithmeticError(block, residual) if it fails."""',
             *_unpack(map(identifier, self.inputs[0]), "u"),
-            *_unpack([identifier(name) for name in self.plan.unknowns], "z"),
         ]
         if self.solved:
-            lines += ["    residual, iterations = 0.0, 0"]
+            lines += ["    half = 0.5 * s", "    residual, iterations = 0.0, 0"]
+            for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
+                lines += _unpack([f"{letter}{k}" for k in range(len(self.plan.unknowns))], source)
+            for k, name in enumerate(self.plan.unknowns):
+                lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
         for block in self.plan.blocks:
             lines += self._newton(writer, block) if block.unknowns else self._assigned(writer, block, "    ")
         z = _tuple(identifier(name) for name in self.plan.unknowns)
@@ -138,8 +143,16 @@ class _Emitter:
             f"det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
         )
         values = _tuple(self.exports)
-        summary = "residual, iterations" if self.solved else "0.0, 0"
+        summary = f"residual, iterations, {self._moved()}" if self.solved else "0.0, 0, 0.0"
         return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
+
+    def _moved(self) -> str:
+        """The largest correction of a prediction, in radians and sizes."""
+        moves = []
+        for k, name in enumerate(self.plan.unknowns):
+            move = f"abs({identifier(name)} - p{k})"
+            moves.append(move if name.endswith(".phi") else f"{move} / {self.plan.size!r}")
+        return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
 
     def _assigned(self, writer: Writer, block: Block, indent: str) -> list[str]:
         lines = []
@@ -222,20 +235,38 @@ class _Emitter:
     def _stage(self, name: str, docstring: str, arguments: Sequence[str], order: int) -> list[str]:
         """A function that returns all outputs at one order of derivative."""
         targets = [motion[1 + order] for motion in self.plan.outputs_motion]
-        unpacked = {
-            "ud": self.inputs[1],
-            "udd": self.inputs[2],
-            "zd": [derivative_name(unknown, 1) for unknown in self.plan.unknowns],
-            "zdd": [derivative_name(unknown, 2) for unknown in self.plan.unknowns],
-        }
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
-        for argument in arguments[1:]:
-            lines += _unpack(map(identifier, unpacked[argument]), argument)
+        for argument, names in (("ud", self.inputs[1]), ("udd", self.inputs[2])):
+            if argument in arguments:
+                lines += _unpack(map(identifier, names), argument)
+        if order:
+            lines += self._chained(order)
         writer = Writer(self.names, reachable(self.position_nodes))
         body = self._defined(writer, targets, self._definitions(targets), set()) + writer.statements(targets)
         returned = _tuple(writer.expression(node) for node in targets)
         self._import(writer)
         return [*lines, *_indented(body), f"    return {returned}", ""]
+
+    def _chained(self, order: int) -> list[str]:
+        """Rates (and accelerations, of order 2) of the unknowns from `first` (and `second`).
+
+        With one driver by the chain rule: zd = z' ud, zdd = z'' ud^2 + z' udd.
+        """
+        rates, accelerations = (
+            [identifier(derivative_name(unknown, k)) for unknown in self.plan.unknowns] for k in (1, 2)
+        )
+        if len(self.plan.drivers) != 1:
+            lines = _unpack(rates, "first")
+            return lines if order == 1 else lines + _unpack(accelerations, "second")
+        speed, more = identifier(self.inputs[1][0]), identifier(self.inputs[2][0])
+        lines = _unpack([f"d{k}" for k in range(len(rates))], "first")
+        lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
+        if order == 2:
+            lines += _unpack([f"a{k}" for k in range(len(rates))], "second")
+            lines += [
+                f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)
+            ]
+        return lines
 
     def _watches(self) -> list[str]:
         writer = Writer(self.names, reachable(self.position_nodes))

@@ -21,16 +21,18 @@ def identifier(name: str) -> str:
 class Names:
     """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order."""
 
-    def __init__(self) -> None:
+    def __init__(self, reserved: Iterable[str] = ()) -> None:
         self._numbered: dict[Node, str] = {}
+        self._reserved = {identifier(name) for name in reserved}
         self._count = 0
 
     def of(self, node: Node) -> str:
         if node.op == "symbol":
             return identifier(node.name)
         if node not in self._numbered:
-            if node.op in ("sin", "cos") and node.args[0].op == "symbol":
-                self._numbered[node] = f"{node.op}_{identifier(node.args[0].name)}"
+            spoken = f"{node.op}_{identifier(node.args[0].name)}" if node.args[0].op == "symbol" else ""
+            if node.op in ("sin", "cos") and spoken and spoken not in self._reserved:
+                self._numbered[node] = spoken
             else:
                 self._count += 1
                 self._numbered[node] = f"t{self._count}"
