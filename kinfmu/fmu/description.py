@@ -58,7 +58,7 @@ def write(description: Description, capabilities: Mapping[str, bool]) -> bytes:
         numberOfEventIndicators="0",
     )
     flags = {name: _text(flag) for name, flag in capabilities.items()}
-    SubElement(root, "CoSimulation", modelIdentifier=description.model_identifier, **flags)
+    SubElement(root, "CoSimulation", {"modelIdentifier": description.model_identifier, **flags})
     _units(root, interface)
     _status_type(root)
     categories = SubElement(root, "LogCategories")
@@ -72,7 +72,8 @@ def write(description: Description, capabilities: Mapping[str, bool]) -> bytes:
         _variable(variables, variable, references)
     _structure(root, interface, references)
     ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
+    text = ET.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def _text(value: float | bool) -> str:

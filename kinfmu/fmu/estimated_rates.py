@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
-
-class Sample(NamedTuple):
-    """The driver values u at a communication point t [s]."""
-
-    t: float
-    u: tuple[float, ...]
+Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
 
 
 def estimated_rates(
@@ -34,11 +28,7 @@ def estimated_rates(
     if count == 1:
         return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = earlier[count - 2]
-    h1 = t1 - t0
-    speeds, accelerations = [], []
-    for k in range(len(u)):
-        d2 = (u[k] - u1[k]) / h2
-        acceleration = 2.0 * (d2 - (u1[k] - u0[k]) / h1) / (h1 + h2)
-        speeds.append(d2 + 0.5 * acceleration * h2)
-        accelerations.append(acceleration)
-    return tuple(speeds), tuple(accelerations)
+    h1, h, half = t1 - t0, 0.5 * (t - t0), 0.5 * h2
+    slopes = [(u[k] - u1[k]) / h2 for k in range(len(u))]
+    accelerations = tuple([(slopes[k] - (u1[k] - u0[k]) / h1) / h for k in range(len(u))])
+    return tuple([slopes[k] + half * accelerations[k] for k in range(len(u))]), accelerations

@@ -96,7 +96,7 @@ def _times(interface: Interface, start: float | None, stop: float | None, step: 
             "a run needs finite times, start <= stop and a positive step"
         )
     count = int((last - first) / h + LAST_STEP)
-    t = first + h * np.arange(count + 1)
+    t: NDArray[np.float64] = first + h * np.arange(count + 1, dtype=np.float64)
     if last - t[-1] > LAST_STEP * h:
         return np.append(t, last)
     t[-1] = last

@@ -121,12 +121,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Sequence[float]
     ) -> tuple[Row, Row, Row]:
         """u, ud, udd with estimates for the rates that are not wired."""
-        wired = self._wired
-        ud, udd = estimated_rates(earlier, t, u)
+        wired, values = self._wired, tuple(u)
+        if len(wired) == 2 * len(values):
+            return values, tuple(inputs[1::3]), tuple(inputs[2::3])
+        ud, udd = estimated_rates(earlier, t, values)
         if wired:
             ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
             udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
-        return tuple(u), ud, udd
+        return values, ud, udd
 
     def _committed_drive(self) -> tuple[Row, Row, Row]:
         """u, ud, udd at the last commit, where the last good values stem from; at rest in the anchor before it."""
@@ -210,18 +212,19 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """Work out once how a list of Real value references is read."""
         places = [self._references.real(vr) for vr in vrs]
         parts = sorted({part for part, _ in places if part is not None})
-        offsets, width = {}, 0
+        offsets: dict[int, int] = {}
+        width = 0
         for part in parts:
             offsets[part] = width
             width += len(self.layout.parts[part].variables)
         readers: list[Callable[[], Row]] = [getattr(self, f"_read_{self.layout.parts[part].name}") for part in parts]
         indices = []
-        for vr, (part, place) in zip(vrs, places, strict=True):
-            if part is None:
+        for vr, (found, place) in zip(vrs, places, strict=True):
+            if found is None:
                 self.log(f"value reference {vr} is not a Real variable of this FMU", Fmi2Status.error)
                 indices.append(width)
             else:
-                indices.append(offsets[part] + place)
+                indices.append(offsets[found] + place)
         if width in indices:
             readers.append(_no_number)
         fetch = Fetch(tuple(readers), _picker(indices))
@@ -233,8 +236,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     # Get
 
     def get_real(self, vrs: Sequence[int]) -> list[float]:
-        key = tuple(vrs)
         try:
+            key = tuple(vrs)
             fetch = self._fetches.get(key) or self._plan_fetch(key)
             row: Row = ()
             for read in fetch.parts:
@@ -242,7 +245,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return list(fetch.pick(row))
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
-            return [NOT_A_NUMBER] * len(key)
+            return [NOT_A_NUMBER] * len(vrs)
 
     def get_integer(self, vrs: Sequence[int]) -> list[int]:
         values = []
@@ -283,22 +286,23 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self._inputs
-        for vr, value in zip(vrs, values, strict=True):
-            if 0 <= vr < len(inputs) and value - value == 0.0:  # an input, which come first, and a finite number
-                if value != inputs[vr]:
-                    inputs[vr] = value
-                    if vr % 3 == 0:
-                        self._pose = self._values = None
-                    elif value != 0.0:
-                        self._wired.add(vr)
-                    if self._driven_by_time:
-                        self._stray = self.layout.parts[0].variables[vr]
-                self._touched = True
-                self._forget_rates()
-                if self._refused:
-                    self._refused.pop(self.layout.parts[0].variables[vr], None)
-            else:
+        for k, vr in enumerate(vrs):
+            value = values[k]
+            if not (0 <= vr < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
                 self._set_other_real(vr, value)
+                continue
+            if value != inputs[vr]:
+                inputs[vr] = value
+                if vr % 3 == 0:
+                    self._pose = self._values = None
+                elif value != 0.0:
+                    self._wired.add(vr)
+                if self._driven_by_time:
+                    self._stray = self._references.name(vr)
+            if self._refused:
+                self._refused.pop(self._references.name(vr), None)
+            self._touched = True
+        self._forget_rates()
 
     def _set_other_real(self, vr: int, value: float) -> None:
         """Parameters, which are set rarely, and what is refused."""
@@ -406,16 +410,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
         """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
-        if self._history and not self._touched and abs(current_time - self._history[-1].t) <= SAME_TIME * step_size:
+        if self._history and not self._touched and abs(current_time - self._history[-1][0]) <= SAME_TIME * step_size:
             return self._committed
         u, _, _ = self.model.drive(current_time, self._constants)
         return self._solver.solve(self._committed, u)
 
     def _commit(self, pose: Pose, t: float) -> None:
         earlier = self._history
-        while earlier and earlier[-1].t >= t:  # the host went back
+        while earlier and earlier[-1][0] >= t:  # the host went back
             earlier = earlier[:-1]
-        self._history = (*earlier[-2:], Sample(t, pose.u))
+        self._history = (*earlier[-2:], (t, pose.u))
         self._committed = pose
         self._committed_inputs = tuple(self._inputs)
         self._touched = False
@@ -441,7 +445,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "stray": [self._stray, self._stray_reported],
             "committed": self._solver.dump(self._committed),
             "committed_inputs": list(self._committed_inputs),
-            "history": [[sample.t, list(sample.u)] for sample in self._history],
+            "history": [[t, list(u)] for t, u in self._history],
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
@@ -461,7 +465,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._solver = Solver(self.model, tolerance=self._tolerance)
         self._committed = self._solver.restore(state["committed"])
         self._committed_inputs = tuple(state["committed_inputs"])
-        self._history = tuple(Sample(t, tuple(u)) for t, u in state["history"])
+        self._history = tuple((t, tuple(u)) for t, u in state["history"])
         self._forget()
 
     @staticmethod

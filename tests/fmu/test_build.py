@@ -26,7 +26,8 @@ import sys
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 about = read_model_description(sys.argv[1])
-slave = FMU2Slave(guid=about.guid, modelIdentifier=about.coSimulation.modelIdentifier, unzipDirectory=extract(sys.argv[1]))
+identifier = about.coSimulation.modelIdentifier
+slave = FMU2Slave(guid=about.guid, modelIdentifier=identifier, unzipDirectory=extract(sys.argv[1]))
 slave.instantiate()
 slave.setupExperiment(startTime=0.0)
 slave.enterInitializationMode()

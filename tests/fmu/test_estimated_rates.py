@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.fmu.estimated_rates import Sample, estimated_rates
+from kinfmu.fmu.estimated_rates import estimated_rates
 from tests.fmu.host import Host
 
 
@@ -75,12 +75,12 @@ coefficients = st.floats(-5.0, 5.0)
 def test_parabola_is_met_exactly_on_any_grid(h1: float, h2: float, a: float, b: float, c: float) -> None:
     t = (0.0, h1, h1 + h2)
     u = [a + b * x + c * x * x for x in t]
-    (speed,), (acceleration,) = estimated_rates([Sample(t[0], (u[0],)), Sample(t[1], (u[1],))], t[2], (u[2],))
+    (speed,), (acceleration,) = estimated_rates([(t[0], (u[0],)), (t[1], (u[1],))], t[2], (u[2],))
     assert speed == pytest.approx(b + 2 * c * t[2], abs=1e-9)
     assert acceleration == pytest.approx(2 * c, abs=1e-7)
 
 
 def test_one_sample_gives_rest_two_give_a_slope_and_samples_of_the_future_do_not_count() -> None:
     assert estimated_rates([], 1.0, (3.0,)) == ((0.0,), (0.0,))
-    assert estimated_rates([Sample(0.5, (2.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
-    assert estimated_rates([Sample(0.5, (2.0,)), Sample(1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
+    assert estimated_rates([(0.5, (2.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
+    assert estimated_rates([(0.5, (2.0,)), (1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))

@@ -14,6 +14,14 @@ Start = Callable[..., Host]
 COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
 
 
+def _counting(run: Callable[..., object], name: str, calls: dict[str, int]) -> Callable[..., object]:
+    def counting(*args: object) -> object:
+        calls[name] = calls.get(name, 0) + 1
+        return run(*args)
+
+    return counting
+
+
 def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     """How often the slave's solver is called from here on; its modules are those inside the FMU."""
     import sys
@@ -27,14 +35,7 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     assert solver is not Solver
     calls: dict[str, int] = {}
     for method in ("solve", "outputs", "rates", "accelerations", "errors", "diagnostics"):
-
-        def counting(
-            self: object, *args: object, _run: Callable[..., object] = getattr(solver, method), _name: str = method
-        ) -> object:
-            calls[_name] = calls.get(_name, 0) + 1
-            return _run(self, *args)
-
-        monkeypatch.setattr(solver, method, counting)
+        monkeypatch.setattr(solver, method, _counting(getattr(solver, method), method, calls))
     return calls
 
 

@@ -158,7 +158,7 @@ def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     before = list(sys.path)
     simulate(pendulum, stop=3.0)
-    with pytest.raises(FmuError, match="range|holds"):
+    with pytest.raises(FmuError, match="holds"):
         simulate(pendulum, inputs={"time": [0.0], "crank_angle": [5.0]})
     assert list(folder.iterdir()) == []
     assert sys.path == before
