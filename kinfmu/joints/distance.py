@@ -4,9 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Joint, Placement, PointPair, body_of
 from kinfmu.units import Length
+
+SHORTEST = 1e-30  # [length]; squares of anything shorter run out of digits
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,10 @@ class Distance(Joint):
     length: Length
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.length) and self.length > 0.0):
-            raise ValueError(f"length = {self.length!r} must be a positive number")
+        if not self.length >= SHORTEST:  # NaN too
+            raise MechanismError(
+                f"[joints.{self.name}] length = {self.length!r} must be a positive number", joint=self.name
+            )
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(body_of(point) for point in self.between)
@@ -43,4 +48,4 @@ class Distance(Joint):
         return (2.0 * self.length,)
 
     def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
-        return (math.sqrt(max(residual[0] + self.length**2, 0.0)) - self.length,)
+        return (math.sqrt(max(residual[0] + self.length * self.length, 0.0)) - self.length,)

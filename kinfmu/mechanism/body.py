@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple
+
+from kinfmu.errors import MechanismError
 
 GROUND_NAME = "ground"
 
@@ -38,9 +40,16 @@ class Body:
     start: Start = Start()
 
     def __post_init__(self) -> None:
-        points = {name: Point(float(x), float(y)) for name, (x, y) in self.points.items()}
+        points = {name: self._point(name, point) for name, point in self.points.items()}
         object.__setattr__(self, "points", MappingProxyType(points))
         object.__setattr__(self, "start", Start(*self.start))
+
+    def _point(self, name: str, point: Iterable[float]) -> Point:
+        try:
+            x, y = point
+            return Point(float(x), float(y))
+        except (TypeError, ValueError, OverflowError):
+            raise MechanismError(f"[bodies.{self.name}] points.{name} = {point!r} must be two numbers [x, y]") from None
 
     @property
     def is_ground(self) -> bool:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
 from kinfmu.joints.joint import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
-from kinfmu.units import METRES
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_line, check_name, check_number
+from kinfmu.units import METRES, Quantity
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 COORDINATES = ("x", "y", "phi")
 
 
@@ -30,8 +29,7 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         for key in ("start", "stop", "step"):
-            if not math.isfinite(getattr(self, key)):
-                raise MechanismError(f"[run] {key} = {getattr(self, key)!r} must be a finite number of seconds")
+            check_number(f"[run] {key}", getattr(self, key))
         if self.step <= 0.0:
             raise MechanismError(f"[run] step = {self.step!r} must be positive")
         if self.stop < self.start:
@@ -89,10 +87,10 @@ def _check(mechanism: Mechanism) -> None:
     """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
     if mechanism.length_unit not in METRES:
         raise MechanismError(
-            f"[units] length = '{mechanism.length_unit}' is not a unit of length; known: {listed(METRES)}"
+            f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length; known: {listed(METRES)}"
         )
-    if not _NAME.match(mechanism.name):
-        raise MechanismError(f"name = '{mechanism.name}' must be letters, digits and underscores, no digit first")
+    check_name("name =", mechanism.name)
+    check_line("title", mechanism.title)
     tables: dict[str, Iterable[Body | Joint | Driver]] = {
         "bodies": mechanism.bodies,
         "joints": mechanism.joints,
@@ -105,9 +103,9 @@ def _check(mechanism: Mechanism) -> None:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in mechanism.bodies:
         _check_numbers(body)
-    points = mechanism.body_points
-    for member in (*mechanism.joints, *mechanism.drivers):
-        _check_references(mechanism, member, points)
+    members: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
+    for member in members:
+        _check_references(mechanism, member)
     for name, target in mechanism.points.items():
         _check_point(mechanism, f"[points] {name}", target)
         if any(name == body.name for body in mechanism.bodies):
@@ -115,15 +113,15 @@ def _check(mechanism: Mechanism) -> None:
     if isinstance(mechanism.coordinates, str):
         if mechanism.coordinates not in ("moving", "all"):
             raise MechanismError(
-                f"[outputs] coordinates = '{mechanism.coordinates}' must be 'moving', 'all' or a list of names"
+                f"[outputs] coordinates = {quoted(mechanism.coordinates)} must be 'moving', 'all' or a list of names"
             )
     else:
         known = mechanism.coordinate_names
         for name in mechanism.coordinates:
             if name not in known:
                 raise MechanismError(
-                    f"[outputs] coordinates: '{name}' is no coordinate of this mechanism{suggestion(name, known)}; "
-                    f"coordinates: {listed(known)}"
+                    f"[outputs] coordinates: {quoted(name)} is no coordinate of this mechanism"
+                    f"{suggestion(name, known)}; coordinates: {listed(known)}"
                 )
         if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
             raise MechanismError("[outputs] coordinates names a coordinate twice")
@@ -132,8 +130,7 @@ def _check(mechanism: Mechanism) -> None:
 def _check_names(table: str, names: Iterable[str]) -> None:
     seen: set[str] = set()
     for name in names:
-        if not _NAME.match(name):
-            raise MechanismError(f"[{table}] '{name}' must be letters, digits and underscores, no digit first")
+        check_name(f"[{table}]", name)
         if name in seen:
             raise MechanismError(f"[{table}] '{name}' is there twice")
         seen.add(name)
@@ -141,35 +138,29 @@ def _check_names(table: str, names: Iterable[str]) -> None:
 
 def _check_numbers(body: Body) -> None:
     for name, point in body.points.items():
-        if not _NAME.match(name):
-            raise MechanismError(f"[bodies.{body.name}] points: '{name}' must be letters, digits and underscores")
-        if not all(map(math.isfinite, point)):
-            raise MechanismError(f"[bodies.{body.name}] points.{name} = {list(point)} must be two finite numbers")
+        check_name(f"[bodies.{body.name}] points", name)
+        for value in point:
+            check_number(f"[bodies.{body.name}] points.{name}", value)
     for key, value in body.start._asdict().items():
-        if value is not None and not math.isfinite(value):
-            raise MechanismError(f"[bodies.{body.name}] start.{key} = {value!r} must be a finite number")
+        if value is not None:
+            check_number(f"[bodies.{body.name}] start.{key}", value)
     if body.is_ground and any(value is not None for value in body.start):
         raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
 
 
-def _check_references(mechanism: Mechanism, member: Joint | Driver, points: Mapping[str, object]) -> None:
+def _check_references(mechanism: Mechanism, member: Joint | Driver) -> None:
     table = "joints" if isinstance(member, Joint) else "drivers"
     hints = get_type_hints(type(member), include_extras=True)
     for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
         where, value = f"[{table}.{member.name}] {key.name}", getattr(member, key.name)
-        for reference in getattr(hints[key.name], "__metadata__", ()):
-            if not isinstance(reference, Reference):
-                continue
-            values = value if isinstance(value, tuple) else (value,)
-            for one in values:
-                if reference.kind == "point":
-                    _check_point(mechanism, where, one)
-                elif reference.kind == "body":
-                    _check_body(mechanism, where, one)
-                elif one not in reference.choices:
-                    raise MechanismError(f"{where} = '{one}' must be one of {listed(reference.choices)}")
-        if isinstance(value, float | int) and not math.isfinite(value):
-            raise MechanismError(f"{where} = {value!r} must be a finite number")
+        for said in getattr(hints[key.name], "__metadata__", ()):
+            if isinstance(said, Quantity):
+                check_number(where, value)
+            elif isinstance(said, Reference):
+                _check_reference(mechanism, where, value, said, is_pair=hints[key.name].__origin__ is not str)
+    if isinstance(member, Driver):
+        for constant in member.law.orders:
+            check_number(f"[{table}.{member.name}] {constant}", getattr(member.law, constant))
     bodies = member.bodies()
     if len(bodies) > 1 and len(set(bodies)) == 1:
         raise MechanismError(f"[{table}.{member.name}] joins body '{bodies[0]}' to itself")
@@ -177,21 +168,36 @@ def _check_references(mechanism: Mechanism, member: Joint | Driver, points: Mapp
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
+def _check_reference(mechanism: Mechanism, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:
+    if is_pair and not (isinstance(value, tuple) and len(value) == 2):
+        raise MechanismError(f"{where} = {quoted(value)} must be two points, ('body.point', 'body.point')")
+    for one in value if is_pair else (value,):
+        if not isinstance(one, str):
+            raise MechanismError(f"{where} = {quoted(one)} must be text")
+        if reference.kind == "point":
+            _check_point(mechanism, where, one)
+        elif reference.kind == "body":
+            _check_body(mechanism, where, one)
+        elif one not in reference.choices:
+            raise MechanismError(f"{where} = {quoted(one)} must be one of {listed(reference.choices)}")
+
+
 def _check_body(mechanism: Mechanism, where: str, name: str) -> None:
     names = [body.name for body in mechanism.bodies]
     if name not in names:
         raise MechanismError(
-            f"{where}: body '{name}' is not in the mechanism{suggestion(name, names)}; bodies: {listed(names)}"
+            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, names)}; bodies: {listed(names)}"
         )
 
 
 def _check_point(mechanism: Mechanism, where: str, name: str) -> None:
     body_name, dot, point = name.partition(".")
     if not dot:
-        raise MechanismError(f"{where} = '{name}' must be 'body.point'")
+        raise MechanismError(f"{where} = {quoted(name)} must be 'body.point'")
     _check_body(mechanism, where, body_name)
     known = next(body for body in mechanism.bodies if body.name == body_name).points
     if point not in known:
         raise MechanismError(
-            f"{where}: body '{body_name}' has no point '{point}'{suggestion(point, known)}; its points: {listed(known)}"
+            f"{where}: body '{body_name}' has no point {quoted(point)}{suggestion(point, known)}; "
+            f"its points: {listed(known)}"
         )

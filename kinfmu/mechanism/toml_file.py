@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
@@ -14,6 +13,8 @@ from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_name, check_number
 from kinfmu.units import METRES, Quantity, factors
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
@@ -25,24 +26,28 @@ def read(path: str | Path) -> Mechanism:
     """The mechanism that a TOML file describes; MechanismError names the file, the table and the key at fault."""
     path = Path(path)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise MechanismError(f"{path}: {path.stat().st_size} bytes is no mechanism file (largest: {LARGEST_FILE})")
-        text = path.read_bytes().decode("utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)  # a device or a pipe has no size to ask for
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        raise MechanismError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    if len(content) > LARGEST_FILE:
+        raise MechanismError(f"{path}: too large for a mechanism file (largest: {LARGEST_FILE} bytes)")
+    try:
+        return parse(content.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
         raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
-    except OSError as error:
-        raise MechanismError(f"{path}: cannot be read ({error.strerror})") from None
-    return parse(text, str(path))
 
 
 def parse(text: str, where: str = "mechanism") -> Mechanism:
     """The mechanism that TOML text describes; `where` names the text in messages."""
     try:
-        return _mechanism(tomllib.loads(text.replace("\r\n", "\n")))
-    except tomllib.TOMLDecodeError as error:
-        raise MechanismError(f"{where}: not valid TOML: {error}") from None
+        document = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
         raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
+    except ValueError as error:  # tomllib's own, and Python's on a number of thousands of digits
+        raise MechanismError(f"{where}: not valid TOML: {error}") from None
+    try:
+        return _mechanism(document)
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
 
@@ -58,7 +63,9 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
     if isinstance(coordinates, list):
         coordinates = tuple(_text("[outputs] coordinates", name) for name in coordinates)
     elif not isinstance(coordinates, str):
-        raise MechanismError(f"[outputs] coordinates = {coordinates!r} must be 'moving', 'all' or a list of names")
+        raise MechanismError(
+            f"[outputs] coordinates = {quoted(coordinates)} must be 'moving', 'all' or a list of names"
+        )
     if "name" not in document:
         raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
     reader = _Reader(_checked_unit(unit))
@@ -69,7 +76,7 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
         bodies=tuple(reader.body(name, body) for name, body in _tables(document, "bodies")),
         joints=tuple(reader.joint(name, joint) for name, joint in _tables(document, "joints")),
         drivers=tuple(reader.driver(name, driver) for name, driver in _tables(document, "drivers")),
-        points={name: _text(f"[points] {name}", target) for name, target in _table(document, "points").items()},
+        points={name: _text(f"[points] {name}", target) for name, target in _named(document, "points")},
         coordinates=coordinates,
         run=reader.run(_table(document, "run")),
     )
@@ -78,7 +85,7 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
 def _checked_unit(unit: str) -> str:
     """The unit itself if it is one of length; Mechanism repeats this check for mechanisms written in Python."""
     if unit not in METRES:
-        raise MechanismError(f"[units] length = '{unit}' is not a unit of length; known: {listed(METRES)}")
+        raise MechanismError(f"[units] length = {quoted(unit)} is not a unit of length; known: {listed(METRES)}")
     return unit
 
 
@@ -91,35 +98,35 @@ class _Reader:
     def number(self, where: str, value: object, quantity: Quantity) -> float:
         """A number, or text such as '60 deg' with a unit of that quantity."""
         known = factors(quantity, self.length_unit)
+        valid = f"a number or text such as '{_example(quantity)}'" if known else "a number"
+        factor = 1.0
         if isinstance(value, str):
             digits, _, unit = value.strip().partition(" ")
-            try:
-                number = float(digits)
-            except ValueError:
-                valid = f"a number or text such as '{_example(quantity)}'" if known else "a number"
-                raise MechanismError(f"{where} = '{value}' must be {valid}") from None
             unit = unit.strip()
-            if unit not in known:
-                raise MechanismError(f"{where} = '{value}': unit '{unit}' must be one of {listed(known)}")
-            number *= known[unit]
-        elif isinstance(value, int | float) and not isinstance(value, bool):
             try:
-                number = float(value)
-            except OverflowError:
-                number = math.inf
+                written: float = float(digits)
+            except ValueError:
+                raise MechanismError(f"{where} = {quoted(value)} must be {valid}") from None
+            if unit not in known:
+                said = f"unit {quoted(unit)} must be one of" if unit else "text needs a unit, one of"
+                raise MechanismError(f"{where} = {quoted(value)}: {said} {listed(known)}")
+            factor = known[unit]
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            written = value
         else:
-            raise MechanismError(f"{where} = {value!r} must be a number")
-        if not math.isfinite(number):
-            raise MechanismError(f"{where} = {value!r} must be a finite number")
-        return number
+            raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
+        check_number(where, written)
+        check_number(where, written * factor)
+        return float(written) * factor
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
         where = f"[bodies.{name}]"
         _known_keys(where, table, ("points", "start"))
         points = {}
         for point, value in _subtable(where, table, "points").items():
+            check_name(f"{where} points", point)
             if not isinstance(value, list) or len(value) != 2:
-                raise MechanismError(f"{where} points.{point} = {value!r} must be two numbers [x, y]")
+                raise MechanismError(f"{where} points.{point} = {quoted(value)} must be two numbers [x, y]")
             points[point] = Point(*(self.number(f"{where} points.{point}", v, _LENGTH) for v in value))
         start = _subtable(where, table, "start")
         _known_keys(f"{where} start", start, ("x", "y", "phi"))
@@ -132,7 +139,7 @@ class _Reader:
         where = f"[joints.{name}]"
         cls = _chosen(where, table, "type", JOINTS)
         _known_keys(where, table, ("type", *_keys(cls)))
-        return _built(where, cls, {"name": name, **self.values(where, cls, table)})
+        return cls(name=name, **self.values(where, cls, table))
 
     def driver(self, name: str, table: Mapping[str, Any]) -> Driver:
         where = f"[drivers.{name}]"
@@ -145,8 +152,7 @@ class _Reader:
             for key, order in law.orders.items()
             if key in table
         }
-        values = {"name": name, "law": _built(where, law, constants), **self.values(where, cls, table, skip=("law",))}
-        return _built(where, cls, values)
+        return cls(name=name, law=law(**constants), **self.values(where, cls, table, skip=("law",)))
 
     def run(self, table: Mapping[str, Any]) -> RunSettings:
         _known_keys("[run]", table, ("start", "stop", "step"))
@@ -171,16 +177,9 @@ class _Reader:
                 values[key.name] = _text(spot, value)
             else:
                 if not isinstance(value, list) or len(value) != 2:
-                    raise MechanismError(f"{spot} = {value!r} must be two points ['body.point', 'body.point']")
+                    raise MechanismError(f"{spot} = {quoted(value)} must be two points ['body.point', 'body.point']")
                 values[key.name] = tuple(_text(spot, v) for v in value)
         return values
-
-
-def _built(where: str, cls: type, values: dict[str, Any]) -> Any:
-    try:
-        return cls(**values)
-    except ValueError as error:  # what a leaf checks about its own numbers
-        raise MechanismError(f"{where} {error}") from None
 
 
 def _keys(cls: type) -> list[str]:
@@ -194,7 +193,9 @@ def _chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[An
         raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
     word = _text(f"{where} {key}", table[key])
     if word not in known:
-        raise MechanismError(f"{where} {key} = '{word}' is not known{suggestion(word, known)}; known: {listed(known)}")
+        raise MechanismError(
+            f"{where} {key} = {quoted(word)} is not known{suggestion(word, known)}; known: {listed(known)}"
+        )
     return known[word]
 
 
@@ -202,34 +203,41 @@ def _known_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> N
     known = list(known)
     for key in table:
         if key not in known:
-            place = f"{where} {key}" if where else f"[{key}]" if isinstance(table[key], dict) else key
+            shown = key if key.isidentifier() and len(key) < 100 else quoted(key)
+            place = f"{where} {shown}" if where else f"[{shown}]" if isinstance(table[key], dict) else shown
             raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
 
 
 def _table(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     table = document.get(name, {})
     if not isinstance(table, dict):
-        raise MechanismError(f"{name} = {table!r} must be a table [{name}]")
+        raise MechanismError(f"{name} = {quoted(table)} must be a table [{name}]")
     return table
 
 
+def _named(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
+    for key, value in _table(document, name).items():
+        check_name(f"[{name}]", key)
+        yield key, value
+
+
 def _tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
-    for key, table in _table(document, name).items():
+    for key, table in _named(document, name):
         if not isinstance(table, dict):
-            raise MechanismError(f"[{name}] {key} = {table!r} must be a table [{name}.{key}]")
+            raise MechanismError(f"[{name}] {key} = {quoted(table)} must be a table [{name}.{key}]")
         yield key, table
 
 
 def _subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
     value = table.get(key, {})
     if not isinstance(value, dict):
-        raise MechanismError(f"{where} {key} = {value!r} must be a table")
+        raise MechanismError(f"{where} {key} = {quoted(value)} must be a table")
     return value
 
 
 def _text(where: str, value: object) -> str:
     if not isinstance(value, str):
-        raise MechanismError(f"{where} = {value!r} must be text")
+        raise MechanismError(f"{where} = {quoted(value)} must be text")
     return value
 
 
@@ -271,7 +279,7 @@ def text(mechanism: Mechanism) -> str:
 def _toml(value: object) -> str:
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped) + '"'
+        return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return repr(value)
+    return repr(float(value))  # type: ignore[arg-type]  # all else is a number; numpy's print their type

@@ -1,0 +1,30 @@
+"""Values as messages show them: on one line, shortened when long, as the engineer wrote them."""
+
+from __future__ import annotations
+
+import reprlib
+
+_LARGEST_WHOLE = 10**40  # whole numbers beyond are told by their size; Python refuses to print very long ones
+
+
+class _Quoter(reprlib.Repr):
+    """reprlib with room for a sentence, and the words of TOML."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = 100
+        self.maxlevel = 3
+
+    def repr_bool(self, x: bool, level: int) -> str:  # noqa: ARG002  the signature is reprlib's
+        return "true" if x else "false"
+
+    def repr_int(self, x: int, level: int) -> str:  # noqa: ARG002
+        return repr(x) if abs(x) < _LARGEST_WHOLE else f"a whole number of {x.bit_length()} bits"
+
+
+def quoted(value: object) -> str:
+    """'text' in quotes with its line breaks escaped, numbers and lists as they are; never longer than about a line."""
+    return _QUOTER.repr(value)
+
+
+_QUOTER = _Quoter()

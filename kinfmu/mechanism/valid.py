@@ -1,0 +1,44 @@
+"""What a name, a number and a line of text in a mechanism may be."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from numbers import Real
+from typing import Any
+
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.quoted import quoted
+
+LARGEST_NUMBER = 1e30  # lengths, angles, rates: products of a few of them stay far from overflow
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}\Z")
+
+
+def check_name(where: str, name: str) -> None:
+    """Raise a MechanismError unless `name` can be a name."""
+    if not _NAME.match(name):
+        rule = "must be letters, digits and underscores, no digit first, at most 100 in all"
+        raise MechanismError(f"{where} {quoted(name)} {rule}")
+
+
+def check_number(where: str, value: Any) -> None:
+    """Raise a MechanismError unless `value` is a finite number of a size that can be meant."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise MechanismError(f"{where} = {quoted(value)} must be a number")
+    if value != value or value in (math.inf, -math.inf):
+        raise MechanismError(f"{where} = {quoted(value)} must be a finite number")
+    if not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
+        raise MechanismError(f"{where} = {quoted(value)} is too large; numbers go up to {LARGEST_NUMBER:g}")
+
+
+def check_line(where: str, text: str) -> None:
+    """Raise a MechanismError unless `text` is one line that terminals, TOML and XML take."""
+    if not all(map(_is_text, text)):
+        raise MechanismError(f"{where} = {quoted(text)} must be one line of text without control characters")
+
+
+def _is_text(character: str) -> bool:
+    """False for control characters, line breaks, halves of a character (surrogates) and what is no character at all."""
+    is_none = ord(character) & 0xFFFE == 0xFFFE
+    return not is_none and unicodedata.category(character) not in ("Cc", "Cs", "Zl", "Zp")
