@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kinfmu import VERSION, gallery
-from kinfmu.errors import KinfmuError, listed, suggestion
+from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, listed, suggestion
 from kinfmu.units import Quantity, factors
 
 if TYPE_CHECKING:
@@ -20,24 +21,35 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 LONG_RUN = 2000  # samples from which a progress bar is worth a line
+TABLES = (".csv", ".parquet", ".npz")
+MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
 
 
-class _MechanismName(click.ParamType):
+class _MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
     """A gallery name or a .toml file; what does not exist is wrong usage, what is wrong in it the mechanism's fault."""
 
     name = "MECH"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         known = gallery.names()
-        if value in known or (str(value).endswith(".toml") and Path(value).is_file()):
+        if value in known or (str(value).endswith(".toml") and _exists(Path(value))):
             return str(value)
         if str(value).endswith(".toml"):
             self.fail(f"{value}: there is no such file", param, ctx)
         hint = suggestion(str(value), known)
-        return self.fail(f"'{value}' is not in the gallery{hint}; gallery: {listed(known)}; files end in .toml", param, ctx)
+        message = f"'{value}' is not in the gallery{hint}; gallery: {listed(known)}; files end in .toml"
+        return self.fail(message, param, ctx)
 
 
-class _Setting(click.ParamType):
+def _exists(path: Path) -> bool:
+    """True if something other than a folder is there; a name that no file can have is not there."""
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+class _Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
     """NAME=VALUE."""
 
     name = "NAME=VALUE"
@@ -51,7 +63,7 @@ class _Setting(click.ParamType):
         return name, text
 
 
-class _Range(click.ParamType):
+class _Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
     """A:B:X of numbers, with units where the quantity has any."""
 
     def __init__(self, quantity: Quantity, last: str) -> None:
@@ -59,14 +71,21 @@ class _Range(click.ParamType):
         self.last = last
         self.name = f"A:B:{last}"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float, float]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
         if isinstance(value, tuple):
             return value
         parts = str(value).split(":")
         if len(parts) != 3:
-            self.fail(f"'{value}' must be {self.name}, such as {'0deg:360deg:361' if self.last == 'N' else '0:1.5:0.01'}", param, ctx)
+            example = "0deg:360deg:361" if self.last == "N" else "0:1.5:0.01"
+            self.fail(f"'{value}' must be {self.name}, such as {example}", param, ctx)
+        third = Quantity("number") if self.last == "N" else self.quantity
         try:
-            numbers = [_number(part, self.quantity if k < 2 or self.last != "N" else Quantity("number")) for k, part in enumerate(parts)]
+            numbers = [
+                _number(part, quantity)
+                for part, quantity in zip(parts, (self.quantity, self.quantity, third), strict=True)
+            ]
         except ValueError as error:
             return self.fail(str(error), param, ctx)
         a, b, x = numbers
@@ -74,6 +93,8 @@ class _Range(click.ParamType):
             self.fail(f"'{value}': N = {parts[2]} must be a whole number of samples", param, ctx)
         if self.last == "STEP" and (x <= 0.0 or b < a):
             self.fail(f"'{value}' must run forwards with a positive step", param, ctx)
+        if (x if self.last == "N" else (b - a) / x) > MOST_SAMPLES:
+            self.fail(f"'{value}' asks for more than {MOST_SAMPLES} samples", param, ctx)
         return a, b, x
 
 
@@ -106,8 +127,17 @@ class _Group(click.Group):
         try:
             return super().invoke(ctx)
         except KinfmuError as error:
-            click.echo(f"kinfmu: {error}", err=True)
+            click.echo("kinfmu: " + " ".join(str(error).splitlines()), err=True)
             ctx.exit(1)
+
+
+@contextmanager
+def _about(mechanism: str) -> Iterator[None]:
+    """What is found wrong in a mechanism after its file was read is told with the file's name in front."""
+    try:
+        yield
+    except (MechanismError, AssemblyError) as error:
+        raise type(error)(f"{mechanism}: {error}", **error.data) from None
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -136,7 +166,7 @@ def new(mechanism: str, file: Path) -> None:
     """Write a commented starting FILE, from gallery mechanism MECH."""
     if file.suffix != ".toml":
         raise click.UsageError(f"{file}: a mechanism file ends in .toml")
-    if file.exists():
+    if _exists(file):
         raise KinfmuError(f"{file}: is there already; nothing was written")
     name = MECHANISM.convert(mechanism, None, None)
     source = gallery.folder() / name / "mechanism.toml" if name in gallery.names() else Path(name)
@@ -148,14 +178,16 @@ def new(mechanism: str, file: Path) -> None:
 
 
 @main.command()
-@click.argument("mechanism", type=MECHANISM)
+@click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("--json", "as_json", is_flag=True, help="Findings for programs.")
-@click.option("--matrices", is_flag=True, help="Jacobians at the start pose and the singular points, plain and row-reduced.")
+@click.option("--matrices", is_flag=True, help="Jacobians at the start pose and singular points.")
 def check(mechanism: str, as_json: bool, matrices: bool) -> None:
     """Mobility, redundant and contradicting constraints, plan, singular points and range."""
     from kinfmu.analysis import check as checked
 
-    report = checked(gallery.load(mechanism))
+    mech = gallery.load(mechanism)
+    with _about(mechanism):
+        report = checked(mech)
     if as_json:
         findings = report.as_json()
         if matrices and report.problem is None:
@@ -167,14 +199,19 @@ def check(mechanism: str, as_json: bool, matrices: bool) -> None:
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
     if report.problem is not None:
-        raise type(report.problem)(f"{mechanism}: {report.problem}")
+        with _about(mechanism):
+            raise report.problem
 
 
 @main.command()
-@click.argument("mechanism", type=MECHANISM)
-@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), required=True, help=".csv, .parquet or .npz.")
+@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@click.option(
+    "-o", "output", type=click.Path(dir_okay=False, path_type=Path), required=True, help=".csv, .parquet or .npz."
+)
 @click.option("--times", type=_Range(Quantity("time"), "STEP"), help="Times [s]; the file's run if nothing is said.")
-@click.option("--angle", type=_Range(Quantity("angle"), "N"), help="N values of the driver [rad], or such as 0deg:360deg:361.")
+@click.option(
+    "--angle", type=_Range(Quantity("angle"), "N"), help="N values of the driver [rad], or such as 0deg:360deg:361."
+)
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A law constant, such as crank.speed=2.0.")
 @click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
 @click.option("--engine", type=click.Choice(["auto", "python"]), default="auto", show_default=True)
@@ -193,29 +230,44 @@ def solve(
     from kinfmu.log import write_table
     from kinfmu.sweep import solve as solved
 
+    if output.suffix.lower() not in TABLES:
+        raise click.UsageError(f"-o {output}: a table ends in one of {listed(TABLES)}")
     if times and angle:
         raise click.UsageError("--times and --angle cannot both drive")
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
     parameters = _parameters(settings)
+    for name, value in parameters.items():
+        if isinstance(value, bool):
+            raise click.UsageError(f"--set {name}: a law constant is a number")
     if angle:
         if len(mech.drivers) != 1:
             raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
-        samples = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
-        run = solved(mech, parameters=parameters, outputs=wanted, engine=engine, **samples)
+        t = None
+        samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
     else:
         start, stop, step = times or (mech.run.start, mech.run.stop, mech.run.step)
-        run = solved(mech, steps(start, stop, step), parameters=parameters, outputs=wanted, engine=engine)
+        t, samples = steps(start, stop, step), {}
+    with _about(mechanism):
+        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, **samples)
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
     _fail_if_failed(run)
 
 
 @main.command()
-@click.argument("mechanism", type=MECHANISM)
+@click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Where to; <name>.fmu if nothing is said.")
-@click.option("--flavour", type=click.Choice(["python"]), default="python", show_default=True, help="What the FMU is made of.")
-@click.option("--drive", type=click.Choice(["time", "inputs"]), default="time", show_default=True, help="What drives at first: the file's law or the inputs.")
+@click.option(
+    "--flavour", type=click.Choice(["python"]), default="python", show_default=True, help="What the FMU is made of."
+)
+@click.option(
+    "--drive",
+    type=click.Choice(["time", "inputs"]),
+    default="time",
+    show_default=True,
+    help="What drives at first: the file's law or the inputs.",
+)
 @click.option("--outputs", help="Coordinates that the FMU shall have, with commas; all if nothing is said.")
 def build(mechanism: str, output: Path | None, flavour: str, drive: Any, outputs: str | None) -> None:
     """Build the FMU of a mechanism."""
@@ -223,7 +275,8 @@ def build(mechanism: str, output: Path | None, flavour: str, drive: Any, outputs
 
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    path = built(mech, output or _own_folder(mech), flavour=flavour, drive=drive, outputs=wanted)
+    with _about(mechanism):
+        path = built(mech, output or _own_folder(mech), flavour=flavour, drive=drive, outputs=wanted)
     click.echo(f"{path}: {path.stat().st_size / 1000.0:.0f} kB, FMI 2.0 co-simulation, driven by {drive}")
 
 
@@ -232,10 +285,21 @@ def build(mechanism: str, output: Path | None, flavour: str, drive: Any, outputs
 @click.option("--start", type=float, help="[s]; from the model if nothing is said, like stop and step.")
 @click.option("--stop", type=float, help="[s]")
 @click.option("--step", type=float, help="Communication step [s].")
-@click.option("--input", "inputs", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="CSV with time and inputs such as crank_angle.")
+@click.option(
+    "--input",
+    "inputs",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="CSV with time and inputs such as crank_angle.",
+)
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=2.0.")
-@click.option("--mcap", type=click.Path(dir_okay=False, path_type=Path), help="Record; logs/<name>.mcap if nothing is said.")
-@click.option("--rrd", type=click.Path(dir_okay=False, path_type=Path), help="Rerun recording; logs/<name>.rrd if nothing is said.")
+@click.option(
+    "--mcap", type=click.Path(dir_okay=False, path_type=Path), help="Record; logs/<name>.mcap if nothing is said."
+)
+@click.option(
+    "--rrd",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Rerun recording; logs/<name>.rrd if nothing is said.",
+)
 def simulate(
     model: str,
     start: float | None,
@@ -257,12 +321,19 @@ def simulate(
         fmu = Path(model)
         if fmu.suffix != ".fmu":
             mech = gallery.load(MECHANISM.convert(model, None, None))
-            fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
-        elif not fmu.is_file():
+            with _about(model):
+                fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
+        elif not _exists(fmu):
             raise click.UsageError(f"{fmu}: there is no such file")
         with _Progress() as progress:
             run = simulated(
-                fmu, start=start, stop=stop, step=step, inputs=inputs, parameters=_parameters(settings), progress=progress
+                fmu,
+                start=start,
+                stop=stop,
+                step=step,
+                inputs=inputs,
+                parameters=_parameters(settings),
+                progress=progress,
             )
     name = run.info.get("name") or fmu.stem
     logs = Path("logs")
@@ -282,8 +353,16 @@ def simulate(
 @main.command()
 @click.argument("run", type=click.Path(dir_okay=False, path_type=Path))
 @click.argument("other", required=False, type=click.Path(dir_okay=False, path_type=Path))
-@click.option("--save", type=click.Path(dir_okay=False, path_type=Path), help="Write the recording (.rrd) instead of opening the viewer.")
-@click.option("--screenshot", type=click.Path(dir_okay=False, path_type=Path), help="Take a picture (.png) with a viewer that needs no screen.")
+@click.option(
+    "--save",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the recording (.rrd) instead of opening the viewer.",
+)
+@click.option(
+    "--screenshot",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Take a picture (.png) with a viewer that needs no screen.",
+)
 @click.option("--at", type=float, help="Time of the picture [s].")
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
     """Open the Rerun viewer on RUN (.mcap), or on two runs compared."""
@@ -323,8 +402,10 @@ def steps(start: float, stop: float, step: float) -> Any:
     """start + k step up to stop, which is included where a step hits it."""
     import numpy as np
 
-    count = int((stop - start) / step + 1e-6)
-    return start + step * np.arange(count + 1)
+    count = (stop - start) / step + 1e-6
+    if count > MOST_SAMPLES:
+        raise KinfmuError(f"[run] {start:g} to {stop:g} s in steps of {step:g} s: more than {MOST_SAMPLES} samples")
+    return start + step * np.arange(int(count) + 1)
 
 
 def verdict(run: Run) -> str:

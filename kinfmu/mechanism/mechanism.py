@@ -103,8 +103,8 @@ def _check(mechanism: Mechanism) -> None:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in mechanism.bodies:
         _check_numbers(body)
-    members: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
-    for member in members:
+    constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
+    for member in constraining:
         _check_references(mechanism, member)
     for name, target in mechanism.points.items():
         _check_point(mechanism, f"[points] {name}", target)

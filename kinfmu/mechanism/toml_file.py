@@ -44,8 +44,10 @@ def parse(text: str, where: str = "mechanism") -> Mechanism:
         document = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
         raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
-    except ValueError as error:  # tomllib's own, and Python's on a number of thousands of digits
+    except tomllib.TOMLDecodeError as error:
         raise MechanismError(f"{where}: not valid TOML: {error}") from None
+    except ValueError:  # Python refuses whole numbers of thousands of digits
+        raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
     try:
         return _mechanism(document)
     except MechanismError as error:
@@ -61,7 +63,7 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
     _known_keys("[outputs]", outputs, ("coordinates",))
     coordinates = outputs.get("coordinates", "moving")
     if isinstance(coordinates, list):
-        coordinates = tuple(_text("[outputs] coordinates", name) for name in coordinates)
+        coordinates = tuple(_text("[outputs] coordinates", name, "text such as 'crank.phi'") for name in coordinates)
     elif not isinstance(coordinates, str):
         raise MechanismError(
             f"[outputs] coordinates = {quoted(coordinates)} must be 'moving', 'all' or a list of names"
@@ -76,7 +78,10 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
         bodies=tuple(reader.body(name, body) for name, body in _tables(document, "bodies")),
         joints=tuple(reader.joint(name, joint) for name, joint in _tables(document, "joints")),
         drivers=tuple(reader.driver(name, driver) for name, driver in _tables(document, "drivers")),
-        points={name: _text(f"[points] {name}", target) for name, target in _named(document, "points")},
+        points={
+            name: _text(f"[points] {name}", target, "text such as 'body.point'")
+            for name, target in _named(document, "points")
+        },
         coordinates=coordinates,
         run=reader.run(_table(document, "run")),
     )
@@ -139,7 +144,8 @@ class _Reader:
         where = f"[joints.{name}]"
         cls = _chosen(where, table, "type", JOINTS)
         _known_keys(where, table, ("type", *_keys(cls)))
-        return cls(name=name, **self.values(where, cls, table))
+        joint: Joint = cls(name=name, **self.values(where, cls, table))
+        return joint
 
     def driver(self, name: str, table: Mapping[str, Any]) -> Driver:
         where = f"[drivers.{name}]"
@@ -152,7 +158,8 @@ class _Reader:
             for key, order in law.orders.items()
             if key in table
         }
-        return cls(name=name, law=law(**constants), **self.values(where, cls, table, skip=("law",)))
+        driver: Driver = cls(name=name, law=law(**constants), **self.values(where, cls, table, skip=("law",)))
+        return driver
 
     def run(self, table: Mapping[str, Any]) -> RunSettings:
         _known_keys("[run]", table, ("start", "stop", "step"))
@@ -178,7 +185,7 @@ class _Reader:
             else:
                 if not isinstance(value, list) or len(value) != 2:
                     raise MechanismError(f"{spot} = {quoted(value)} must be two points ['body.point', 'body.point']")
-                values[key.name] = tuple(_text(spot, v) for v in value)
+                values[key.name] = tuple(_text(spot, v, "text such as 'body.point'") for v in value)
         return values
 
 
@@ -191,7 +198,7 @@ def _chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[An
     known = {cls.type: cls for cls in classes}
     if key not in table:
         raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
-    word = _text(f"{where} {key}", table[key])
+    word = _text(f"{where} {key}", table[key], f"one of {listed(known)}")
     if word not in known:
         raise MechanismError(
             f"{where} {key} = {quoted(word)} is not known{suggestion(word, known)}; known: {listed(known)}"
@@ -231,13 +238,14 @@ def _tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[
 def _subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
     value = table.get(key, {})
     if not isinstance(value, dict):
-        raise MechanismError(f"{where} {key} = {quoted(value)} must be a table")
+        example = "{ P = [1, 0] }" if key == "points" else "{ x = 0, y = 0, phi = 0 }"
+        raise MechanismError(f"{where} {key} = {quoted(value)} must be a table such as {example}")
     return value
 
 
-def _text(where: str, value: object) -> str:
+def _text(where: str, value: object, valid: str = "text") -> str:
     if not isinstance(value, str):
-        raise MechanismError(f"{where} = {quoted(value)} must be text")
+        raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     return value
 
 

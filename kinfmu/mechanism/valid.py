@@ -24,11 +24,12 @@ def check_name(where: str, name: str) -> None:
 
 def check_number(where: str, value: Any) -> None:
     """Raise a MechanismError unless `value` is a finite number of a size that can be meant."""
-    if not isinstance(value, Real) or isinstance(value, bool):
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number:
         raise MechanismError(f"{where} = {quoted(value)} must be a number")
     if value != value or value in (math.inf, -math.inf):
         raise MechanismError(f"{where} = {quoted(value)} must be a finite number")
-    if not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
+    if abs(value) > LARGEST_NUMBER:
         raise MechanismError(f"{where} = {quoted(value)} is too large; numbers go up to {LARGEST_NUMBER:g}")
 
 
