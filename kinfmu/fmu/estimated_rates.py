@@ -28,7 +28,12 @@ def estimated_rates(
     if count == 1:
         return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = earlier[count - 2]
-    h1, h, half = t1 - t0, 0.5 * (t - t0), 0.5 * h2
-    slopes = [(u[k] - u1[k]) / h2 for k in range(len(u))]
-    accelerations = tuple([(slopes[k] - (u1[k] - u0[k]) / h1) / h for k in range(len(u))])
-    return tuple([slopes[k] + half * accelerations[k] for k in range(len(u))]), accelerations
+    h1 = t1 - t0
+    speeds: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+    for k, value in enumerate(u):  # grown one by one: for the one or two drivers there are, faster than a list
+        d2 = (value - u1[k]) / h2
+        acceleration = 2.0 * (d2 - (u1[k] - u0[k]) / h1) / (h1 + h2)
+        speeds += (d2 + 0.5 * acceleration * h2,)
+        accelerations += (acceleration,)
+    return speeds, accelerations

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of fmi2OK, Warning, Discard, Error, Fatal, Pending
-_DISCARD = 2
+_WARNING, _DISCARD = 1, 2
 
 
 def simulate(
@@ -61,6 +61,9 @@ def simulate(
         table = None if inputs is None else input_table(inputs, [v.name for v in interface.part("inputs")])
         chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
         samples = _Samples(interface, len(t))
+        if table is None and not _time_drives(interface, chosen):
+            samples.now = float(t[0])
+            samples.log(_WARNING, "driven by inputs, and none are given: the drivers stay at their start values")
         with _slave(about, folder, samples.log) as slave:
             _initialize(slave, interface, chosen, t)
             _step_through(slave, interface, samples, t, table, progress)
@@ -127,6 +130,11 @@ def _parameters(
     return chosen
 
 
+def _time_drives(interface: Interface, parameters: Mapping[str, float | bool]) -> bool:
+    (switch,) = interface.part("drive")
+    return bool(parameters.get(switch.name, switch.start))
+
+
 @contextmanager
 def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) -> Iterator[Any]:
     """fmpy's slave, instantiated; freed in the end, its traces in `sys.path` removed."""
@@ -148,7 +156,7 @@ def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) ->
             modelIdentifier=about.model_identifier,
             unzipDirectory=str(folder),
         )
-        _instantiate(slave, folder, _callbacks(logged))
+        _instantiate(slave, folder, fmi_callbacks(logged))
     except Exception as error:  # fmpy raises bare exceptions
         sys.path[:] = path_before
         raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
@@ -178,7 +186,7 @@ def _instantiate(slave: Any, folder: Path, callbacks: Any) -> None:
         raise FmuError("the slave did not start")
 
 
-def _callbacks(log: Callable[[int, str], None]) -> Any:
+def fmi_callbacks(log: Callable[[int, str], None]) -> Any:
     """FMI's callbacks: messages go to `log`, nothing to the terminal.
 
     Without fmpy's proxy for printf-like messages: it serves one logger in a process, and our FMUs send finished text.

@@ -19,11 +19,12 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import Sample, estimated_rates
-from kinfmu.solver import Pose, Solver
+from kinfmu.solver import Pose, Solver, Status
 
 Row = tuple[float, ...]
 
 NOT_A_NUMBER = math.nan
+LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 
@@ -149,14 +150,13 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _shown(self) -> tuple[Pose, Row, Row]:
         """The pose whose numbers are shown, with ud and udd: the one asked for, or the last good one."""
-        if self._sample is None:
-            pose = self._asked()
-            if pose.good:
-                _, ud, udd = self._driven()
-            else:
-                pose = self._committed
-                _, ud, udd = self._committed_drive()
-            self._sample = pose, ud, udd
+        pose = self._pose or self._asked()
+        if pose.status <= LAST_GOOD:
+            _, ud, udd = self._drive or self._driven()
+        else:
+            pose = self._committed
+            _, ud, udd = self._committed_drive()
+        self._sample = pose, ud, udd
         return self._sample
 
     # Parts of the list of variables, each computed when first read
@@ -166,19 +166,20 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _read_values(self) -> Row:
         if self._values is None:
-            pose = self._asked()
-            self._values = self._solver.outputs(pose if pose.good else self._committed)
+            pose = self._pose or self._asked()
+            self._values = self._solver.outputs(pose if pose.status <= LAST_GOOD else self._committed)
         return self._values
 
     def _read_rates(self) -> Row:
         if self._rates is None:
-            pose, ud, _ = self._shown()
+            pose, ud, _ = self._sample or self._shown()
             self._rates = self._solver.rates(pose, ud)
         return self._rates
 
     def _read_accelerations(self) -> Row:
         if self._accelerations is None:
-            self._accelerations = self._solver.accelerations(*self._shown())
+            pose, ud, udd = self._sample or self._shown()
+            self._accelerations = self._solver.accelerations(pose, ud, udd)
         return self._accelerations
 
     def _read_residual(self) -> Row:
@@ -189,7 +190,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _read_errors(self) -> Row:
         if self._errors is None:
-            self._errors = tuple(self._solver.errors(*self._shown()))
+            self._errors = tuple(self._solver.errors(*(self._sample or self._shown())))
         return self._errors
 
     def _read_watch(self) -> Row:
@@ -238,11 +239,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def get_real(self, vrs: Sequence[int]) -> list[float]:
         try:
             key = tuple(vrs)
-            fetch = self._fetches.get(key) or self._plan_fetch(key)
+            parts, pick = self._fetches.get(key) or self._plan_fetch(key)
             row: Row = ()
-            for read in fetch.parts:
+            for read in parts:
                 row += read()
-            return list(fetch.pick(row))
+            return list(pick(row))
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
             return [NOT_A_NUMBER] * len(vrs)

@@ -165,7 +165,9 @@ def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     assert capfd.readouterr() == ("", "")
 
 
-def test_inputs_flavour_without_inputs_stays_at_its_start(built: Callable[..., Path]) -> None:
+def test_fmu_driven_by_inputs_stays_at_its_start_without_any_and_says_so(built: Callable[..., Path]) -> None:
     run = simulate(built("double_pendulum", "inputs"), stop=0.3, step=0.1)
     assert run["upper.phi"] == pytest.approx(np.full(4, np.radians(300.0)))
     assert run["upper.omega"] == pytest.approx(np.zeros(4))
+    assert [event.level for event in run.events] == ["warning"]
+    assert "none are given" in run.events[0].text
