@@ -61,8 +61,8 @@ def driver_range(plan: SolvePlan) -> DriverRange | None:
             if not arrived.good:
                 break
             pose = arrived
-            for bridge in pose.bridges:
-                if isinstance(bridge, Bridge) and bridge.centre not in found:
+            for bridge in pose.road.bridges if pose.road else ():
+                if bridge.centre not in found:
                     found[bridge.centre] = _change_point(solver, bridge)
         limits.append(limit)
     points = sorted(found.values(), key=lambda point: point.value)
@@ -93,7 +93,7 @@ def _block(bridge: Bridge) -> int:
 
 
 def _determinant(solver: Solver, bridge: Bridge, u: float, block: int) -> float:
-    pose: Pose = bridge.pose(solver.model, (u,))
+    pose: Pose = bridge.pose((u,))
     return float(pose.determinants[block])
 
 

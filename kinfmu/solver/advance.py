@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .bridge import HALF_WIDTH, REGULAR, Bridge, build, secant_zero, zero_near
-from .pose import ALONE, Model, Pose, Vector, corrected, failed
+from .bridge import HALF_WIDTH, REGULAR, build, secant_zero, zero_near
+from .pose import ALONE, Model, Pose, Vector, directed, failed, on_road
+from .road import Blocked, Road, bridge_ahead
 from .status import Status
 
 LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
-TRUSTED = 0.1  # largest correction of a prediction, over the determinant: other branches lie about a determinant away
+TRUST = 10.0  # a correction of the prediction must be this much smaller than the determinants: so far off lie branches
 FALL = 0.3  # a step may not bring a determinant below this part of what it was
 SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near and its place is extrapolated
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
-_BRIDGES_KEPT = 4
 
 
 class Limit(NamedTuple):
@@ -23,13 +23,6 @@ class Limit(NamedTuple):
 
     u: Vector
     block: int
-
-
-class Blocked(NamedTuple):
-    """A place that no bridge leads over: a dead centre, or branches that only come close."""
-
-    low: float
-    high: float
 
 
 def advance(model: Model, start: Pose, target: Vector) -> Pose:
@@ -52,33 +45,38 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     """
     one = len(target) == 1
     direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
-    longest = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
+    longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
     pose, step, iterations = start, longest, 0
     before, limit = start, None
     while True:
         if one:
-            bridge = _in_the_way(pose, target[0]) if pose.bridges else None
-            if bridge is not None:
-                if bridge.covers(target[0]):
-                    return _across(model, bridge, pose, target)
-                pose = _carried(bridge.exit(target[0]), pose.bridges)
+            if pose.road is not None:
+                bridge = bridge_ahead(pose, target[0])
+                if bridge is not None:
+                    road = pose.road
+                    if bridge.covers(target[0]):
+                        pose = bridge.pose(target)
+                        pose.road = road
+                        return pose
+                    pose = on_road(bridge.exit(target[0]), road)
             distance = target[0] - pose.u[0]
             if distance == 0.0:
                 return pose
-        whole = abs(distance) <= step
+        whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
         u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
         trial = _step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
-            if one and trial.margin() < REGULAR:
-                bridges = _bridged(model, pose, trial)
-                if bridges is not None:
-                    pose = _carried(pose, bridges)
+            margin = trial.margin()
+            if margin < REGULAR and one:
+                road = _road_at(model, pose, trial)
+                if road is not trial.road:
+                    pose = on_road(pose, road)
                     continue
             if whole:
                 trial.iterations = iterations
-                if trial.margin() < NEAR_SINGULAR:
+                if margin < NEAR_SINGULAR:
                     trial.status = Status.NEAR_SINGULAR
                 return trial
             before, pose = pose, trial
@@ -101,73 +99,42 @@ def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]
 
 def _step(model: Model, pose: Pose, direction: Vector, s: float, u: Vector) -> Pose | None:
     """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
-    trial = corrected(model, u, pose, direction, s)
-    if trial is None:
+    zd, zdd = pose.tangent or directed(model, pose, direction)
+    try:
+        trial = Pose(u, model.position(u, pose.z, zd, zdd, s), pose.road)
+    except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
-    allowed = trial.moved / TRUSTED
+    needed = TRUST * trial.moved
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
-        falls = abs(after) < FALL * abs(before)
-        if before * after <= 0.0 or falls or allowed > abs(before) or allowed > abs(after):
+        if before < 0.0:
+            before, after = -before, -after
+        if after < FALL * before or after < needed or before < needed or after == 0.0:
             return None
     return trial
 
 
-def _in_the_way(pose: Pose, target: float) -> Bridge | None:
-    """The nearest known bridge on the way from a pose to the target, or the one that the pose stands on."""
-    if pose.bridge is not None:
-        return pose.bridge if pose.bridge.covers(pose.u[0]) else None
-    ahead = [b for b in pose.bridges if isinstance(b, Bridge) and b.between(pose.u[0], target)]
-    return min(ahead, key=lambda bridge: abs(bridge.centre - pose.u[0]), default=None) if ahead else None
-
-
-def _across(model: Model, bridge: Bridge, pose: Pose, target: Vector) -> Pose:
-    try:
-        found = bridge.pose(model, target)
-    except (ArithmeticError, ValueError):
-        return failed(pose, target, Status.NOT_CONVERGED, f"{place(model, target)}: the bridge there does not hold")
-    found.bridges = pose.bridges
-    return found
-
-
-def _carried(pose: Pose, bridges: tuple[Bridge | Blocked, ...]) -> Pose:
-    """A pose with the bridges known on its way."""
-    other = Pose(pose.u, pose.found(), bridges)
-    other._tangent = pose._tangent
-    return other
-
-
-def _bridged(model: Model, pose: Pose, trial: Pose) -> tuple[Bridge | Blocked, ...] | None:
-    """Known bridges and a new one, if the trial pose has come into the window of a singular point; None if not.
-
-    A place where no bridge holds is remembered as blocked, so that it is tried once.
+def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
+    """The road with what is new at a trial pose: a bridge, if it has come into the window of a singular point; a blocked
+    place, if no bridge holds there. The road as it was, if nothing is new.
     """
 
     def walk(start: Pose, u: float) -> Pose | None:
         return _plainly(model, start, u)
 
     reach: float = model.REACH[0]
+    known = trial.road or Road()
+    if known.knows(trial.u[0]):
+        return trial.road
     block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
-    known = trial.bridges
-    if any(_knows(place, trial.u[0]) for place in known):
-        return None
     far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * reach
     zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk, reach)
-    if zero is None or abs(zero - trial.u[0]) > 1.05 * HALF_WIDTH * reach:
-        return None
-    if any(_knows(place, zero) for place in known):
-        return None
-    bridge = build(model, pose, block, walk)
-    if bridge is None:
-        room = 2.0 * HALF_WIDTH * reach
-        trial.bridges = (*known, Blocked(zero - room, zero + room))[-_BRIDGES_KEPT:]
-        return None
-    return (*known, bridge)[-_BRIDGES_KEPT:]
-
-
-def _knows(place: Bridge | Blocked, u: float) -> bool:
-    if isinstance(place, Blocked):
-        return place.low <= u <= place.high
-    return abs(u - place.centre) <= place.half * 1.2
+    if zero is None or abs(zero - trial.u[0]) > 1.05 * HALF_WIDTH * reach or known.knows(zero):
+        return trial.road
+    bridge = build(model, pose, block, zero, walk)
+    if bridge is not None:
+        return known.with_bridge(bridge)
+    room = 2.0 * HALF_WIDTH * reach
+    return known.with_blocked(Blocked(zero - room, zero + room))
 
 
 def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
@@ -176,7 +143,7 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
     pose, step = start, longest
     while pose.u[0] != u:
         distance = u - pose.u[0]
-        whole = abs(distance) <= step
+        whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
         trial = _step(model, pose, ALONE, s, (u,) if whole else (pose.u[0] + s,))
         if trial is not None:

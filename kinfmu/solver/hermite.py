@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 Samples = tuple[float, float, float]  # f, f', f'' at a node
 
 
@@ -42,3 +44,18 @@ class Hermite:
             slope = slope * d + value
             value = value * d + coefficient
         return value, slope, curve
+
+
+@lru_cache(maxsize=None)
+def weights(nodes: tuple[float, ...], x: float) -> tuple[Samples, ...]:
+    """What f, f' and f'' of each node count for the value of the interpolating polynomial at x."""
+    zero: Samples = (0.0, 0.0, 0.0)
+    unit: tuple[Samples, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    rows = []
+    for k in range(len(nodes)):
+        column = []
+        for one in unit:
+            samples = tuple(one if j == k else zero for j in range(len(nodes)))
+            column.append(Hermite(nodes, samples)(x)[0])
+        rows.append((column[0], column[1], column[2]))
+    return tuple(rows)

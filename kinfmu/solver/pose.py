@@ -7,96 +7,97 @@ from typing import Any
 from .status import Status
 
 Vector = tuple[float, ...]
+Model = Any  # a generated module: see kinfmu.backends.python.emit
+Found = tuple[Any, ...]  # what its `position` gives
+
 ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
 AT_REST: Vector = (0.0,)
-Model = Any  # a generated module: see kinfmu.backends.python.emit
 
 
 class Pose:
     """A value; what is derived from it is computed when first asked for.
 
     u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular; residual: largest,
-    relative to the size; moved: largest correction of the prediction, in radians and sizes; values: numbers of the
-    position stage that later stages use; held: bit a block whose z was interpolated; bridges: singular stretches met on
-    the way here. status and message: see Status.
+    relative to the size; moved: largest correction of the prediction, in radians and sizes; watch: largest residual of
+    the rows set aside, relative to the size; values: numbers of the position stage that later stages use. road: the
+    singular stretches known on the way here; bridge: the one that this pose was interpolated by. status and message:
+    see Status.
     """
 
     __slots__ = (
-        "_tangent",
         "bridge",
-        "bridges",
         "determinants",
-        "held",
         "iterations",
         "message",
         "moved",
         "residual",
+        "road",
         "status",
+        "tangent",
         "u",
         "values",
+        "watch",
         "z",
     )
 
-    def __init__(self, u: Vector, found: tuple[Any, ...], bridges: tuple[Any, ...] = ()) -> None:
+    def __init__(self, u: Vector, found: Found, road: Any = None) -> None:
         self.u = u
-        self.z, self.determinants, self.residual, self.iterations, self.moved, self.values = found
-        self.bridges = bridges
-        self.bridge: Any = None  # the Bridge that this pose was interpolated by
-        self.held = 0
-        self.status: int = Status.OK
+        self.z, self.determinants, self.residual, self.iterations, self.moved, self.watch, self.values = found
+        self.road = road  # None: nothing singular is known
+        self.bridge: Any = None
+        self.status: int = 0
         self.message = ""
-        self._tangent: tuple[Vector, Vector, Vector] | None = None
+        self.tangent: tuple[Vector, Vector] | None = None  # of a single driver: see tangent_of
 
     @property
     def good(self) -> bool:
         """True if the pose holds numbers."""
-        return self.status <= Status.BRIDGED
+        return self.status <= 2
 
     def margin(self) -> float:
         """Smallest |determinant| over the blocks: 1 far from singular, 0 at a singular point."""
         return min(map(abs, self.determinants), default=1.0)
 
-    def tangent(self, model: Model, direction: Vector) -> tuple[Vector, Vector]:
-        """First and second derivative of z when the drivers move at a steady rate: zd, zdd for ud = direction."""
-        cached = self._tangent
-        if cached is None or cached[0] != direction:
-            at_rest = (0.0,) * len(direction)
-            zd = model.velocity(self.values, direction)
-            cached = self._tangent = (direction, zd, model.acceleration(self.values, direction, at_rest, zd))
-        return cached[1], cached[2]
-
-    def with_tangent(self, direction: Vector, zd: Vector, zdd: Vector) -> Pose:
-        """The same pose with a tangent that is known already."""
-        self._tangent = (direction, zd, zdd)
-        return self
-
-
-    def found(self) -> tuple[Any, ...]:
+    def found(self) -> Found:
         """What `position` gave for this pose."""
-        return self.z, self.determinants, self.residual, self.iterations, self.moved, self.values
+        return self.z, self.determinants, self.residual, self.iterations, self.moved, self.watch, self.values
+
+
+def tangent_of(model: Model, pose: Pose) -> tuple[Vector, Vector]:
+    """First and second derivative of z with respect to the only driver."""
+    tangent = pose.tangent
+    if tangent is None:
+        tangent = pose.tangent = model.tangent(pose.values)
+    return tangent
+
+
+def directed(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vector]:
+    """First and second derivative of z on a straight way of the drivers."""
+    if len(direction) == 1:
+        return tangent_of(model, pose)
+    zd = model.velocity(pose.values, direction)
+    return zd, model.acceleration(pose.values, direction, (0.0,) * len(direction), zd)
 
 
 def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
     """A pose without numbers: what could not be reached from `start`, and why."""
-    pose = Pose(u, start.found(), start.bridges)
+    pose = Pose(u, start.found(), start.road)
     pose.status = status
     pose.message = message
     return pose
 
 
-def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> tuple[Any, ...]:
+def on_road(pose: Pose, road: Any) -> Pose:
+    """The same pose with other singular stretches known."""
+    other = Pose(pose.u, pose.found(), road)
+    other.tangent = pose.tangent
+    return other
+
+
+def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> Found:
     """What `position` gives for unknowns that are known: held blocks (all, if nothing is said) are not solved for.
 
     s = -0.0 at rest leaves z as it is, to the bit.
     """
     rest = (0.0,) * len(z)
     return tuple(model.position(u, z, rest, rest, -0.0, held))
-
-
-def corrected(model: Model, u: Vector, pose: Pose, direction: Vector, s: float) -> Pose | None:
-    """The pose that Newton finds at u from the second-order prediction a way s along the direction, or None."""
-    zd, zdd = pose.tangent(model, direction)
-    try:
-        return Pose(u, model.position(u, pose.z, zd, zdd, s), pose.bridges)
-    except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
-        return None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from .advance import Blocked, advance, place
-from .bridge import restored
+from .advance import advance, place
 from .linear import reciprocal_condition
-from .pose import ALONE, Model, Pose, Vector, evaluated, failed
+from .pose import Model, Pose, Vector, evaluated, failed, tangent_of
+from .road import laid
 from .status import Status
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
@@ -36,28 +36,29 @@ class Solver:
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
         pose = advance(self.model, start, u)
-        if pose.status <= Status.BRIDGED:
-            self._judge(pose)
+        tolerance = self.tolerance
+        if not (pose.residual <= tolerance and pose.watch <= tolerance) and pose.good:
+            self._reject(pose)
         return pose
 
-    def _judge(self, pose: Pose) -> None:
+    def _reject(self, pose: Pose) -> None:
         """A pose counts only if its rows close and the rows set aside as redundant hold too."""
         if not pose.residual <= self.tolerance:
             pose.status = Status.NOT_CONVERGED
             pose.message = f"{place(self.model, pose.u)}: residual {pose.residual:.2g} of the size is left"
-        for k, value in enumerate(self.model.watches(pose.values)):
-            if not abs(value) <= self.tolerance:
-                name = self.model.WATCHES[k]
-                pose.status = Status.INCONSISTENT
-                gap = abs(value) * self.model.SIZE
-                pose.message = (
-                    f"{place(self.model, pose.u)}: the redundant row {name} is open by {gap:.3g} {self.model.LENGTH_UNIT}"
-                )
+            return
+        open_rows = zip(self.model.WATCHES, self.watch(pose), strict=True)
+        name, value = max(open_rows, key=lambda row: abs(row[1]))
+        gap = abs(value) * self.model.SIZE
+        pose.status = Status.INCONSISTENT
+        pose.message = (
+            f"{place(self.model, pose.u)}: the redundant row {name} is open by {gap:.3g} {self.model.LENGTH_UNIT}"
+        )
 
     def _first(self, pose: Pose, ud: Vector) -> Vector:
         """What the model's rates start from: z' = dz/du with one driver, else zd."""
         if self._one:
-            return pose.tangent(self.model, ALONE)[0]
+            return tangent_of(self.model, pose)[0]
         return tuple(self.model.velocity(pose.values, ud))
 
     def outputs(self, pose: Pose) -> Vector:
@@ -72,7 +73,7 @@ class Solver:
         """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
         model = self.model
         if self._one:
-            first, second = pose.tangent(model, ALONE)
+            first, second = pose.tangent or tangent_of(model, pose)
         else:
             first = self._first(pose, ud)
             second = model.acceleration(pose.values, ud, udd, first)
@@ -118,26 +119,18 @@ class Solver:
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
-        bridges = [
-            ["blocked", list(bridge)] if isinstance(bridge, Blocked) else ["bridge", bridge.dump()]
-            for bridge in pose.bridges
-        ]
-        standing = next((k for k, bridge in enumerate(pose.bridges) if bridge is pose.bridge), -1)
-        own = pose.bridge.dump() if pose.bridge is not None and standing < 0 else None
-        return [list(pose.u), list(pose.z), pose.iterations, pose.status, pose.message, bridges, standing, own]
+        road = None if pose.road is None else pose.road.dump()
+        standing = -1 if pose.bridge is None else pose.road.bridges.index(pose.bridge)
+        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, road, standing]
 
     def restore(self, data: list[Any]) -> Pose:
         """The pose that was dumped."""
-        u, z, iterations, status, message, dumped, standing, own = data
-        bridges = tuple(
-            Blocked(*content) if kind == "blocked" else restored(self.model, content)
-            for kind, content in dumped
-        )
-        if standing >= 0 or own is not None:
-            bridge = bridges[standing] if standing >= 0 else restored(self.model, own)
-            pose = bridge.pose(self.model, tuple(u))
+        u, z, iterations, status, message, dumped, standing = data
+        road = None if dumped is None else laid(self.model, dumped)
+        if road is not None and standing >= 0:
+            pose = road.bridges[standing].pose(tuple(u))
         else:
             pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
-        pose.bridges = bridges
+        pose.road = road
         pose.iterations, pose.status, pose.message = iterations, status, message
         return pose

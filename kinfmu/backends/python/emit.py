@@ -3,7 +3,8 @@
 The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
 
     drive(t, constants)                            -> u, ud, udd
-    position(u, z, zd, zdd, s, held)               -> z, determinants, residual, iterations, moved, values
+    position(u, z, zd, zdd, s, held)               -> z, determinants, residual, iterations, moved, watch, values
+    tangent(values)                                -> z' and z'' (one driver only)
     velocity(values, ud, given, held)              -> zd
     acceleration(values, ud, udd, zd, given, held) -> zdd
     outputs(values)                                -> positions of the outputs
@@ -13,7 +14,7 @@ The module holds constants and these functions, each a stage; nothing is compute
     jacobians(values)                              -> one matrix a block
 
 z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; moved is the largest
-correction. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
+correction, watch the largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
 with one driver they are the derivatives of z with respect to u, and the chain rule is part of the code.
 """
 
@@ -55,6 +56,7 @@ class _Emitter:
         later = [
             self._velocity(),
             self._acceleration(),
+            self._tangent(),
             self._stage("outputs", "Positions of the outputs.", ["values"], 0),
             self._stage("rates", "Rates of the outputs.", ["values", "ud", "first"], 1),
             self._stage("accelerations", "Accelerations of the outputs.", ["values", "ud", "udd", "first", "second"], 2),
@@ -144,6 +146,10 @@ class _Emitter:
         )
         values = _tuple(self.exports)
         summary = f"residual, iterations, {self._moved()}" if self.solved else "0.0, 0, 0.0"
+        rows = [node for _, node in self.plan.watches]
+        lines += _indented(writer.statements(rows))
+        watched = [f"abs({writer.expression(node)})" for node in rows]
+        summary += ", " + (f"max({', '.join(watched)})" if len(watched) > 1 else "".join(watched) or "0.0")
         return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
 
     def _moved(self) -> str:
@@ -207,30 +213,53 @@ class _Emitter:
         lines += _unpack([identifier(derivative_name(name, 1)) for name in self.plan.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
-    def _linear(self, order: int, right: _Right) -> list[str]:
-        """Linear solves of one order, block after block, with the definitions that they need on the way."""
+    def _tangent(self) -> list[str]:
+        """With one driver: velocity and acceleration for ud = 1, udd = 0 in one go, for it is needed at every pose."""
+        if len(self.plan.drivers) != 1:
+            return []
+        lines = ["", "def tangent(values):", '    """First and second derivative of the unknowns with respect to the driver."""', _VALUES]
+        lines += [f"    {identifier(self.inputs[1][0])} = 1.0", f"    {identifier(self.inputs[2][0])} = 0.0"]
         writer = Writer(self.names, reachable(self.position_nodes))
-        definitions = self._definitions([node for block in self.solved for node in right(block)])
-        lines, count = [], 0
-        done: set[str] = set()
-        for block in self.plan.blocks:
-            if block.unknowns:
-                lines += self._defined(writer, right(block), definitions, done)
-                k = self.number[id(block)] + 1
-                entries = [entry for row in block.jacobian for entry in row]
-                lines += writer.statements([*right(block), *entries])
-                b = [f"b{i}" for i in range(len(right(block)))]
-                lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, right(block), strict=True)]
-                z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-                jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-                self.exports.setdefault(f"det{k}" if _is_small(block) else f"factors{k}", None)
-                lines.append(f"if held & {1 << (k - 1)}:")
-                lines.append(f"    {_tuple(z)} = given[{count}:{count + len(z)}]")
-                lines += ["else:", *_indented(_solution(k, jacobian, b, z), 4)]
-                count += len(z)
+        lines += _indented(self._linear_lines(writer, 1, lambda block: block.velocity, held=False))
+        lines += _indented(self._linear_lines(writer, 2, lambda block: block.acceleration, held=False))
+        self._import(writer)
+        first, second = (
+            _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns) for order in (1, 2)
+        )
+        return [*lines, f"    return {first}, {second}", ""]
+
+    def _linear(self, order: int, right: _Right) -> list[str]:
+        """Linear solves of one order as a function's body."""
+        writer = Writer(self.names, reachable(self.position_nodes))
+        lines = self._linear_lines(writer, order, right, held=True)
         self._import(writer)
         result = _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns)
         return [*_indented(lines), f"    return {result}", ""]
+
+    def _linear_lines(self, writer: Writer, order: int, right: _Right, *, held: bool) -> list[str]:
+        """Linear solves of one order, block after block, with the definitions that they need on the way."""
+        definitions = self._definitions([node for block in self.solved for node in right(block)])
+        lines, count = [], 0
+        done: set[str] = set()
+        for block in self.solved:
+            lines += self._defined(writer, right(block), definitions, done)
+            k = self.number[id(block)] + 1
+            entries = [entry for row in block.jacobian for entry in row]
+            lines += writer.statements([*right(block), *entries])
+            b = [f"b{i}" for i in range(len(right(block)))]
+            lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, right(block), strict=True)]
+            z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+            self.exports.setdefault(f"det{k}" if _is_small(block) else f"factors{k}", None)
+            solution = _solution(k, jacobian, b, z)
+            if held:
+                lines.append(f"if held & {1 << (k - 1)}:")
+                lines.append(f"    {_tuple(z)} = given[{count}:{count + len(z)}]")
+                lines += ["else:", *_indented(solution, 4)]
+            else:
+                lines += solution
+            count += len(z)
+        return lines
 
     def _stage(self, name: str, docstring: str, arguments: Sequence[str], order: int) -> list[str]:
         """A function that returns all outputs at one order of derivative."""
