@@ -1,0 +1,36 @@
+"""For every folder: golden files with `--update`, and how hypothesis draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+GOLDEN = Path(__file__).parent / "golden"
+
+settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=60)
+settings.load_profile("kinfmu")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update", action="store_true", help="rewrite the golden files, so that a change is read as a diff"
+    )
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
+    """`golden(name, text)`: text must equal tests/golden/<name>; with --update it is written there instead."""
+
+    def compare(name: str, text: str) -> None:
+        path = GOLDEN / name
+        if request.config.getoption("--update"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+        assert path.is_file(), f"there is no {path.name} in tests/golden; pytest --update writes it"
+        expected = path.read_text(encoding="utf-8")
+        assert text == expected, f"differs from tests/golden/{name}; if the change is meant: pytest --update"
+
+    return compare

@@ -1,0 +1,131 @@
+"""What every driver and every law promises, over all members of DRIVERS and LAWS."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kinfmu.drivers
+from kinfmu.drivers import DRIVERS, LAWS, Driver, Law
+from kinfmu.equations.graph import Graph, evaluate
+from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.plan.trace import Tracer
+from tests.joints.drawn import (
+    coordinates,
+    jacobian_by_complex_step,
+    laws,
+    poses,
+    second_derivative,
+    size,
+    systems,
+)
+from tests.power_series import Series
+
+every_driver = pytest.mark.parametrize("cls", DRIVERS, ids=lambda cls: cls.type)
+every_law = pytest.mark.parametrize("cls", LAWS, ids=lambda cls: cls.type)
+ROUNDING = 1e-14
+
+
+def test_types_are_all_different() -> None:
+    assert len({cls.type for cls in DRIVERS}) == len(DRIVERS)
+    assert len({cls.type for cls in LAWS}) == len(LAWS)
+
+
+@pytest.mark.parametrize("cls", [*DRIVERS, *LAWS], ids=lambda cls: cls.type)
+def test_a_driver_or_law_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type) -> None:
+    assert dataclasses.is_dataclass(cls)
+    assert cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    assert cls.__name__ in kinfmu.drivers.__all__
+    assert ("Phi = " if issubclass(cls, Driver) else "u = ") in (cls.__doc__ or "")
+
+
+@every_driver
+@given(data=st.data(), u=coordinates)
+def test_the_jacobian_is_the_complex_step_derivative_of_the_residual(
+    cls: type[Driver], data: st.DataObject, u: float
+) -> None:
+    system = data.draw(systems(cls))
+    q = data.draw(poses(system))
+    exact = jacobian_by_complex_step(system, q, [u])
+    np.testing.assert_allclose(system.jacobian(q), exact, rtol=0.0, atol=ROUNDING * size(system, q))
+
+
+@every_driver
+@given(data=st.data(), u=coordinates, ud=coordinates, udd=coordinates)
+def test_velocity_and_acceleration_equations_hold_along_any_motion(
+    cls: type[Driver], data: st.DataObject, u: float, ud: float, udd: float
+) -> None:
+    """Phi' = Phi_q qd - nu and Phi'' = Phi_q qdd - gamma, whatever q(t) and u(t) are."""
+    system = data.draw(systems(cls))
+    q, qd, qdd = (data.draw(poses(system)) for _ in range(3))
+    motion = [Series([a, b, c / 2]) for a, b, c in zip(q, qd, qdd, strict=True)]
+    target = [Series([u, ud, udd / 2])]
+    first = np.array([float(phi.c[1]) for phi in system.evaluate(motion, target)])
+    tolerance = 10 * ROUNDING * size(system, q, qd, qdd)
+    np.testing.assert_allclose(system.jacobian(q) @ qd - system.nu(q, [ud]), first, rtol=0.0, atol=tolerance)
+    second = system.jacobian(q) @ qdd - system.gamma(q, qd, [u], [ud], [udd])
+    np.testing.assert_allclose(second, second_derivative(system, motion, target), rtol=0.0, atol=tolerance)
+
+
+@every_driver
+@given(data=st.data())
+def test_a_driver_holds_when_its_target_is_what_it_measures(cls: type[Driver], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    q = data.draw(poses(system))
+    measured = system.measure(q)
+    assert system.residual(q, measured).tolist() == [0.0]
+    assert system.residual(q, measured + 0.5) == pytest.approx([-0.5], abs=1e-12)
+    assert system.nu(q, [1.0]).tolist() == [1.0]
+
+
+@every_driver
+@given(data=st.data(), u=coordinates)
+def test_the_traced_graph_gives_the_bits_of_direct_evaluation(cls: type[Driver], data: st.DataObject, u: float) -> None:
+    system = data.draw(systems(cls))
+    (driver,) = system.mechanism.drivers
+    q = data.draw(poses(system))
+    node = Tracer(system.mechanism).driver(driver, {})
+    values = {**dict(zip(system.coordinates, map(float, q), strict=True)), driver.inputs()[0]: u}
+    assert evaluate([node], values) == system.residual(q, [u]).tolist()
+
+
+@every_driver
+@given(data=st.data())
+def test_inputs_are_named_after_the_driver_and_what_it_drives(cls: type[Driver], data: st.DataObject) -> None:
+    (driver,) = data.draw(systems(cls)).mechanism.drivers
+    assert driver.inputs() == (f"member_{cls.noun}", "member_speed", "member_acceleration")
+
+
+@every_driver
+@given(data=st.data())
+def test_a_driver_is_the_same_after_writing_and_reading(cls: type[Driver], data: st.DataObject) -> None:
+    mechanism = data.draw(systems(cls)).mechanism
+    assert parse(text(mechanism)) == mechanism
+
+
+@every_law
+def test_the_constants_of_a_law_are_its_fields_with_their_orders(cls: type[Law]) -> None:
+    assert [field.name for field in dataclasses.fields(cls)] == list(cls.orders)  # type: ignore[arg-type]
+    assert set(cls.orders.values()) <= {0, 1, 2}
+
+
+@every_law
+@given(data=st.data(), t=coordinates)
+def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
+    cls: type[Law], data: st.DataObject, t: float
+) -> None:
+    law = data.draw(laws(cls))
+    constants = {name: getattr(law, name) for name in cls.orders}
+    graph = Graph()
+    time = graph.symbol("time")
+    target = graph.lift(law.target(time, **{name: graph.symbol(name) for name in cls.orders}))
+    (rate,) = graph.derivative([target], {time: graph.constant(1.0)})
+    (acceleration,) = graph.derivative([rate], {time: graph.constant(1.0)})
+    traced = evaluate([target, rate, acceleration], {"time": t, **constants})
+    exact = law.target(Series([t, 1, 0]), **constants)
+    assert traced[0] == law.target(t, **constants)
+    assert traced == pytest.approx([float(exact.c[0]), float(exact.c[1]), float(2 * exact.c[2])], rel=1e-13, abs=1e-13)

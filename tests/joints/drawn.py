@@ -1,0 +1,107 @@
+"""Joints and drivers of every class, drawn by hypothesis from the annotations of their fields.
+
+A new joint or driver is picked up by itself; one with a field of a new kind fails here and says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from kinfmu.drivers import LAWS, Driver, Law
+from kinfmu.equations.system import System
+from kinfmu.joints import Joint
+from kinfmu.joints.joint import Reference
+from kinfmu.mechanism import Body, Mechanism, Point, Start
+from kinfmu.units import Quantity
+from tests.power_series import Series
+
+POINTS = {"ground": "O", "left": "P", "right": "Q"}
+coordinates = st.floats(-3.0, 3.0).map(lambda x: round(x, 6))  # no numbers so small that their products vanish
+lengths = st.floats(0.1, 4.0)
+angles = st.floats(-7.0, 7.0).map(lambda x: round(x, 6))
+
+
+def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    """Members of a joint or driver class between the bodies ground, left and right."""
+    hints = get_type_hints(cls, include_extras=True)
+    drawn = {"name": st.just("member"), **given}
+    for key in fields(cls):
+        if key.name not in drawn:
+            drawn[key.name] = _values(cls, key.name, hints[key.name])
+    return st.builds(cls, **drawn)
+
+
+def _values(cls: type[Any], key: str, hint: Any) -> st.SearchStrategy[Any]:
+    if hint is Law:
+        return st.sampled_from(LAWS).flatmap(laws)
+    for said in getattr(hint, "__metadata__", ()):
+        if isinstance(said, Quantity):
+            return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[said.kind]
+        if isinstance(said, Reference):
+            return _references(said, is_pair=bool(get_args(hint.__origin__)))
+    raise NotImplementedError(f"{cls.__name__}.{key}: tests/joints/drawn.py does not know how to draw {hint}")
+
+
+def _references(reference: Reference, *, is_pair: bool) -> st.SearchStrategy[Any]:
+    if reference.kind == "choice":
+        return st.sampled_from(reference.choices)
+    names = {"point": {body: f"{body}.{point}" for body, point in POINTS.items()}, "body": {b: b for b in POINTS}}
+    of = names[reference.kind]
+    if not is_pair:
+        return st.sampled_from([of["left"], of["right"]])
+    bodies = [("left", "right"), ("right", "left"), ("ground", "left"), ("right", "ground")]
+    return st.sampled_from([(of[a], of[b]) for a, b in bodies])
+
+
+def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
+    """Laws of a class with drawn constants."""
+    return st.builds(cls, **dict.fromkeys(cls.orders, coordinates))
+
+
+@st.composite
+def systems(draw: st.DrawFn, member: type[Joint] | type[Driver], **given: st.SearchStrategy[Any]) -> System:
+    """A ground and two bodies with a drawn point each, and one drawn joint or driver; `given`: its keys."""
+    bodies = [
+        Body(
+            name,
+            {point: Point(draw(coordinates), draw(coordinates))},
+            Start() if name == "ground" else Start(0.0, 0.0, 0.0),
+        )
+        for name, point in POINTS.items()
+    ]
+    one = draw(members(member, **given))
+    of_kind: Mapping[str, Any] = {"joints": (one,)} if isinstance(one, Joint) else {"drivers": (one,)}
+    return System(Mechanism("drawn", tuple(bodies), **of_kind))
+
+
+def poses(system: System) -> st.SearchStrategy[NDArray[np.float64]]:
+    """All coordinates q, or their rates."""
+    n = len(system.coordinates)
+    return st.lists(coordinates, min_size=n, max_size=n).map(np.array)
+
+
+def jacobian_by_complex_step(system: System, q: NDArray[np.float64], u: list[float]) -> NDArray[np.float64]:
+    """Phi_q, (m, n), to round-off: Im Phi(q + i h e_k) / h."""
+    h = 1e-30
+    columns = []
+    for k in range(len(q)):
+        moved = [complex(x, h if j == k else 0.0) for j, x in enumerate(q)]
+        columns.append([complex(phi).imag / h for phi in system.evaluate(moved, u)])
+    return np.array(columns).T
+
+
+def second_derivative(system: System, q: list[Series], u: list[Series]) -> NDArray[np.float64]:
+    """Phi'' along a motion given as power series in time, (m,), from 50 digits."""
+    rows = [phi if isinstance(phi, Series) else Series([phi, 0, 0]) for phi in system.evaluate(q, u)]
+    return np.array([float(2 * phi.c[2]) for phi in rows])
+
+
+def size(system: System, *vectors: NDArray[np.float64]) -> float:
+    """A bound on the numbers that meet in the evaluation, against which rounding is measured."""
+    return max(system.size, 1.0, *(float(np.abs(vector).max(initial=0.0)) for vector in vectors)) ** 4

@@ -1,0 +1,201 @@
+"""What every joint promises, over all members of JOINTS."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+import kinfmu.joints
+from kinfmu.equations.assembly import CLOSED, close
+from kinfmu.equations.graph import evaluate
+from kinfmu.equations.system import FloatArray, System
+from kinfmu.joints import JOINTS, Joint
+from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.plan.trace import Tracer
+from tests.joints.drawn import angles, coordinates, jacobian_by_complex_step, poses, second_derivative, size, systems
+from tests.power_series import Series
+
+PAIRS = tuple(cls for cls in JOINTS if "between" in {field.name for field in dataclasses.fields(cls)})
+MOVING = st.sampled_from([("left.P", "right.Q"), ("right.Q", "left.P")])
+every_joint = pytest.mark.parametrize("cls", JOINTS, ids=lambda cls: cls.type)
+every_pair = pytest.mark.parametrize("cls", PAIRS, ids=lambda cls: cls.type)
+NO_DRIVERS = np.zeros(0)
+ROUNDING = 1e-14
+
+
+def closed(data: st.DataObject, cls: type[Joint], **given: st.SearchStrategy[Any]) -> tuple[System, FloatArray]:
+    """A drawn system in a pose where its joint holds."""
+    system = data.draw(systems(cls, **given))
+    q, gap = close(system, data.draw(poses(system)), NO_DRIVERS)
+    assume(gap <= CLOSED)
+    return system, q
+
+
+def test_types_are_all_different() -> None:
+    assert len({cls.type for cls in JOINTS}) == len(JOINTS)
+
+
+@every_joint
+def test_a_joint_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Joint]) -> None:
+    assert dataclasses.is_dataclass(cls)
+    assert dataclasses.fields(cls)[0].name == "name"
+    assert cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    assert cls.__name__ in kinfmu.joints.__all__
+    assert "Phi = " in (cls.__doc__ or "")
+    assert len(set(cls.labels)) == len(cls.labels) > 0
+
+
+@every_joint
+@given(data=st.data())
+def test_there_is_one_label_scale_residual_and_gap_a_row(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    (joint,) = system.mechanism.joints
+    residual = system.residual(data.draw(poses(system)), NO_DRIVERS)
+    assert len(residual) == len(cls.labels) == len(joint.scales()) == len(joint.gaps(tuple(residual)))
+    assert all(scale > 0.0 for scale in joint.scales())
+
+
+@every_joint
+@given(data=st.data())
+def test_the_jacobian_is_the_complex_step_derivative_of_the_residual(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    q = data.draw(poses(system))
+    exact = jacobian_by_complex_step(system, q, [])
+    np.testing.assert_allclose(system.jacobian(q), exact, rtol=0.0, atol=ROUNDING * size(system, q))
+
+
+@every_joint
+@given(data=st.data())
+def test_the_jacobian_meets_only_the_bodies_that_the_joint_names(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    (joint,) = system.mechanism.joints
+    jacobian = system.jacobian(data.draw(poses(system)))
+    for k, name in enumerate(system.coordinates):
+        if name.partition(".")[0] not in joint.bodies():
+            assert not jacobian[:, k].any()
+
+
+@every_joint
+@given(data=st.data())
+def test_gamma_is_minus_the_second_derivative_along_a_motion(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    q, qd = data.draw(poses(system)), data.draw(poses(system))
+    motion = [Series([a, b, 0]) for a, b in zip(q, qd, strict=True)]
+    exact = -second_derivative(system, motion, [])
+    gamma = system.gamma(q, qd, NO_DRIVERS, NO_DRIVERS, NO_DRIVERS)
+    np.testing.assert_allclose(gamma, exact, rtol=0.0, atol=ROUNDING * size(system, q, qd))
+
+
+@every_joint
+@given(data=st.data())
+def test_a_joint_does_not_depend_on_time(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    assert not system.nu(data.draw(poses(system)), NO_DRIVERS).any()
+
+
+@every_joint
+@given(data=st.data())
+def test_the_acceleration_equation_holds_along_any_motion(cls: type[Joint], data: st.DataObject) -> None:
+    """Phi'' = Phi_q qdd - gamma, whatever q, qd and qdd are."""
+    system = data.draw(systems(cls))
+    q, qd, qdd = (data.draw(poses(system)) for _ in range(3))
+    motion = [Series([a, b, c / 2]) for a, b, c in zip(q, qd, qdd, strict=True)]
+    second = system.jacobian(q) @ qdd - system.gamma(q, qd, NO_DRIVERS, NO_DRIVERS, NO_DRIVERS)
+    exact = second_derivative(system, motion, [])
+    np.testing.assert_allclose(second, exact, rtol=0.0, atol=10 * ROUNDING * size(system, q, qd, qdd))
+
+
+@every_joint
+@given(data=st.data())
+def test_the_traced_graph_gives_the_bits_of_direct_evaluation(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    q = data.draw(poses(system))
+    tracer = Tracer(system.mechanism)
+    nodes = tracer.joint(system.mechanism.joints[0], {})
+    traced = evaluate(nodes, dict(zip(system.coordinates, map(float, q), strict=True)))
+    assert traced == system.residual(q, NO_DRIVERS).tolist()
+
+
+@every_joint
+@given(data=st.data())
+def test_derivatives_on_the_graph_are_the_jacobian(cls: type[Joint], data: st.DataObject) -> None:
+    system = data.draw(systems(cls))
+    q = data.draw(poses(system))
+    tracer = Tracer(system.mechanism)
+    nodes = tracer.joint(system.mechanism.joints[0], {})
+    values = dict(zip(system.coordinates, map(float, q), strict=True))
+    for k, name in enumerate(system.coordinates):
+        rates = {tracer.symbols[name]: tracer.graph.constant(1.0)}
+        column = evaluate(tracer.graph.derivative(nodes, rates), values)
+        np.testing.assert_allclose(column, system.jacobian(q)[:, k], rtol=0.0, atol=ROUNDING * size(system, q))
+
+
+@every_pair
+@given(data=st.data(), shift_x=coordinates, shift_y=coordinates, turn=angles)
+def test_moving_both_bodies_together_keeps_a_closed_joint_closed(
+    cls: type[Joint], data: st.DataObject, shift_x: float, shift_y: float, turn: float
+) -> None:
+    """For joints between two bodies; what holds one body alone says where the world is."""
+    system, q = closed(data, cls, between=MOVING)
+    c, s = math.cos(turn), math.sin(turn)
+    moved = [
+        coordinate
+        for x, y, phi in q.reshape(-1, 3)
+        for coordinate in (shift_x + c * x - s * y, shift_y + s * x + c * y, phi + turn)
+    ]
+    gaps = system.residual(moved, NO_DRIVERS) / system.scales
+    np.testing.assert_allclose(gaps, 0.0, atol=ROUNDING * 10 * size(system, q, np.array(moved)))
+
+
+@every_pair
+@given(data=st.data())
+def test_a_joint_between_two_bodies_does_not_resist_their_moving_together(
+    cls: type[Joint], data: st.DataObject
+) -> None:
+    """Phi_q times the three rigid motions of the plane is zero in a closed pose."""
+    system, q = closed(data, cls, between=MOVING)
+    rigid = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-y, x, 1.0]] for x, y, _ in q.reshape(-1, 3)])  # (b, 3, 3)
+    resisted = system.jacobian(q) @ rigid.transpose(0, 2, 1).reshape(-1, 3)
+    np.testing.assert_allclose(resisted, 0.0, atol=1e-11 * size(system, q))
+
+
+@every_joint
+@given(data=st.data())
+def test_a_joint_that_is_not_between_two_bodies_says_that_it_is_absolute(cls: type[Joint], data: st.DataObject) -> None:
+    (joint,) = data.draw(systems(cls)).mechanism.joints
+    assert len(joint.bodies()) == (2 if cls in PAIRS else 1)
+    assert cls in PAIRS or "absolute" in (cls.__doc__ or "")
+
+
+@every_joint
+@given(data=st.data(), outwards=st.sampled_from([1.0, -1.0]))
+def test_a_body_displaced_by_d_opens_a_row_by_d_times_its_scale(
+    cls: type[Joint], data: st.DataObject, outwards: float
+) -> None:
+    system, q = closed(data, cls)
+    (joint,) = system.mechanism.joints
+    d = outwards * 1e-6 * min(1.0, *system.scales)
+    body = next(name for name in joint.bodies() if name != "ground")
+    at = system.coordinates.index(f"{body}.x")
+    for k, scale in enumerate(joint.scales()):
+        gradient = system.jacobian(q)[k, at : at + 2]
+        displaced = q.copy()
+        displaced[at : at + 2] += d * gradient / np.linalg.norm(gradient)
+        residual = system.residual(displaced, NO_DRIVERS)
+        assert residual[k] / scale == pytest.approx(d, rel=1e-4)
+        assert joint.gaps(tuple(residual))[k] == pytest.approx(d, rel=1e-4)
+
+
+@every_joint
+@given(data=st.data())
+def test_a_joint_is_the_same_after_writing_and_reading(cls: type[Joint], data: st.DataObject) -> None:
+    mechanism = data.draw(systems(cls)).mechanism
+    again = parse(text(mechanism))
+    assert again == mechanism
+    assert hash(again) == hash(mechanism)
