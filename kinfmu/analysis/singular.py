@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from kinfmu.backends.python import load_model
 from kinfmu.plan import SolvePlan
 from kinfmu.solver import Pose, Solver
-from kinfmu.solver.advance import Limit, advance_or_limit
+from kinfmu.solver.advance import Limit, advance
 from kinfmu.solver.bridge import Bridge
 
 _STEP = 0.1  # [rad, sizes] between looks at the determinants
@@ -53,7 +53,7 @@ def driver_range(plan: SolvePlan) -> DriverRange | None:
         pose, limit = solver.anchor, None
         count = math.ceil(reach / (_STEP * unit))
         for k in range(1, count + 1):
-            arrived = advance_or_limit(solver.model, pose, (start + side * reach * k / count,))
+            arrived = advance(solver.model, pose, (start + side * reach * k / count,))
             if isinstance(arrived, Limit):
                 limit = arrived.u[0]
                 found[limit] = SingularPoint(limit, "limit", arrived.block + 1)

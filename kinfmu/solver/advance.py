@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, REGULAR, build, secant_zero, zero_near
-from .pose import ALONE, Model, Pose, Vector, directed, failed, on_road
-from .road import Blocked, Road, bridge_ahead
+from .pose import ALONE, Model, Pose, Vector, directed, on_road
+from .road import Blocked, Road
 from .status import Status
 
 LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
@@ -25,18 +25,7 @@ class Limit(NamedTuple):
     block: int
 
 
-def advance(model: Model, start: Pose, target: Vector) -> Pose:
-    """The pose at `target`, followed from `start` in a straight line of the driver values.
-
-    A target that cannot be reached gives a pose of status OUTSIDE with the limit in its message.
-    """
-    arrived = advance_or_limit(model, start, target)
-    if isinstance(arrived, Limit):
-        return failed(start, target, Status.OUTSIDE, _limit_message(model, arrived, target))
-    return arrived
-
-
-def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
+def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     """The pose at `target`, or the limit on the way to it.
 
     Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
@@ -50,15 +39,16 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     before, limit = start, None
     while True:
         if one:
-            if pose.road is not None:
-                bridge = bridge_ahead(pose, target[0])
-                if bridge is not None:
-                    road = pose.road
-                    if bridge.covers(target[0]):
-                        pose = bridge.pose(target)
-                        pose.road = road
-                        return pose
-                    pose = on_road(bridge.exit(target[0]), road)
+            road = pose.road
+            if road is not None and not road.low <= target[0] <= road.high:
+                bridge = pose.bridge or road.next_bridge(pose.u[0], target[0])
+                if bridge.covers(target[0]):
+                    pose = bridge.pose(target)
+                    pose.road = road.around(target[0])
+                    return pose
+                pose = bridge.exit(target[0])
+                pose = on_road(pose, road.around(pose.u[0]))
+                continue
             distance = target[0] - pose.u[0]
             if distance == 0.0:
                 return pose
@@ -68,15 +58,14 @@ def advance_or_limit(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         trial = _step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
-            margin = trial.margin()
-            if margin < REGULAR and one:
+            if trial.margin < REGULAR and one:
                 road = _road_at(model, pose, trial)
                 if road is not trial.road:
                     pose = on_road(pose, road)
                     continue
             if whole:
                 trial.iterations = iterations
-                if margin < NEAR_SINGULAR:
+                if trial.margin < NEAR_SINGULAR:
                     trial.status = Status.NEAR_SINGULAR
                 return trial
             before, pose = pose, trial
@@ -132,7 +121,7 @@ def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
         return trial.road
     bridge = build(model, pose, block, zero, walk)
     if bridge is not None:
-        return known.with_bridge(bridge)
+        return known.with_bridge(bridge, pose.u[0])
     room = 2.0 * HALF_WIDTH * reach
     return known.with_blocked(Blocked(zero - room, zero + room))
 
@@ -175,7 +164,7 @@ def _beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
     return sum((a - b) * d * s for a, b, d in zip(target, limit, direction, strict=True)) > 0.0
 
 
-def _limit_message(model: Model, limit: Limit, target: Vector) -> str:
+def limit_message(model: Model, limit: Limit, target: Vector) -> str:
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
     return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {names} would part"
 

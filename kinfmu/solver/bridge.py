@@ -83,7 +83,7 @@ class Bridge:
         if max(abs(a - b) for a, b in zip(inner, outer, strict=True)) > AGREED:
             return False
         try:
-            return bool(evaluated(self.model, (self.centre,), inner, self.held)[2] <= CLOSED)
+            return bool(evaluated(self.model, (self.centre,), inner, self.held)[3] <= CLOSED)
         except (ArithmeticError, ValueError):
             return False
 
@@ -178,7 +178,7 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
             pose = Pose(u, evaluated(model, u, guess, held=0))
         except (ArithmeticError, ValueError):
             return None
-        if pose.moved > STEADY * pose.margin():
+        if pose.moved > STEADY * pose.margin:
             return None
         places.append(distance)
         poses.append(pose)

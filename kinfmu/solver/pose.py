@@ -17,8 +17,8 @@ AT_REST: Vector = (0.0,)
 class Pose:
     """A value; what is derived from it is computed when first asked for.
 
-    u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular; residual: largest,
-    relative to the size; moved: largest correction of the prediction, in radians and sizes; watch: largest residual of
+    u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular, 0 at a singular point;
+    margin: the smallest of their sizes; residual: largest, relative to the size; moved: largest correction of the prediction, in radians and sizes; watch: largest residual of
     the rows set aside, relative to the size; values: numbers of the position stage that later stages use. road: the
     singular stretches known on the way here; bridge: the one that this pose was interpolated by. status and message:
     see Status.
@@ -28,6 +28,7 @@ class Pose:
         "bridge",
         "determinants",
         "iterations",
+        "margin",
         "message",
         "moved",
         "residual",
@@ -42,7 +43,16 @@ class Pose:
 
     def __init__(self, u: Vector, found: Found, road: Any = None) -> None:
         self.u = u
-        self.z, self.determinants, self.residual, self.iterations, self.moved, self.watch, self.values = found
+        (
+            self.z,
+            self.determinants,
+            self.margin,
+            self.residual,
+            self.iterations,
+            self.moved,
+            self.watch,
+            self.values,
+        ) = found
         self.road = road  # None: nothing singular is known
         self.bridge: Any = None
         self.status: int = 0
@@ -54,13 +64,18 @@ class Pose:
         """True if the pose holds numbers."""
         return self.status <= 2
 
-    def margin(self) -> float:
-        """Smallest |determinant| over the blocks: 1 far from singular, 0 at a singular point."""
-        return min(map(abs, self.determinants), default=1.0)
-
     def found(self) -> Found:
         """What `position` gave for this pose."""
-        return self.z, self.determinants, self.residual, self.iterations, self.moved, self.watch, self.values
+        return (
+            self.z,
+            self.determinants,
+            self.margin,
+            self.residual,
+            self.iterations,
+            self.moved,
+            self.watch,
+            self.values,
+        )
 
 
 def tangent_of(model: Model, pose: Pose) -> tuple[Vector, Vector]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, NamedTuple
 
 from .bridge import Bridge, restored
-from .pose import Model, Pose
+from .pose import Model
 
 _KEPT = 4  # of each kind, the latest
 
@@ -18,22 +19,50 @@ class Blocked(NamedTuple):
 
 
 class Road(NamedTuple):
-    """Bridges and blocked places, the latest last. A value: it travels with the poses that were found along it."""
+    """Bridges and blocked places, the latest last, and the stretch [low, high] around a pose that is free of windows.
+
+    A value: it travels with the poses that were found along it.
+    """
 
     bridges: tuple[Bridge, ...] = ()
     blocked: tuple[Blocked, ...] = ()
+    low: float = -inf
+    high: float = inf
 
-    def with_bridge(self, bridge: Bridge) -> Road:
-        return Road((*self.bridges, bridge)[-_KEPT:], self.blocked)
+    def around(self, u: float) -> Road:
+        """The same road seen from a driver value: the stretch there, empty inside a window."""
+        low, high = -inf, inf
+        for bridge in self.bridges:
+            if bridge.covers(u):
+                low, high = inf, -inf
+                break
+            if bridge.centre < u:
+                low = max(low, bridge.high)
+            else:
+                high = min(high, bridge.low)
+        return Road(self.bridges, self.blocked, low, high)
+
+    def with_bridge(self, bridge: Bridge, u: float) -> Road:
+        """The road with one more bridge, seen from a driver value."""
+        return Road((*self.bridges, bridge)[-_KEPT:], self.blocked).around(u)
 
     def with_blocked(self, place: Blocked) -> Road:
-        return Road(self.bridges, (*self.blocked, place)[-_KEPT:])
+        """The road with one more blocked place."""
+        return Road(self.bridges, (*self.blocked, place)[-_KEPT:], self.low, self.high)
 
     def knows(self, u: float) -> bool:
         """True if the singular point near a driver value has been looked at."""
         return any(place.low <= u <= place.high for place in self.blocked) or any(
             abs(u - bridge.centre) <= 1.2 * bridge.half for bridge in self.bridges
         )
+
+    def next_bridge(self, here: float, target: float) -> Bridge:
+        """The bridge whose window holds `here`, or the one that ends the stretch around it on the target's side."""
+        for bridge in self.bridges:
+            if bridge.covers(here):
+                return bridge
+        beyond = [bridge for bridge in self.bridges if (bridge.centre > here) == (target > here)]
+        return min(beyond, key=lambda bridge: abs(bridge.centre - here))
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `laid` makes the same road."""
@@ -44,17 +73,3 @@ def laid(model: Model, data: list[Any]) -> Road:
     """The road that was dumped."""
     bridges, blocked = data
     return Road(tuple(restored(model, bridge) for bridge in bridges), tuple(Blocked(*place) for place in blocked))
-
-
-def bridge_ahead(pose: Pose, target: float) -> Bridge | None:
-    """The nearest known bridge between a pose and the target, or the one that the pose stands on."""
-    if pose.bridge is not None:
-        return pose.bridge  # type: ignore[no-any-return]  # declared Any, for bridges are made of poses
-    here = pose.u[0]
-    low, high = (here, target) if here < target else (target, here)
-    nearest = None
-    for bridge in pose.road.bridges:
-        if low < bridge.high and bridge.low < high:  # their ways overlap; a node is at most on the edge of its own
-            if nearest is None or abs(bridge.centre - here) < abs(nearest.centre - here):
-                nearest = bridge
-    return nearest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from .advance import advance, place
+from .advance import Limit, advance, limit_message, place
 from .linear import reciprocal_condition
 from .pose import Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
@@ -36,8 +36,10 @@ class Solver:
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
         pose = advance(self.model, start, u)
+        if isinstance(pose, Limit):
+            return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
         tolerance = self.tolerance
-        if not (pose.residual <= tolerance and pose.watch <= tolerance) and pose.good:
+        if not (pose.residual <= tolerance and pose.watch <= tolerance):
             self._reject(pose)
         return pose
 
@@ -112,7 +114,7 @@ class Solver:
             return error_q, error_qd, error_qdd
         speed = max(map(abs, self._first(pose, ud)), default=0.0)
         speed = drive * max(1.0, speed) if self._one else max(drive, speed)
-        m = max(pose.margin(), EPS)
+        m = max(pose.margin, EPS)
         error_q = 4.0 * (EPS + pose.residual) / m
         error_qd = error_q * speed / m
         return error_q, error_qd, (error_qd * speed + error_q * more) / m
@@ -131,6 +133,6 @@ class Solver:
             pose = road.bridges[standing].pose(tuple(u))
         else:
             pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
-        pose.road = road
+        pose.road = None if road is None else road.around(pose.u[0])
         pose.iterations, pose.status, pose.message = iterations, status, message
         return pose

@@ -3,7 +3,7 @@
 The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
 
     drive(t, constants)                            -> u, ud, udd
-    position(u, z, zd, zdd, s, held)               -> z, determinants, residual, iterations, moved, watch, values
+    position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch, values
     tangent(values)                                -> z' and z'' (one driver only)
     velocity(values, ud, given, held)              -> zd
     acceleration(values, ud, udd, zd, given, held) -> zdd
@@ -13,8 +13,8 @@ The module holds constants and these functions, each a stage; nothing is compute
     watches(values)                                -> rows set aside, relative to the size
     jacobians(values)                              -> one matrix a block
 
-z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; moved is the largest
-correction, watch the largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
+z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; margin is the
+smallest |determinant|, moved the largest correction, watch the largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
 with one driver they are the derivatives of z with respect to u, and the chain rule is part of the code.
 """
 
@@ -141,11 +141,14 @@ class _Emitter:
         for block in self.plan.blocks:
             lines += self._newton(writer, block) if block.unknowns else self._assigned(writer, block, "    ")
         z = _tuple(identifier(name) for name in self.plan.unknowns)
-        determinants = _tuple(
-            f"det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
-        )
         values = _tuple(self.exports)
-        summary = f"residual, iterations, {self._moved()}" if self.solved else "0.0, 0, 0.0"
+        margin = "1.0"
+        if self.solved:
+            lines += [f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)]
+            sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
+            margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
+        determinants = _tuple(f"m{k}" for k in range(1, len(self.solved) + 1))
+        summary = f"{margin}, residual, iterations, {self._moved()}" if self.solved else "1.0, 0.0, 0, 0.0"
         rows = [node for _, node in self.plan.watches]
         lines += _indented(writer.statements(rows))
         watched = [f"abs({writer.expression(node)})" for node in rows]
