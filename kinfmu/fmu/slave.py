@@ -46,10 +46,32 @@ class Layout(NamedTuple):
 
 
 class Fetch(NamedTuple):
-    """How to read one list of Real variables: compute these parts, put them in a row, pick these places."""
+    """How to read one list of Real variables: read these parts into a row, pick these places."""
 
-    parts: tuple[Callable[[], Row], ...]
+    readers: tuple[Callable[[], Row], ...]
     pick: Callable[[Row], Sequence[float]]
+
+
+class Shown:
+    """A pose that is shown, with what has been computed of it."""
+
+    __slots__ = ("_drive", "_driven", "accelerations", "errors", "motion", "pose", "rates", "values")
+
+    def __init__(self, pose: Pose, driven: Callable[[], tuple[Row, Row, Row]]) -> None:
+        self.pose = pose
+        self._driven = driven
+        self._drive: tuple[Row, Row, Row] | None = None
+        self.values: Row | None = None
+        self.rates: Row | None = None
+        self.accelerations: Row | None = None
+        self.motion: Row | None = None
+        self.errors: Row | None = None
+
+    def drive(self) -> tuple[Row, Row, Row]:
+        """u, ud, udd of the drivers."""
+        if self._drive is None:
+            self._drive = self._driven()
+        return self._drive
 
 
 class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
@@ -96,40 +118,29 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _forget(self) -> None:
         """The driver values may have changed: solve again when something is read."""
         self._pose: Pose | None = None
-        self._values: Row | None = None
-        self._forget_rates()
-
-    def _forget_rates(self) -> None:
-        self._drive: tuple[Row, Row, Row] | None = None
-        self._sample: tuple[Pose, Row, Row] | None = None
-        self._rates: Row | None = None
-        self._accelerations: Row | None = None
-        self._errors: Row | None = None
+        self._shown: Shown | None = None
 
     def _driven(self) -> tuple[Row, Row, Row]:
         """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
-        if self._drive is None:
-            if self._driven_by_time:
-                self._drive = self.model.drive(self._time, self._constants)
-            elif self._touched or not self._history:
-                self._drive = self._by_inputs(self._inputs, self._history, self._time, self._inputs[0::3])
-            else:  # nothing set since the commit: still the committed sample, whose time was that of its doStep
-                t, u = self._history[-1]
-                self._drive = self._by_inputs(self._inputs, self._history[:-1], t, u)
-        return self._drive
+        if self._driven_by_time:
+            return self.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
+        if self._touched or not self._history:
+            return self._by_inputs(self._inputs, self._history, self._time, tuple(self._inputs[::3]))
+        t, u = self._history[-1]  # nothing set since the commit: still the committed sample, at the time of its doStep
+        return self._by_inputs(self._inputs, self._history[:-1], t, u)
 
     def _by_inputs(
-        self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Sequence[float]
+        self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Row
     ) -> tuple[Row, Row, Row]:
         """u, ud, udd with estimates for the rates that are not wired."""
-        wired, values = self._wired, tuple(u)
-        if len(wired) == 2 * len(values):
-            return values, tuple(inputs[1::3]), tuple(inputs[2::3])
-        ud, udd = estimated_rates(earlier, t, values)
+        wired = self._wired
+        if len(wired) == 2 * len(u):
+            return u, tuple(inputs[1::3]), tuple(inputs[2::3])
+        ud, udd = estimated_rates(earlier, t, u)
         if wired:
             ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
             udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
-        return values, ud, udd
+        return u, ud, udd
 
     def _committed_drive(self) -> tuple[Row, Row, Row]:
         """u, ud, udd at the last commit, where the last good values stem from; at rest in the anchor before it."""
@@ -144,20 +155,17 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _asked(self) -> Pose:
         """The pose asked for, good or not: followed from the committed one."""
         if self._pose is None:
-            u = self._driven()[0] if self._driven_by_time else tuple(self._inputs[0::3])
+            u = self._driven()[0] if self._driven_by_time else tuple(self._inputs[::3])
             self._pose = self._solver.solve(self._committed, u)
         return self._pose
 
-    def _shown(self) -> tuple[Pose, Row, Row]:
-        """The pose whose numbers are shown, with ud and udd: the one asked for, or the last good one."""
-        pose = self._pose or self._asked()
-        if pose.status <= LAST_GOOD:
-            _, ud, udd = self._drive or self._driven()
-        else:
-            pose = self._committed
-            _, ud, udd = self._committed_drive()
-        self._sample = pose, ud, udd
-        return self._sample
+    def _look(self) -> Shown:
+        """What is shown: the pose asked for, or the last good one."""
+        if self._shown is None:
+            pose = self._pose or self._asked()
+            good = pose.status <= LAST_GOOD
+            self._shown = Shown(pose if good else self._committed, self._driven if good else self._committed_drive)
+        return self._shown
 
     # Parts of the list of variables, each computed when first read
 
@@ -165,22 +173,31 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return tuple(self._inputs)
 
     def _read_values(self) -> Row:
-        if self._values is None:
-            pose = self._pose or self._asked()
-            self._values = self._solver.outputs(pose if pose.status <= LAST_GOOD else self._committed)
-        return self._values
+        shown = self._shown or self._look()
+        if shown.values is None:
+            shown.values = self._solver.outputs(shown.pose)
+        return shown.values
 
     def _read_rates(self) -> Row:
-        if self._rates is None:
-            pose, ud, _ = self._sample or self._shown()
-            self._rates = self._solver.rates(pose, ud)
-        return self._rates
+        shown = self._shown or self._look()
+        if shown.rates is None:
+            shown.rates = self._solver.rates(shown.pose, shown.drive()[1])
+        return shown.rates
 
     def _read_accelerations(self) -> Row:
-        if self._accelerations is None:
-            pose, ud, udd = self._sample or self._shown()
-            self._accelerations = self._solver.accelerations(pose, ud, udd)
-        return self._accelerations
+        shown = self._shown or self._look()
+        if shown.accelerations is None:
+            _, ud, udd = shown.drive()
+            shown.accelerations = self._solver.accelerations(shown.pose, ud, udd)
+        return shown.accelerations
+
+    def _read_motion(self) -> Row:
+        """Values, rates and accelerations in one row: what they share is computed once."""
+        shown = self._shown or self._look()
+        if shown.motion is None:
+            _, ud, udd = shown.drive()
+            shown.motion = self._solver.motion(shown.pose, ud, udd)
+        return shown.motion
 
     def _read_residual(self) -> Row:
         return (self._asked().residual,)
@@ -189,13 +206,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return (self._solver.diagnostics(self._asked())[3],)  # a stage of its own: it costs more than a pose
 
     def _read_errors(self) -> Row:
-        if self._errors is None:
-            self._errors = tuple(self._solver.errors(*(self._sample or self._shown())))
-        return self._errors
+        shown = self._shown or self._look()
+        if shown.errors is None:
+            _, ud, udd = shown.drive()
+            shown.errors = self._solver.errors(shown.pose, ud, udd)
+        return shown.errors
 
     def _read_watch(self) -> Row:
-        pose = self._asked()
-        return tuple(self._solver.watch(pose if pose.good else self._committed))
+        return self._solver.watch((self._shown or self._look()).pose)
 
     def _read_driven(self) -> Row:
         return tuple(value for driver in zip(*self._driven(), strict=True) for value in driver)
@@ -218,7 +236,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         for part in parts:
             offsets[part] = width
             width += len(self.layout.parts[part].variables)
-        readers: list[Callable[[], Row]] = [getattr(self, f"_read_{self.layout.parts[part].name}") for part in parts]
+        readers = self._readers([self.layout.parts[part].name for part in parts])
         indices = []
         for vr, (found, place) in zip(vrs, places, strict=True):
             if found is None:
@@ -226,7 +244,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 indices.append(width)
             else:
                 indices.append(offsets[found] + place)
-        if width in indices:
+        if width in indices or not readers:
             readers.append(_no_number)
         fetch = Fetch(tuple(readers), _picker(indices))
         if len(self._fetches) >= MOST_FETCHES:
@@ -234,14 +252,24 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._fetches[vrs] = fetch
         return fetch
 
+    def _readers(self, names: list[str]) -> list[Callable[[], Row]]:
+        """Methods that read these parts, one after another."""
+        readers: list[Callable[[], Row]] = []
+        whole = "values", "rates", "accelerations"
+        while names:
+            count = len(whole) if tuple(names[: len(whole)]) == whole else 1
+            readers.append(self._read_motion if count > 1 else getattr(self, f"_read_{names[0]}"))
+            names = names[count:]
+        return readers
+
     # Get
 
     def get_real(self, vrs: Sequence[int]) -> list[float]:
         try:
             key = tuple(vrs)
-            parts, pick = self._fetches.get(key) or self._plan_fetch(key)
-            row: Row = ()
-            for read in parts:
+            readers, pick = self._fetches.get(key) or self._plan_fetch(key)
+            row = readers[0]()
+            for read in readers[1:]:
                 row += read()
             return list(pick(row))
         except Exception as error:  # an exception here would be Fatal for the host
@@ -295,15 +323,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if value != inputs[vr]:
                 inputs[vr] = value
                 if vr % 3 == 0:
-                    self._pose = self._values = None
+                    self._pose = None
                 elif value != 0.0:
                     self._wired.add(vr)
                 if self._driven_by_time:
                     self._stray = self._references.name(vr)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
-            self._touched = True
-        self._forget_rates()
+        self._touched = True
+        self._shown = None
 
     def _set_other_real(self, vr: int, value: float) -> None:
         """Parameters, which are set rarely, and what is refused."""
@@ -368,13 +396,22 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
-            return self._step(current_time, step_size)
+            if self._driven_by_time or self._refused:
+                return self._step(current_time, step_size)
+            pose = self._pose or self._asked()
+            if pose.status > LAST_GOOD:
+                return self._discard(pose, current_time)
+            if not self._touched or current_time != self._time:
+                self._shown = None  # the host holds its inputs, or its clock differs: estimates see another time
+            self._commit(pose, current_time)
+            self._time = current_time + step_size
+            return True
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
             return False
 
     def _step(self, current_time: float, step_size: float) -> bool:
-        """Commit the pose at the communication point; driven by time, also the one at the end of the step."""
+        """A step when time drives, which commits the poses at both its ends; or none, when a value was refused."""
         if self._stray and not self._stray_reported:
             self._stray_reported = True
             self.log(
@@ -386,20 +423,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self.log(f"at t = {current_time:g} s: {reason}", Fmi2Status.discard)
             self._refused.clear()
             return False
-        if not self._driven_by_time:
-            pose = self._asked()
-            if not pose.good:
-                return self._discard(pose, current_time)
-            if not self._touched or current_time != self._time:
-                self._forget_rates()  # the host holds its inputs, or its clock differs: estimates see another time
-            self._commit(pose, current_time)
-            self._time = current_time + step_size
-            return True
         pose = self._at_start_of_step(current_time, step_size)
         if pose.good:
             self._time = current_time + step_size
-            self._drive = self.model.drive(self._time, self._constants)
-            pose = self._solver.solve(pose, self._drive[0])
+            pose = self._solver.solve(pose, self._driven()[0])
         else:
             self._time = current_time
         self._forget()

@@ -55,7 +55,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
         u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
-        trial = _step(model, pose, direction, s, u)
+        trial = trusted_step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
             if trial.margin < REGULAR and one:
@@ -86,7 +86,7 @@ def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]
     return tuple((b - a) / length for a, b in zip(start, target, strict=True)), length
 
 
-def _step(model: Model, pose: Pose, direction: Vector, s: float, u: Vector) -> Pose | None:
+def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vector) -> Pose | None:
     """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
     zd, zdd = pose.tangent or directed(model, pose, direction)
     try:
@@ -123,7 +123,7 @@ def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
     if bridge is not None:
         return known.with_bridge(bridge, pose.u[0])
     room = 2.0 * HALF_WIDTH * reach
-    return known.with_blocked(Blocked(zero - room, zero + room))
+    return known.with_blocked(Blocked(zero - room, zero + room), pose.u[0])
 
 
 def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
@@ -134,7 +134,7 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
         distance = u - pose.u[0]
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
-        trial = _step(model, pose, ALONE, s, (u,) if whole else (pose.u[0] + s,))
+        trial = trusted_step(model, pose, ALONE, s, (u,) if whole else (pose.u[0] + s,))
         if trial is not None:
             pose = trial
         else:

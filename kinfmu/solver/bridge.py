@@ -180,6 +180,8 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
             return None
         if pose.moved > STEADY * pose.margin:
             return None
+        if distance > 1.0 and any(a * b <= 0.0 for a, b in zip(pose.determinants, poses[-1].determinants, strict=True)):
+            return None  # there is another zero beside the one to be bridged
         places.append(distance)
         poses.append(pose)
     return poses[3:]

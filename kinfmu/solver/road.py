@@ -21,11 +21,13 @@ class Blocked(NamedTuple):
 class Road(NamedTuple):
     """Bridges and blocked places, the latest last, and the stretch [low, high] around a pose that is free of windows.
 
-    A value: it travels with the poses that were found along it.
+    surveyed: intervals where no further singular point is to be sought. A value: it travels with the poses that were
+    found along it.
     """
 
     bridges: tuple[Bridge, ...] = ()
     blocked: tuple[Blocked, ...] = ()
+    surveyed: tuple[tuple[float, float], ...] = ()
     low: float = -inf
     high: float = inf
 
@@ -40,21 +42,22 @@ class Road(NamedTuple):
                 low = max(low, bridge.high)
             else:
                 high = min(high, bridge.low)
-        return Road(self.bridges, self.blocked, low, high)
+        return Road(self.bridges, self.blocked, self.surveyed, low, high)
 
     def with_bridge(self, bridge: Bridge, u: float) -> Road:
         """The road with one more bridge, seen from a driver value."""
-        return Road((*self.bridges, bridge)[-_KEPT:], self.blocked).around(u)
+        return _made((*self.bridges, bridge)[-_KEPT:], self.blocked).around(u)
 
-    def with_blocked(self, place: Blocked) -> Road:
-        """The road with one more blocked place."""
-        return Road(self.bridges, (*self.blocked, place)[-_KEPT:], self.low, self.high)
+    def with_blocked(self, place: Blocked, u: float) -> Road:
+        """The road with one more blocked place, seen from a driver value."""
+        return _made(self.bridges, (*self.blocked, place)[-_KEPT:]).around(u)
 
     def knows(self, u: float) -> bool:
         """True if the singular point near a driver value has been looked at."""
-        return any(place.low <= u <= place.high for place in self.blocked) or any(
-            abs(u - bridge.centre) <= 1.2 * bridge.half for bridge in self.bridges
-        )
+        for low, high in self.surveyed:
+            if low <= u <= high:
+                return True
+        return False
 
     def next_bridge(self, here: float, target: float) -> Bridge:
         """The bridge whose window holds `here`, or the one that ends the stretch around it on the target's side."""
@@ -72,4 +75,11 @@ class Road(NamedTuple):
 def laid(model: Model, data: list[Any]) -> Road:
     """The road that was dumped."""
     bridges, blocked = data
-    return Road(tuple(restored(model, bridge) for bridge in bridges), tuple(Blocked(*place) for place in blocked))
+    return _made(tuple(restored(model, bridge) for bridge in bridges), tuple(Blocked(*place) for place in blocked))
+
+
+def _made(bridges: tuple[Bridge, ...], blocked: tuple[Blocked, ...]) -> Road:
+    """Between a bridge's outermost nodes its own zero is the only one."""
+    surveyed = [(place.low, place.high) for place in blocked]
+    surveyed += [(bridge.nodes[0].u[0], bridge.nodes[-1].u[0]) for bridge in bridges]
+    return Road(bridges, blocked, tuple(surveyed))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from .advance import Limit, advance, limit_message, place
+from .advance import LONGEST_STEP, NEAR_SINGULAR, Limit, advance, limit_message, place, trusted_step
+from .bridge import REGULAR
 from .linear import reciprocal_condition
-from .pose import Model, Pose, Vector, evaluated, failed, tangent_of
+from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
 from .status import Status
 
@@ -28,11 +29,23 @@ class Solver:
         u, z = model.ANCHOR
         self.anchor = Pose(u, evaluated(model, u, z, held=0))
         self._one = len(u) == 1
+        self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
         if u == start.u:
             return start
+        road = start.road
+        if self._one and (road is None or road.low <= u[0] <= road.high):  # most samples: one trusted step
+            s = u[0] - start.u[0]
+            if -self._longest <= s <= self._longest:
+                near = trusted_step(self.model, start, ALONE, s, u)
+                if (
+                    near is not None
+                    and (near.margin >= REGULAR or (near.margin > NEAR_SINGULAR and road is not None and road.knows(u[0])))
+                    and near.watch <= self.tolerance >= near.residual
+                ):
+                    return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
         pose = advance(self.model, start, u)
@@ -63,6 +76,13 @@ class Solver:
             return tangent_of(self.model, pose)[0]
         return tuple(self.model.velocity(pose.values, ud))
 
+    def _both(self, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
+        """What the model's accelerations start from: z' and z'' with one driver, else zd and zdd."""
+        if self._one:
+            return tangent_of(self.model, pose)
+        zd = self._first(pose, ud)
+        return zd, tuple(self.model.acceleration(pose.values, ud, udd, zd))
+
     def outputs(self, pose: Pose) -> Vector:
         """Positions of the model's OUTPUTS."""
         return self.model.outputs(pose.values)  # type: ignore[no-any-return]  # generated code has no types
@@ -73,13 +93,13 @@ class Solver:
 
     def accelerations(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
-        model = self.model
-        if self._one:
-            first, second = pose.tangent or tangent_of(model, pose)
-        else:
-            first = self._first(pose, ud)
-            second = model.acceleration(pose.values, ud, udd, first)
-        return model.accelerations(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
+        first, second = self._both(pose, ud, udd)
+        return self.model.accelerations(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
+
+    def motion(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
+        """Positions, rates and accelerations of the OUTPUTS in one row: what they share is computed once."""
+        first, second = pose.tangent or self._both(pose, ud, udd)
+        return self.model.motion(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 
     def watch(self, pose: Pose) -> Vector:
         """Rows set aside as redundant, relative to the size."""

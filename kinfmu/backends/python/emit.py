@@ -10,6 +10,7 @@ The module holds constants and these functions, each a stage; nothing is compute
     outputs(values)                                -> positions of the outputs
     rates(values, ud, first)                       -> their rates
     accelerations(values, ud, udd, first, second)  -> their accelerations
+    motion(values, ud, udd, first, second)         -> the three in one row, with what they share computed once
     watches(values)                                -> rows set aside, relative to the size
     jacobians(values)                              -> one matrix a block
 
@@ -57,9 +58,10 @@ class _Emitter:
             self._velocity(),
             self._acceleration(),
             self._tangent(),
-            self._stage("outputs", "Positions of the outputs.", ["values"], 0),
-            self._stage("rates", "Rates of the outputs.", ["values", "ud", "first"], 1),
-            self._stage("accelerations", "Accelerations of the outputs.", ["values", "ud", "udd", "first", "second"], 2),
+            self._stage("outputs", "Positions of the outputs.", (0,)),
+            self._stage("rates", "Rates of the outputs.", (1,)),
+            self._stage("accelerations", "Accelerations of the outputs.", (2,)),
+            self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
             self._watches(),
             self._jacobians(),
         ]
@@ -264,15 +266,17 @@ class _Emitter:
             count += len(z)
         return lines
 
-    def _stage(self, name: str, docstring: str, arguments: Sequence[str], order: int) -> list[str]:
-        """A function that returns all outputs at one order of derivative."""
-        targets = [motion[1 + order] for motion in self.plan.outputs_motion]
+    def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
+        """A function that returns all outputs at some orders of derivative, one after another."""
+        targets = [motion[1 + order] for order in orders for motion in self.plan.outputs_motion]
+        highest = max(orders)
+        arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
         for argument, names in (("ud", self.inputs[1]), ("udd", self.inputs[2])):
             if argument in arguments:
                 lines += _unpack(map(identifier, names), argument)
-        if order:
-            lines += self._chained(order)
+        if highest:
+            lines += self._chained(highest)
         writer = Writer(self.names, reachable(self.position_nodes))
         body = self._defined(writer, targets, self._definitions(targets), set()) + writer.statements(targets)
         returned = _tuple(writer.expression(node) for node in targets)
