@@ -32,7 +32,8 @@ class Distance(Joint):
     def __post_init__(self) -> None:
         if not self.length >= SHORTEST:  # NaN too
             raise MechanismError(
-                f"[joints.{self.name}] length = {self.length!r} must be a positive number", joint=self.name
+                f"[joints.{self.name}] length = {self.length!r} must be a positive number, {SHORTEST:g} or more",
+                joint=self.name,
             )
 
     def bodies(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 
+LONGEST = 120
 _LARGEST_WHOLE = 10**40  # whole numbers beyond are told by their size; Python refuses to print very long ones
 
 
@@ -23,8 +24,9 @@ class _Quoter(reprlib.Repr):
 
 
 def quoted(value: object) -> str:
-    """'text' in quotes with its line breaks escaped, numbers and lists as they are; never longer than about a line."""
-    return _QUOTER.repr(value)
+    """'text' in quotes with its line breaks escaped, numbers and lists as they are; LONGEST characters at most."""
+    told = _QUOTER.repr(float(value) if isinstance(value, float) else value)  # numpy's floats print their type
+    return told if len(told) <= LONGEST else told[: LONGEST - 3] + "..."
 
 
 _QUOTER = _Quoter()

@@ -120,9 +120,10 @@ class _Reader:
             written = value
         else:
             raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
-        check_number(where, written)
-        check_number(where, written * factor)
-        return float(written) * factor
+        check_number(where, written, value)
+        number = float(written) * factor
+        check_number(where, number, value)
+        return number
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
         where = f"[bodies.{name}]"

@@ -22,15 +22,16 @@ def check_name(where: str, name: str) -> None:
         raise MechanismError(f"{where} {quoted(name)} {rule}")
 
 
-def check_number(where: str, value: Any) -> None:
-    """Raise a MechanismError unless `value` is a finite number of a size that can be meant."""
+def check_number(where: str, value: Any, written: object = None) -> None:
+    """Raise a MechanismError unless `value` is a finite number of a size that can be meant; `written`: as given."""
+    told = quoted(value if written is None else written)
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if not is_number:
-        raise MechanismError(f"{where} = {quoted(value)} must be a number")
+        raise MechanismError(f"{where} = {told} must be a number")
     if value != value or value in (math.inf, -math.inf):
-        raise MechanismError(f"{where} = {quoted(value)} must be a finite number")
+        raise MechanismError(f"{where} = {told} must be a finite number")
     if abs(value) > LARGEST_NUMBER:
-        raise MechanismError(f"{where} = {quoted(value)} is too large; numbers go up to {LARGEST_NUMBER:g}")
+        raise MechanismError(f"{where} = {told} is too large; numbers go up to {LARGEST_NUMBER:g}")
 
 
 def check_line(where: str, text: str) -> None:

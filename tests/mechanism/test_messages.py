@@ -1,0 +1,433 @@
+"""What is wrong in a mechanism file is told in one line: file, table, key, and what would be valid."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from kinfmu import gallery
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.toml_file import LARGEST_FILE, parse, read
+
+FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")
+
+
+def message(text: str) -> str:
+    """The one line that is told about a mechanism file with this text."""
+    with pytest.raises(MechanismError) as caught:
+        parse(text, "arm.toml")
+    told = str(caught.value)
+    assert told.splitlines() == [told]
+    assert told.startswith("arm.toml: ")
+    assert len(told) < 400
+    return told.removeprefix("arm.toml: ")
+
+
+def changed(old: str, new: str) -> str:
+    """The four-bar's file with one thing changed, in its first place."""
+    assert old in FOURBAR
+    return FOURBAR.replace(old, new, 1)
+
+
+LENGTHS = "m, mm, cm, um, km, in, ft"
+NAME_RULE = "must be letters, digits and underscores, no digit first, at most 100 in all"
+
+# what is changed, into what, and what is told
+CHANGES = {
+    "a table that is not known": (
+        "[joints.O]",
+        "[joint.O]",
+        "[joint]: unknown key; did you mean 'joints'?; "
+        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+    ),
+    "a key of the file that is not known": (
+        "title =",
+        "tittle =",
+        "tittle: unknown key; did you mean 'title'?; "
+        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+    ),
+    "a key of a joint that is not known": (
+        "length = 1\n",
+        "lenght = 1 ",
+        "[joints.AB] lenght: unknown key; did you mean 'length'?; keys: type, between, length",
+    ),
+    "a key of a body that is not known": (
+        "start = { x = 0,",
+        "stat = { x = 0,",
+        "[bodies.crank] stat: unknown key; did you mean 'start'?; keys: points, start",
+    ),
+    "a coordinate of a start pose that is not known": (
+        "start = { x = 0,",
+        "start = { z = 0,",
+        "[bodies.crank] start z: unknown key; keys: x, y, phi",
+    ),
+    "a key of a driver that is not known": (
+        "speed =",
+        "sped =",
+        "[drivers.crank] sped: unknown key; did you mean 'speed'?; keys: type, law, of, start, speed",
+    ),
+    "a key of the run that is not known": (
+        "step =",
+        "steps =",
+        "[run] steps: unknown key; did you mean 'step'?; keys: start, stop, step",
+    ),
+    "a key of the units that is not known": (
+        'length = "m"',
+        'angle = "deg"',
+        "[units] angle: unknown key; keys: length",
+    ),
+    "a name that is missing": (
+        'name = "fourbar"',
+        "",
+        "name is missing; the first line should be such as name = 'fourbar'",
+    ),
+    "a type that is missing": (
+        'type = "revolute"',
+        "",
+        "[joints.O] needs the key 'type', one of revolute, distance, coordinate",
+    ),
+    "a type that is not known": (
+        'type = "revolute"',
+        'type = "revolut"',
+        "[joints.O] type = 'revolut' is not known; did you mean 'revolute'?; known: revolute, distance, coordinate",
+    ),
+    "a type that is no text": (
+        'type = "revolute"',
+        "type = 1",
+        "[joints.O] type = 1 must be one of revolute, distance, coordinate",
+    ),
+    "a law that is missing": (
+        'law = "constant_speed"',
+        "",
+        "[drivers.crank] needs the key 'law', one of constant_speed",
+    ),
+    "a law that is not known": (
+        'law = "constant_speed"',
+        'law = "constant"',
+        "[drivers.crank] law = 'constant' is not known; did you mean 'constant_speed'?; known: constant_speed",
+    ),
+    "points of a joint that are missing": (
+        'between = ["ground.O", "crank.O"]',
+        "",
+        "[joints.O] needs the key 'between'; keys: between",
+    ),
+    "a length that is missing": ("length = 1\n", "", "[joints.AB] needs the key 'length'; keys: between, length"),
+    "a body of a driver that is missing": ('of = "crank"', "", "[drivers.crank] needs the key 'of'; keys: of, law"),
+    "one point in place of two": (
+        '["ground.O", "crank.O"]',
+        '"ground.O"',
+        "[joints.O] between = 'ground.O' must be two points ['body.point', 'body.point']",
+    ),
+    "three points in place of two": (
+        '["ground.O", "crank.O"]',
+        '["ground.O", "crank.O", "rocker.Q"]',
+        "[joints.O] between = ['ground.O', 'crank.O', 'rocker.Q'] must be two points ['body.point', 'body.point']",
+    ),
+    "a point that is a number": (
+        '["ground.O", "crank.O"]',
+        '["ground.O", 5]',
+        "[joints.O] between = 5 must be text such as 'body.point'",
+    ),
+    "a point without its body": (
+        '"crank.O"]',
+        '"O"]',
+        "[joints.O] between = 'O' must be 'body.point'",
+    ),
+    "a body that is not there": (
+        '"crank.O"]',
+        '"crnk.O"]',
+        "[joints.O] between: body 'crnk' is not in the mechanism; did you mean 'crank'?; "
+        "bodies: ground, crank, coupler, rocker",
+    ),
+    "a point that is not there": (
+        '"coupler.P"]',
+        '"coupler.p"]',
+        "[joints.P] between: body 'coupler' has no point 'p'; did you mean 'P'?; its points: P, Q, A",
+    ),
+    "a driven body that is not there": (
+        'of = "crank"',
+        'of = "crank.O"',
+        "[drivers.crank] of: body 'crank.O' is not in the mechanism; did you mean 'crank'?; "
+        "bodies: ground, crank, coupler, rocker",
+    ),
+    "a driven ground": (
+        'of = "crank"',
+        'of = "ground"',
+        "[drivers.crank] acts on the ground only, which does not move",
+    ),
+    "a body joined to itself": (
+        '["ground.O", "crank.O"]',
+        '["crank.P", "crank.O"]',
+        "[joints.O] joins body 'crank' to itself",
+    ),
+    "the ground joined to itself": (
+        '["ground.O", "crank.O"]',
+        '["ground.B", "ground.O"]',
+        "[joints.O] joins body 'ground' to itself",
+    ),
+    "a length that is negative": (
+        "length = 1\n",
+        "length = -1 ",
+        "[joints.AB] length = -1.0 must be a positive number, 1e-30 or more",
+    ),
+    "a length that is zero": (
+        "length = 1\n",
+        "length = 0 ",
+        "[joints.AB] length = 0.0 must be a positive number, 1e-30 or more",
+    ),
+    "a length that is no number": ("length = 1\n", "length = nan ", "[joints.AB] length = nan must be a finite number"),
+    "a length that is infinite": (
+        "length = 1\n",
+        "length = -inf ",
+        "[joints.AB] length = -inf must be a finite number",
+    ),
+    "a length that is too large": (
+        "length = 1\n",
+        "length = 1e200 ",
+        "[joints.AB] length = 1e+200 is too large; numbers go up to 1e+30",
+    ),
+    "a length that is too large in the unit used": (
+        "length = 1\n",
+        'length = "1e29 km" ',
+        "[joints.AB] length = '1e29 km' is too large; numbers go up to 1e+30",
+    ),
+    "a length of a thousand digits": (
+        "length = 1\n",
+        f"length = {'9' * 1000} ",
+        "[joints.AB] length = a whole number of 3322 bits is too large; numbers go up to 1e+30",
+    ),
+    "a length of five thousand hexadecimal digits": (
+        "length = 1\n",
+        f"length = 0x{'F' * 5000} ",
+        "[joints.AB] length = a whole number of 20000 bits is too large; numbers go up to 1e+30",
+    ),
+    "a length that is a truth": (
+        "length = 1\n",
+        "length = true ",
+        "[joints.AB] length = true must be a number or text such as '25 mm'",
+    ),
+    "a length that is a list": (
+        "length = 1\n",
+        "length = [1] ",
+        "[joints.AB] length = [1] must be a number or text such as '25 mm'",
+    ),
+    "a length with the unit of an angle": (
+        "length = 1\n",
+        'length = "1 deg" ',
+        f"[joints.AB] length = '1 deg': unit 'deg' must be one of {LENGTHS}",
+    ),
+    "a length as text without a unit": (
+        "length = 1\n",
+        'length = "1" ',
+        f"[joints.AB] length = '1': text needs a unit, one of {LENGTHS}",
+    ),
+    "a length that is text without a number": (
+        "length = 1\n",
+        'length = "one m" ',
+        "[joints.AB] length = 'one m' must be a number or text such as '25 mm'",
+    ),
+    "a speed with the unit of an angle": (
+        '"1 deg/s"',
+        '"1 deg"',
+        "[drivers.crank] speed = '1 deg': unit 'deg' must be one of "
+        "rad/s, rad/min, deg/s, deg/min, rev/s, rev/min, rpm",
+    ),
+    "an angle with the unit of a length": (
+        'phi = "60 deg"',
+        'phi = "60 mm"',
+        "[bodies.crank] start.phi = '60 mm': unit 'mm' must be one of rad, deg, rev",
+    ),
+    "a unit of length that is not known": (
+        'length = "m"',
+        'length = "parsec"',
+        f"[units] length = 'parsec' is not a unit of length; known: {LENGTHS}",
+    ),
+    "a unit that is no text": ('length = "m"', "length = 1", "[units] length = 1 must be text"),
+    "a point of one number": (
+        "O = [0, 0], C",
+        "O = [0], C",
+        "[bodies.ground] points.O = [0] must be two numbers [x, y]",
+    ),
+    "a point that is infinite": (
+        "O = [0, 0], C",
+        "O = [0, inf], C",
+        "[bodies.ground] points.O = inf must be a finite number",
+    ),
+    "points that are a list": (
+        "points = { O = [0, 0], P = [1, 0] }",
+        "points = [0, 0]",
+        "[bodies.crank] points = [0, 0] must be a table such as { P = [1, 0] }",
+    ),
+    "a start pose that is a list": (
+        'start = { x = 0, y = 0, phi = "60 deg" }',
+        "start = [0, 0, 0]",
+        "[bodies.crank] start = [0, 0, 0] must be a table such as { x = 0, y = 0, phi = 0 }",
+    ),
+    "a start pose of the ground": (
+        "[bodies.crank]",
+        "start = { x = 1 }\n[bodies.crank]",
+        "[bodies.ground] start: the ground does not move, its frame is the world's",
+    ),
+    "a run without an end": ("stop = 180", "stop = inf", "[run] stop = inf must be a finite number"),
+    "a run that ends before it starts": ("stop = 180", "stop = -1", "[run] stop = -1.0 lies before start = 0.0"),
+    "a step of nothing": ("step = 1", "step = 0", "[run] step = 0.0 must be positive"),
+    "a point of interest with the name of a body": (
+        'A = "coupler.A"',
+        'coupler = "coupler.A"',
+        "[points] coupler: a body has this name already, so 'coupler.x' would mean two things",
+    ),
+    "a point of interest that is a number": (
+        'A = "coupler.A"',
+        "A = 1",
+        "[points] A = 1 must be text such as 'body.point'",
+    ),
+    "a point of interest that is not there": (
+        'A = "coupler.A"',
+        'A = "coupler.B"',
+        "[points] A: body 'coupler' has no point 'B'; its points: P, Q, A",
+    ),
+    "a name with a blank": ('name = "fourbar"', 'name = "four bar"', f"name = 'four bar' {NAME_RULE}"),
+    "a name with a line break": ('name = "fourbar"', r'name = "four\nbar"', rf"name = 'four\nbar' {NAME_RULE}"),
+    "a name that is a number": ('name = "fourbar"', "name = 4", "name = 4 must be text"),
+    "a name of a body that a variable cannot have": (
+        "[bodies.crank]",
+        '[bodies."cränk"]',
+        f"[bodies] 'cränk' {NAME_RULE}",
+    ),
+    "a name of a joint with a line break": ("[joints.O]", r'[joints."O\nO"]', rf"[joints] 'O\nO' {NAME_RULE}"),
+    "a name of a driver with a dot": ("[drivers.crank]", '[drivers."crank.a"]', f"[drivers] 'crank.a' {NAME_RULE}"),
+    "a name of a point that is empty": ("{ O = [0, 0], P", '{ "" = [0, 0], P', f"[bodies.crank] points '' {NAME_RULE}"),
+    "a key with a line break": (
+        "title =",
+        r'"tit\nle" =',
+        r"'tit\nle': unknown key; did you mean 'title'?; "
+        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+    ),
+    "a title with a line break": (
+        'title = "Four-bar',
+        r'title = "\nFour-bar',
+        r"title = '\nFour-bar crank with a redundant constraint' must be one line of text without control characters",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_a_change_is_told_in_one_line_with_table_key_and_what_would_be_valid(case: str) -> None:
+    old, new, told = CHANGES[case]
+    assert message(changed(old, new)) == told
+
+
+def test_coordinates_of_the_outputs_are_checked() -> None:
+    def told(value: str) -> str:
+        return message(f"{FOURBAR}\n[outputs]\ncoordinates = {value}\n")
+
+    assert told('"most"') == "[outputs] coordinates = 'most' must be 'moving', 'all' or a list of names"
+    assert told("5") == "[outputs] coordinates = 5 must be 'moving', 'all' or a list of names"
+    assert told("[5]") == "[outputs] coordinates = 5 must be text such as 'crank.phi'"
+    assert told('["crank.x", "crank.x"]') == "[outputs] coordinates names a coordinate twice"
+    assert told('["crank.fi"]').startswith(
+        "[outputs] coordinates: 'crank.fi' is no coordinate of this mechanism; did you mean 'crank.phi'?; "
+        "coordinates: crank.x, crank.y, crank.phi, coupler.x"
+    )
+
+
+def test_two_joints_of_one_name_are_told_with_the_line() -> None:
+    text = changed("[joints.P]", "[joints.O]")
+    line = 1 + [k for k, line in enumerate(text.splitlines()) if line == "[joints.O]"][1]
+    assert message(text) == f"not valid TOML: Cannot declare ('joints', 'O') twice (at line {line}, column 10)"
+
+
+def test_a_mechanism_of_the_ground_only_is_told() -> None:
+    told = "[bodies] has only the ground; a mechanism needs a body that can move"
+    assert message('name = "a"') == told
+    assert message('name = "a"\n[bodies.ground]\n') == told
+
+
+def test_a_table_that_is_something_else_is_told() -> None:
+    assert message('name = "a"\njoints = 1') == "joints = 1 must be a table [joints]"
+    assert message('name = "a"\nbodies = "crank"') == "bodies = 'crank' must be a table [bodies]"
+    assert message('name = "a"\n[[joints]]\nx = 1') == "joints = [{'x': 1}] must be a table [joints]"
+    assert message('name = "a"\n[bodies]\ncrank = 1') == "[bodies] crank = 1 must be a table [bodies.crank]"
+
+
+def test_an_empty_file_is_told_how_to_begin() -> None:
+    told = "name is missing; the first line should be such as name = 'fourbar'"
+    assert message("") == told
+    assert message("# nothing yet\n") == told
+
+
+def test_what_is_not_toml_is_told_with_its_place() -> None:
+    assert message("name = \n") == "not valid TOML: Invalid value (at line 1, column 8)"
+    assert message("name").startswith("not valid TOML: Expected '='")
+    assert message(FOURBAR.replace("\n", "\r")).startswith("not valid TOML: ")
+
+
+def test_deep_nesting_is_told_and_does_not_overflow() -> None:
+    assert message("a = " + "[" * 100_000) == "not valid TOML: nested too deeply"
+    assert message("name" + ".a" * 2000 + " = 1").endswith("must be text")
+
+
+def test_a_number_of_thousands_of_digits_is_told() -> None:
+    assert message("name = " + "1" * 10_000) == "not valid TOML: a number has too many digits"
+
+
+def test_a_long_value_is_told_shortened() -> None:
+    assert re.fullmatch(r"name = 'a{40,}\.\.\.a{40,}' must be letters.*", message(f'name = "{"a" * 100_000}"'))
+    assert message("name = [" + "1," * 100_000 + "]") == "name = [1, 1, 1, 1, 1, 1, ...] must be text"
+
+
+def test_windows_line_ends_and_a_byte_order_mark_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "fourbar.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + FOURBAR.replace("\n", "\r\n").encode())
+    assert read(path) == parse(FOURBAR)
+
+
+def file_message(path: Path) -> str:
+    with pytest.raises(MechanismError) as caught:
+        read(path)
+    told = str(caught.value)
+    assert told.splitlines() == [told]
+    assert told.startswith(f"{path}: ")
+    return told.removeprefix(f"{path}: ")
+
+
+def test_files_that_cannot_be_read_are_told(tmp_path: Path) -> None:
+    assert file_message(tmp_path / "none.toml") == "cannot be read (No such file or directory)"
+    assert file_message(tmp_path) == "cannot be read (Is a directory)"
+    assert file_message(tmp_path / ("long" * 1000)) == "cannot be read (File name too long)"
+    assert file_message(tmp_path / "nul\0") == "cannot be read (embedded null byte)"
+
+
+def test_files_that_are_no_text_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"name = \xff")
+    assert file_message(path) == "not a text file (byte 7 is not UTF-8)"
+    path.write_bytes('name = "ä"'.encode("latin-1"))
+    assert file_message(path) == "not a text file (byte 8 is not UTF-8)"
+    path.write_text('name = "a"', encoding="utf-16")
+    assert file_message(path) == "not a text file (byte 0 is not UTF-8)"
+    path.write_bytes(b"\0" * 100)
+    assert file_message(path).startswith("not valid TOML: ")
+
+
+def test_a_file_too_large_is_not_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "large.toml"
+    with path.open("wb") as file:
+        file.truncate(LARGEST_FILE + 1)
+    assert file_message(path) == f"too large for a mechanism file (largest: {LARGEST_FILE} bytes)"
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="this system has no /dev/zero")
+def test_a_device_without_an_end_is_told() -> None:
+    assert file_message(Path("/dev/zero")).startswith("too large for a mechanism file")
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="everybody may read everything here")
+def test_a_file_without_permission_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "locked.toml"
+    path.write_text(FOURBAR)
+    path.chmod(0)
+    assert file_message(path) == "cannot be read (Permission denied)"
