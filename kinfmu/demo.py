@@ -70,12 +70,14 @@ def main() -> int:
     fmu = build(mechanism, Path("fmus/fourbar/fourbar.fmu"))
     run = simulate(fmu)
     bridged = listed_times(run, Status.BRIDGED)
-    print(f"\nsimulated {fmu} with fmpy: t = {run.t[0]:g} ... {run.t[-1]:g} s, {len(run)} samples; bridged at t = {bridged} s")
+    print(f"\nsimulated {fmu} with fmpy: t = {run.t[0]:g} ... {run.t[-1]:g} s, {len(run)} samples")
+    print(f"bridged over the singular points at t = {bridged} s")
 
     table, agrees = compare_with_report(run)
-    print(f"\nthe report's table, ours with its percent errors: {'all 25 numbers agree' if agrees else 'DIFFERS'}\n{table}")
+    print(f"\nours and the percent errors of the report's table: {'all 25 numbers agree' if agrees else 'DIFFERENT'}")
+    print(table)
     difference, exact = compare_with_closed_form(run)
-    print(f"\nlargest difference from the closed form at {len(run)} samples: {difference}{'' if exact else ' TOO LARGE'}")
+    print(f"\nlargest difference from the closed form: {difference} ({'fine' if exact else 'TOO LARGE'})")
 
     logs = Path("logs")
     logs.mkdir(exist_ok=True)

@@ -44,7 +44,8 @@ class Matrix:
 
     def __str__(self) -> str:
         head = f"{self.title}: {len(self.rows)} x {len(self.columns)}, rank {self.rank}"
-        return "\n".join([head, _table(self.rows, self.columns, self.entries), "row-reduced", _table(None, self.columns, self.reduced)])
+        plain = _table(self.rows, self.columns, self.entries)
+        return "\n".join([head, plain, "row-reduced", _table(None, self.columns, self.reduced)])
 
 
 def moving_jacobian(system: System, q: FloatArray, rows: Sequence[int], columns: Sequence[str], title: str) -> Matrix:

@@ -136,19 +136,21 @@ def _lines(report: Report) -> list[str]:
     unit = mechanism.length_unit
     rows = sum(len(joint.labels) for joint in mechanism.joints)
     lines = [f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name]
-    lines.append(f"  bodies      {len(mechanism.moving_bodies)} moving: {listed(b.name for b in mechanism.moving_bodies)}")
+    lines.append(
+        f"  bodies      {len(mechanism.moving_bodies)} moving: {listed(b.name for b in mechanism.moving_bodies)}"
+    )
     lines.append(f"  joint rows  {rows} over {len(mechanism.coordinate_names)} coordinates")
     lines.append(f"  mobility    {report.mobility}, driven by {listed(driver.name for driver in mechanism.drivers)}")
     if report.gruebler != report.mobility:
         lines.append(f"              Gruebler's count gives {report.gruebler}: it does not see that rows are redundant")
     for row in report.redundant:
-        lines.append(f"  redundant   {row.row.owner} (row {row.row.name}): at every pose it follows from "
-                     f"{listed(row.implied_by_joints)}; set aside and kept on watch")
+        reason = f"at every pose it follows from {listed(row.implied_by_joints)}; set aside and kept on watch"
+        lines.append(f"  redundant   {row.row.owner} (row {row.row.name}): {reason}")
     if not report.redundancy.dependent:
         lines.append("  redundant   none")
     for row in report.inconsistent:
-        lines.append(f"  contradicts {row.row.owner} (row {row.row.name}): {listed(row.implied_by_joints)} leave it open "
-                     f"by {abs(row.gap):.6g} {unit} at every pose")
+        reason = f"{listed(row.implied_by_joints)} leave it open by {abs(row.gap):.6g} {unit} at every pose"
+        lines.append(f"  contradicts {row.row.owner} (row {row.row.name}): {reason}")
     plan = report.plan
     if plan is not None:
         lines.append(f"  coordinates {listed(plan.coordinates)}")
@@ -174,10 +176,10 @@ def _singular_lines(report: Report) -> list[str]:
     if changes:
         places = listed(written(value, unit, kind) for value in changes)
         every = "k pi: " if _all_multiples_of_pi(changes) else ""
-        lines.append(f"  singular    {driver.name} = {every}{places}; branches cross there and the motion goes on (bridged)")
-    ends = [end for end in (report.range.low, report.range.high) if end is not None]
-    if ends:
-        low, high = (("no limit" if end is None else written(end, unit, kind)) for end in (report.range.low, report.range.high))
+        lines.append(f"  singular    {driver.name} = {every}{places}; branches cross, the motion goes on (bridged)")
+    both = (report.range.low, report.range.high)
+    if both != (None, None):
+        low, high = ("no limit" if end is None else written(end, unit, kind) for end in both)
         lines.append(f"  range       {driver.name} from {low} to {high}; dead centre at each limit")
     elif kind == "angle":
         lines.append(f"  range       {driver.name} turns all the way round")
@@ -222,7 +224,8 @@ def _pose(report: Report, plan: SolvePlan, value: float) -> FloatArray | None:
     """All coordinates at a driver value, exactly at a limit too: closed from the pose a little before it."""
     driver = plan.drivers[0]
     for nearer in (0.0, 1e-9, -1e-9):
-        run = solve(plan, **{driver.inputs[0]: [value + nearer]})
+        asked: dict[str, Any] = {driver.inputs[0]: [value + nearer]}
+        run = solve(plan, **asked)
         if run.good[0]:
             q = np.array([run[name][0] for name in report.mechanism.coordinate_names])
             return q if nearer == 0.0 else close(System(report.mechanism), q, np.array([value]))[0]

@@ -63,20 +63,20 @@ def driver_range(plan: SolvePlan) -> DriverRange | None:
             pose = arrived
             for bridge in pose.road.bridges if pose.road else ():
                 if bridge.centre not in found:
-                    found[bridge.centre] = _change_point(solver, bridge)
+                    found[bridge.centre] = _change_point(bridge)
         limits.append(limit)
     points = sorted(found.values(), key=lambda point: point.value)
     return DriverRange(tuple(_distinct(points, is_angle)), limits[0], limits[1])
 
 
-def _change_point(solver: Solver, bridge: Bridge) -> SingularPoint:
+def _change_point(bridge: Bridge) -> SingularPoint:
     """The zero of the determinant inside a bridge's window, by bisection on interpolated poses."""
     low, high = bridge.centre - 0.999 * bridge.half, bridge.centre + 0.999 * bridge.half
     block = _block(bridge)
-    at_low = _determinant(solver, bridge, low, block)
+    at_low = _determinant(bridge, low, block)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        at_middle = _determinant(solver, bridge, middle, block)
+        at_middle = _determinant(bridge, middle, block)
         if at_middle == 0.0:
             low = high = middle
         elif (at_middle < 0.0) == (at_low < 0.0):
@@ -92,7 +92,7 @@ def _block(bridge: Bridge) -> int:
     return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a * b < 0.0)
 
 
-def _determinant(solver: Solver, bridge: Bridge, u: float, block: int) -> float:
+def _determinant(bridge: Bridge, u: float, block: int) -> float:
     pose: Pose = bridge.pose((u,))
     return float(pose.determinants[block])
 
@@ -130,5 +130,3 @@ def multiple_of_pi(value: float) -> str | None:
             top = "pi" if size == 1 else f"{size} pi"
             return f"{sign}{top}" if denominator == 1 else f"{sign}{top}/{denominator}"
     return None
-
-

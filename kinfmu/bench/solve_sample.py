@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -55,7 +55,9 @@ Results = tuple[FloatArray, FloatArray, FloatArray]
 def _reference(u: FloatArray) -> Callable[[], Results]:
     system = System(load("fourbar"))
     kept = [*find_redundancy(system).kept, system.joint_row_count]
-    five = [system.coordinates.index(name) for name in ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")]
+    five = [
+        system.coordinates.index(name) for name in ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
+    ]
     q0 = np.array([0, 0, u[0], 1 + np.cos(u[0]), np.sin(u[0]), 0, 1, 0, u[0]])
 
     def way() -> Results:
@@ -72,7 +74,9 @@ def _reference(u: FloatArray) -> Callable[[], Results]:
 
 def _engine(u: FloatArray) -> Callable[[], Results]:
     mechanism = load("fourbar")
-    solver = Solver(load_model(compile_plan(mechanism, ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"])))
+    solver = Solver(
+        load_model(compile_plan(mechanism, ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]))
+    )
 
     def way() -> Results:
         pose, rows = solver.anchor, []
@@ -94,7 +98,7 @@ def _solve(u: FloatArray) -> Callable[[], Results]:
     return way
 
 
-def _stacked(rows: list[tuple[object, object, object]]) -> Results:
+def _stacked(rows: Sequence[tuple[object, ...]]) -> Results:
     q, qd, qdd = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     return q, qd, qdd
 

@@ -10,15 +10,16 @@ import numpy as np
 from kinfmu.equations.system import FloatArray, System
 
 CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
-SINGULAR = 1e-4  # margin below which a start pose counts as singular
+SINGULAR = 1e-6  # margin below which a start pose counts as singular: double roots are known to half the digits
+COMFORTABLE = 0.03  # margin below which a pose beside the start makes a better anchor
 BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
+_STEPS = 40  # in which a nearly singular start pose is left
+_APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
 
 
-def close(
-    system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | None = None
-) -> tuple[FloatArray, float]:
+def close(system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | None = None) -> tuple[FloatArray, float]:
     """The pose nearest to q where the chosen rows hold (all of them if None), and its residual relative to the size.
 
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near by, so that redundant rows and singular points do
@@ -84,10 +85,10 @@ def motion_samples(
     return samples
 
 
-def null_space(matrix: FloatArray) -> FloatArray:
-    """Orthonormal basis of the directions that a matrix maps to zero, (n, k)."""
+def null_space(matrix: FloatArray, small: float = _RANK) -> FloatArray:
+    """Orthonormal basis of the directions that a matrix maps to zero or to a small part of its norm, (n, k)."""
     _, singular, right = np.linalg.svd(matrix)
-    rank = int((singular > _RANK * singular.max(initial=0.0)).sum())
+    rank = int((singular > small * singular.max(initial=0.0)).sum())
     return np.asarray(right[rank:].T)
 
 
@@ -97,7 +98,7 @@ def rough_start(system: System) -> FloatArray:
 
 
 def start_targets(system: System) -> FloatArray:
-    """Driver values of the start pose, (d,): as measured in it where it gives what the driver moves, else by the law."""
+    """Driver values of the start pose, (d,): measured in it where it gives what the driver moves, else by the law."""
     given = [value is not None for body in system.mechanism.moving_bodies for value in body.start]
     q = rough_start(system)
     measured, seen = system.measure(q), system.jacobian(q)[system.joint_row_count :] != 0.0
@@ -118,7 +119,7 @@ class Assembled(NamedTuple):
 
 
 def assemble(system: System) -> Assembled | None:
-    """The start pose, closed; if it is singular, the more regular of the poses a little beside it.
+    """The start pose, closed; if it is singular or nearly so, the most regular of it and the poses a little beside it.
 
     None if the rows, all together, do not close near the start pose.
     """
@@ -127,15 +128,51 @@ def assemble(system: System) -> Assembled | None:
     if gap > CLOSED:
         return None
     found = Assembled(q, u, margin(system, q))
-    if found.margin > SINGULAR:
+    if found.margin > COMFORTABLE:
         return found
     beside = []
     for side in (1.0, -1.0):
-        step = side * BESIDE * np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
-        near, gap = close(system, q, u + step)
-        if gap <= CLOSED:
-            beside.append(Assembled(near, u + step, margin(system, near)))
+        way = side * BESIDE * np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
+        if found.margin > SINGULAR:
+            near = _walked(system, q, u, way)
+        else:
+            near = next(iter(branches(system, q, u + way)), None)
+        if near is not None:
+            beside.append(Assembled(near, u + way, margin(system, near)))
     return max([found, *beside], key=lambda pose: pose.margin)
+
+
+def _walked(system: System, q: FloatArray, u: FloatArray, way: FloatArray) -> FloatArray | None:
+    """The pose a way of the drivers further on the same branch, or None if it does not close there.
+
+    Small steps with a second-order prediction, for close to a singular point the prediction decides the branch.
+    """
+    ud, at_rest = way / _STEPS, np.zeros(len(way))
+    for k in range(1, _STEPS + 1):
+        jacobian = system.jacobian(q)
+        qd = np.linalg.lstsq(jacobian, system.nu(q, ud), rcond=_RANK)[0]
+        gamma = system.gamma(q, qd, u + (k - 1) * ud, ud, at_rest)
+        qdd = np.linalg.lstsq(jacobian, gamma, rcond=_RANK)[0]
+        q, gap = close(system, q + qd + 0.5 * qdd, u + k * ud)
+        if gap > CLOSED:
+            return None
+    return q
+
+
+def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatArray]:
+    """Closed poses at driver values u a little beside a singular pose, nearest first: one a branch that leaves it."""
+    free = null_space(system.scaled_jacobian(singular), 1e-4)
+    starts = [singular] + [
+        singular + side * system.column_scales * direction for direction in free.T for side in (-0.2, 0.2)
+    ]
+    found: list[tuple[float, FloatArray]] = []
+    for start in starts:
+        pose, gap = close(system, start, u)
+        away = float(np.abs((pose - singular) / system.column_scales).max())
+        new = all(np.abs((pose - other) / system.column_scales).max() > _APART for _, other in found)
+        if gap <= CLOSED and away < 1.0 and new:
+            found.append((away, pose))
+    return [pose for _, pose in sorted(found, key=lambda item: item[0])]
 
 
 def _reach(system: System, kind: str) -> float:

@@ -1,4 +1,4 @@
-"""The method as the book writes it, dense and with numpy: readable, and the baseline that everything else is held to."""
+"""The method as the book writes it, dense and with numpy: readable, and the baseline for everything else."""
 
 from __future__ import annotations
 
@@ -33,15 +33,17 @@ def solve_reference(
     """
     chosen = list(rows)
     q = np.array(q, dtype=float)
-    for iteration in range(_ITERATIONS):
+    iterations = 0
+    while True:
         residual = system.residual(q, u)[chosen]
         jacobian = system.jacobian(q)[chosen]
         if np.abs(residual).max() <= 1e-14 * system.size:
             break
+        if iterations == _ITERATIONS:
+            raise PoseError(f"Newton did not end: residual {np.abs(residual).max():.2g} after {_ITERATIONS} iterations")
         dq = np.linalg.solve(jacobian, -residual)
         q += dq
-    else:
-        raise PoseError(f"Newton did not end: residual {np.abs(residual).max():.2g} after {_ITERATIONS} iterations")
-    qd = np.linalg.solve(jacobian, system.nu(q, ud)[chosen])
-    qdd = np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen])
-    return Solution(q, qd, qdd, iteration)
+        iterations += 1
+    qd = np.asarray(np.linalg.solve(jacobian, system.nu(q, ud)[chosen]), dtype=float)
+    qdd = np.asarray(np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen]), dtype=float)
+    return Solution(q, qd, qdd, iterations)

@@ -94,7 +94,8 @@ class System:
 
     def gaps(self, phi: ArrayLike) -> FloatArray:
         """By how much each joint row is open, as a length, (joint rows,)."""
-        values, gaps = list(_floats(phi)), []
+        values = _floats(phi)
+        gaps: list[float] = []
         for joint in self.mechanism.joints:
             count = len(joint.labels)
             gaps += joint.gaps(tuple(values[:count]))

@@ -42,9 +42,7 @@ class Taylor:
 
     def __mul__(self, other: Taylor | float) -> Taylor:
         o = _lifted(other)
-        return Taylor(
-            self.f * o.f, self.d1 * o.f + self.f * o.d1, self.d2 * o.f + 2.0 * self.d1 * o.d1 + self.f * o.d2
-        )
+        return Taylor(self.f * o.f, self.d1 * o.f + self.f * o.d1, self.d2 * o.f + 2.0 * self.d1 * o.d1 + self.f * o.d2)
 
     def __truediv__(self, other: Taylor | float) -> Taylor:
         o = _lifted(other)

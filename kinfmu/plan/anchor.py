@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 
-from kinfmu.equations.assembly import CLOSED, SINGULAR, Assembled, assemble, close, margin, null_space, rough_start, start_targets
+from kinfmu.equations.assembly import (
+    SINGULAR,
+    Assembled,
+    assemble,
+    branches,
+    close,
+    margin,
+    rough_start,
+    start_targets,
+)
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
-
-_APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 
 
 def find_anchor(system: System) -> Assembled:
@@ -24,29 +31,15 @@ def find_anchor(system: System) -> Assembled:
         raise _does_not_close(system)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
-        raise MobilityError(f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too")
+        raise MobilityError(
+            f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too"
+        )
     start, _ = close(system, rough_start(system), start_targets(system))
     if margin(system, start) <= SINGULAR:
-        branches = _branches(system, start, found)
-        if len(branches) > 1:
-            raise _ambiguous(system, found, branches)
+        leaving = branches(system, start, found.u)
+        if len(leaving) > 1:
+            raise _ambiguous(system, found, leaving)
     return found
-
-
-def _branches(system: System, singular: FloatArray, found: Assembled) -> list[FloatArray]:
-    """Poses at the anchor's driver values that are reached from the singular start pose."""
-    free = null_space(system.scaled_jacobian(singular))
-    starts = [found.q, singular] + [
-        singular + side * system.column_scales * direction for direction in free.T for side in (-0.2, 0.2)
-    ]
-    branches: list[FloatArray] = []
-    for start in starts:
-        pose, gap = close(system, start, found.u)
-        away = np.abs((pose - singular) / system.column_scales).max()
-        new = all(np.abs((pose - other) / system.column_scales).max() > _APART for other in branches)
-        if gap <= CLOSED and away < 1.0 and new:
-            branches.append(pose)
-    return branches
 
 
 def _does_not_close(system: System) -> AssemblyError:
@@ -56,21 +49,21 @@ def _does_not_close(system: System) -> AssemblyError:
     worst = int(gaps.argmax())
     unit = system.mechanism.length_unit
     return AssemblyError(
-        f"the mechanism does not close near its start pose ({_at(system, u)}): joint '{system.rows[worst].owner}' stays "
-        f"open by {gaps[worst]:.4g} {unit}; check lengths and start poses",
+        f"the mechanism does not close near its start pose ({_at(system, u)}): joint '{system.rows[worst].owner}' "
+        f"stays open by {gaps[worst]:.4g} {unit}; check lengths and start poses",
         joint=system.rows[worst].owner,
         gap=float(gaps[worst]),
     )
 
 
-def _ambiguous(system: System, found: Assembled, branches: list[FloatArray]) -> AmbiguousStartError:
-    spread = np.ptp(np.array(branches) / system.column_scales, axis=0)
+def _ambiguous(system: System, found: Assembled, leaving: list[FloatArray]) -> AmbiguousStartError:
+    spread = np.ptp(np.array(leaving) / system.column_scales, axis=0)
     tell = int(spread.argmax())
-    values = listed(f"{branch[tell]:.4g}" for branch in branches)
+    values = listed(f"{branch[tell]:.4g}" for branch in leaving)
     return AmbiguousStartError(
-        f"the start pose is singular ({_at(system, start_targets(system))}) and {len(branches)} branches leave it: at "
+        f"the start pose is singular ({_at(system, start_targets(system))}) and {len(leaving)} branches leave it: at "
         f"{_at(system, found.u)} {system.coordinates[tell]} can be {values}; give a start pose beside it",
-        branches=branches,
+        branches=leaving,
     )
 
 

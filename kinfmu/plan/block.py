@@ -78,7 +78,12 @@ class Rates:
 
 
 def build_block(
-    system: System, tracer: Tracer, row: RowTracer, rates: Rates, structure: BlockStructure, fixed: Mapping[str, Node],
+    system: System,
+    tracer: Tracer,
+    row: RowTracer,
+    rates: Rates,
+    structure: BlockStructure,
+    fixed: Mapping[str, Node],
     anchor: Mapping[str, float],
 ) -> Block:
     """Trace the rows of a block once and take everything from that trace. anchor: all coordinates, by name."""
@@ -112,8 +117,10 @@ def build_block(
 
 
 def block_determinant(jacobian: NDArray[np.float64]) -> float:
-    """What the run time watches as the determinant of a block: for one and two unknowns det J itself; from three on that
-    of the rows scaled to unit length; for tall J the product of R's diagonal over the column lengths.
+    """What the run time watches as the determinant of a block.
+
+    For one and two unknowns det J itself; from three on that of the rows scaled to unit length; for tall J the product
+    of R's diagonal over the column lengths.
     """
     m, k = jacobian.shape
     if m > k:
@@ -131,7 +138,10 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
     largest = 0.0
     for sample in range(_DETERMINANT_SAMPLES):
         turned = {
-            name: value if sample == 0 else rng.uniform(-np.pi, np.pi) if name.endswith(".phi")
+            name: value
+            if sample == 0
+            else rng.uniform(-np.pi, np.pi)
+            if name.endswith(".phi")
             else value + size * rng.uniform(-0.5, 0.5)
             for name, value in anchor.items()
         }

@@ -94,9 +94,11 @@ class SolvePlan:
         number = {node: k for k, node in enumerate(reachable(roots))}
         lines = [f"plan {self.mechanism.name} size {self.size!r} anchor {self.anchor_values!r}"]
         for node, k in number.items():
-            lines.append(f"{k} = {node.op} {node.value if not node.args else ' '.join(str(number[a]) for a in node.args)}")
+            made_of = " ".join(str(number[arg]) for arg in node.args) if node.args else node.value
+            lines.append(f"{k} = {node.op} {made_of}")
         for block in self.blocks:
-            lines.append(f"block {block.unknowns} {block.row_names} {block.row_scales} {block.determinant_scale!r} {[number[n] for n in _nodes(block)]}")
+            scales = f"{block.row_scales} {block.determinant_scale!r}"
+            lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in _nodes(block)]}")
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"{list(self.fixed.items())} {self.law_constants} {self.drivers} {self.coordinate_count}"]

@@ -1,6 +1,6 @@
 """Structure of the rows: which coordinates are constants, which are given outright, and which blocks remain.
 
-    rows -> constants -> matching and strongly connected components -> blocks in order -> assignments in each block
+rows -> constants -> matching and strongly connected components -> blocks in order -> assignments in each block
 """
 
 from __future__ import annotations
@@ -78,10 +78,10 @@ def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_asid
         for index in open_rows
     }
     blocks = [
-        _torn(system, tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
+        _torn(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
         for rows, columns in _blocks(system, open_rows, unknown, meets)
     ]
-    return Structure(fixed, tuple(_with_companions(system, tracer, row, known, blocks, kept, set_aside)))
+    return Structure(fixed, tuple(_with_companions(system, row, known, blocks, kept, set_aside)))
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:
@@ -143,7 +143,7 @@ def _blocks(
     if len(rows) != len(unknown) or (match < 0).any():
         missed = [unknown[k] for k in range(len(unknown)) if k not in set(match.tolist())]
         spare = [system.rows[index].name for index, k in zip(rows, match, strict=True) if k < 0]
-        raise MobilityError(f"rows and coordinates do not match: nothing determines {listed(missed)}; spare rows: {listed(spare)}")
+        raise MobilityError(f"nothing determines {listed(missed)}; rows to spare: {listed(spare)}")
     owner = np.empty(len(unknown), dtype=int)
     owner[match] = np.arange(len(rows))
     needs = csr_matrix((np.ones(len(column)), (row_number, owner[column])), shape=(len(rows), len(rows)))
@@ -179,14 +179,13 @@ def _topological(
 
 
 def _torn(
-    system: System,
     tracer: Tracer,
     row: RowTracer,
     known: Mapping[str, Node],
     rows: Sequence[int],
     columns: Sequence[str],
 ) -> BlockStructure:
-    """Assignments taken out of a block: rows that give a coordinate outright, as long as they do not need each other."""
+    """Assignments taken out of a block: rows that give a coordinate outright and do not need each other in turn."""
     needs: dict[str, set[str]] = {}  # assigned coordinate -> coordinates of the block in its row
     assigned: dict[str, int] = {}
     for index in rows:
@@ -228,7 +227,6 @@ def _reaches(needs: Mapping[str, set[str]], start: set[str], goal: str) -> bool:
 
 def _with_companions(
     system: System,
-    tracer: Tracer,
     row: RowTracer,
     known: Mapping[str, Node],
     blocks: Sequence[BlockStructure],
