@@ -1,0 +1,127 @@
+"""kinfmu check: findings as text, as JSON and as matrices; a mechanism at fault is told and exits with 1."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Command
+
+
+def test_the_check_of_the_fourbar_says_what_a_colleague_would(command: Command) -> None:
+    result = command("check", "fourbar")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    for line in (
+        "fourbar: Four-bar crank with a redundant constraint",
+        "mobility    1, driven by crank",
+        "Gruebler's count gives 0",
+        "redundant   AB (row AB.length): at every pose it follows from O, P, C, Q",
+        "coordinates crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi",
+        "fixed       crank.x = 0, crank.y = 0, rocker.x = 1, rocker.y = 0",
+        "2 x 2: coupler.phi, rocker.phi from Q.x, Q.y, determinant sin(coupler.phi - rocker.phi)",
+        "singular    crank = k pi: 0 (0 deg), pi (180 deg)",
+    ):
+        assert line in result.stdout
+
+
+def test_the_check_as_json_has_the_findings_by_name(command: Command) -> None:
+    result = command("check", "fourbar", "--json")
+    assert result.exit_code == 0
+    found = json.loads(result.stdout)
+    assert found["mobility"] == 1
+    assert found["gruebler"] == 0
+    assert [(row["name"], row["implied_by"]) for row in found["redundant"]] == [("AB", ["O", "P", "C", "Q"])]
+    assert found["inconsistent"] == []
+    assert found["coordinates"] == ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]
+    assert found["fixed"] == {"crank.x": 0.0, "crank.y": 0.0, "rocker.x": 1.0, "rocker.y": 0.0}
+    assert found["blocks"] == [
+        {
+            "unknowns": ["coupler.phi", "rocker.phi"],
+            "rows": ["Q.x", "Q.y"],
+            "determinant": "sin(coupler.phi - rocker.phi)",
+        }
+    ]
+    assert [point["value"] for point in found["singular"]] == pytest.approx([0.0, math.pi], abs=1e-9)
+    assert found["problem"] is None
+    assert "matrices" not in found
+
+
+def test_matrices_are_told_plain_and_row_reduced(command: Command) -> None:
+    result = command("check", "fourbar", "--matrices")
+    assert result.exit_code == 0
+    assert "Phi_K,q at crank = pi/3 (60 deg): 5 x 5, rank 4" in result.stdout
+    assert "singular point: 5 x 5, rank 4" in result.stdout
+    assert "a small turn beside it: 5 x 5, rank 5" in result.stdout
+    assert result.stdout.count("\nrow-reduced\n") == result.stdout.count(", rank ") == 6
+
+
+def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command) -> None:
+    matrices = json.loads(command("check", "fourbar", "--json", "--matrices").stdout)["matrices"]
+    joints, system = matrices[:2]
+    assert joints["columns"] == ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]
+    assert joints["rows"] == ["P.x", "P.y", "Q.x", "Q.y", "AB.length"]
+    s, c = math.sqrt(0.75), 0.5
+    expected = [[s, 1, 0, 0, 0], [-c, 0, 1, -1, 0], [0, 1, 0, 0, s], [0, 0, 1, 0, -c], [0, 1, 2 * s, 2 * s, 0]]
+    np.testing.assert_allclose(joints["entries"], expected, atol=1e-12)
+    assert [matrix["rank"] for matrix in matrices] == [4, 5, 4, 5, 4, 5]
+    assert not any(joints["reduced"][4])
+    assert system["rows"] == ["P.x", "P.y", "Q.x", "Q.y", "crank.angle"]
+    np.testing.assert_allclose(system["reduced"], np.eye(5), atol=1e-12)
+
+
+def test_a_bar_of_a_wrong_length_is_told_by_name_and_gap(
+    command: Command, fails: Callable[..., str], fourbar_file: Callable[..., Path]
+) -> None:
+    path = fourbar_file("length = 1\n", "length = 1.01\n")
+    told = fails("check", path)
+    assert told.startswith(f"{path}: [joints.AB] contradicts the other joints: O, P, C, Q leave ")
+    assert " open by 0.01 m" in told
+    assert "contradicts AB" in command("check", path).stdout
+    found = json.loads(command("check", path, "--json").stdout)
+    assert [(row["name"], round(abs(row["gap"]), 12)) for row in found["inconsistent"]] == [("AB", 0.01)]
+    assert f"{path}: {found['problem']}" == told
+
+
+@pytest.mark.parametrize("arguments", [("solve", "-o", "run.csv"), ("build", "-o", "mine.fmu"), ("simulate",)])
+def test_every_command_names_the_file_whose_bar_is_wrong(
+    arguments: tuple[str, ...], fails: Callable[..., str], fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = fourbar_file("length = 1\n", "length = 1.01\n")
+    verb, *rest = arguments
+    assert fails(verb, path, *rest).startswith(f"{path}: [joints.AB] contradicts the other joints")
+    assert not [made.name for made in tmp_path.iterdir() if made.suffix in (".csv", ".fmu")]
+
+
+def test_a_driver_too_many_or_too_few_is_told(fails: Callable[..., str], fourbar_file: Callable[..., Path]) -> None:
+    second = '[drivers.two]\ntype = "angle"\nof = "rocker"\nlaw = "constant_speed"\n[points]'
+    path = fourbar_file("[points]", second)
+    assert fails("check", path) == f"{path}: [drivers] mobility is 1 but there are 2 drivers (crank, two): remove 1"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text[: text.index("[drivers.crank]")], encoding="utf-8")
+    assert fails("check", path) == (
+        f"{path}: [drivers] mobility is 1 but there is no driver (none): 1 more driver is needed"
+    )
+
+
+def test_a_mistake_in_the_file_is_told_with_its_place(
+    fails: Callable[..., str], fourbar_file: Callable[..., Path]
+) -> None:
+    path = fourbar_file("length = 1\n", "lenght = 1\n")
+    told = fails("check", path)
+    assert told.startswith(f"{path}: [joints.AB] lenght: unknown key; did you mean 'length'?")
+
+
+def test_a_name_that_is_nowhere_is_wrong_usage(refuses: Callable[..., str]) -> None:
+    assert refuses("check", "forbar") == (
+        "Invalid value for 'MECH': 'forbar' is not in the gallery; did you mean 'fourbar'?; "
+        "gallery: double_pendulum, fourbar; files end in .toml"
+    )
+    assert refuses("check", "none.toml").endswith("none.toml: there is no such file")
+    assert refuses("check", "n" * 5000 + ".toml").endswith(": there is no such file")
+    assert refuses("check") == "Missing argument 'MECH'."

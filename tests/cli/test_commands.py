@@ -1,0 +1,165 @@
+"""kinfmu list, new, build and simulate, help, and the command as its own program."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu import gallery, log
+from kinfmu.cli import main
+from tests.cli.conftest import Command
+
+ROOT = Path(__file__).parents[2]
+
+
+def program(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "kinfmu.cli", *arguments],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_list_names_the_gallery_with_titles(command: Command) -> None:
+    result = command("list")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines()] == gallery.names()
+    assert "fourbar          Four-bar crank with a redundant constraint" in result.stdout.splitlines()
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tmp_path: Path) -> None:
+    result = command("new", name, "mine.toml")
+    assert result.exit_code == 0
+    assert result.stdout == "mine.toml: written; next: kinfmu check mine.toml\n"
+    assert kinfmu.load(tmp_path / "mine.toml") == kinfmu.load(name)
+    assert (tmp_path / "mine.toml").read_text(encoding="utf-8").startswith("# ")
+    assert command("check", "mine.toml").exit_code == 0
+
+
+def test_new_starts_from_a_file_of_ones_own(
+    command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    source = fourbar_file("stop = 180", "stop = 90")
+    assert command("new", source, "copy.toml").exit_code == 0
+    assert (tmp_path / "copy.toml").read_bytes() == source.read_bytes()
+
+
+def test_new_does_not_overwrite(fails: Callable[..., str], tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("precious")
+    assert fails("new", "fourbar", "mine.toml") == "mine.toml: is there already; nothing was written"
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+
+
+def test_new_tells_what_it_cannot_write(fails: Callable[..., str], refuses: Callable[..., str]) -> None:
+    assert fails("new", "fourbar", "none/mine.toml") == "none/mine.toml: cannot be written (No such file or directory)"
+    assert fails("new", "fourbar", "n" * 300 + ".toml").endswith(": cannot be written (File name too long)")
+    assert refuses("new", "fourbar", "mine.txt") == "mine.txt: a mechanism file ends in .toml"
+    assert "'forbar' is not in the gallery; did you mean 'fourbar'?" in refuses("new", "forbar", "mine.toml")
+
+
+def test_build_and_simulate_step_an_fmu_into_logs(command: Command, tmp_path: Path) -> None:
+    built = command("build", "fourbar", "-o", "four.fmu")
+    assert built.exit_code == 0
+    assert re.fullmatch(r"four\.fmu: \d+ kB, FMI 2\.0 co-simulation, driven by time\n", built.stdout)
+    logs = ("--mcap", "four.mcap", "--rrd", "four.rrd")
+    result = command("simulate", "four.fmu", "--start", "20", "--stop", "30", "--step", "5", *logs)
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[1:] == ["to look at it: kinfmu review four.mcap"]
+    assert result.stdout.startswith("3 samples: 3 ok; largest residual ")
+    run = log.read(tmp_path / "four.mcap")
+    assert run.t.tolist() == [20.0, 25.0, 30.0]
+    assert run["coupler.y"][2] == pytest.approx(0.5, abs=1e-12)
+    assert (tmp_path / "four.rrd").stat().st_size > 0
+    assert not (tmp_path / "logs").exists()
+
+
+def test_simulate_builds_a_mechanism_first_and_logs_beside_it(
+    command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    result = command("simulate", fourbar_file(), "--stop", "2", "--set", "crank.speed=0.5", "--set", "crank.start=0.25")
+    assert result.exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == ["fourbar.mcap", "fourbar.rrd"]
+    assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.25, 0.75, 1.25])
+
+
+def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "inputs.csv").write_text("time,crank_angle\n0,0.5\n2,1.5\n")
+    assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv").exit_code == 0
+    assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.5, 1.0, 1.5])
+
+
+def test_simulate_tells_a_limit_and_keeps_what_was_reached(command: Command, tmp_path: Path) -> None:
+    result = command("simulate", "double_pendulum", "--stop", "3", "--step", "0.5")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("kinfmu: t = 2")
+    assert "crank = 6.54498469498 rad (375 deg) cannot be reached: the limit is crank = 6.28" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    run = log.read(tmp_path / "logs" / "double_pendulum.mcap")
+    assert run.good[:5].all()
+
+
+def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str], fails: Callable[..., str]) -> None:
+    assert refuses("simulate", "none.fmu") == "none.fmu: there is no such file"
+    assert "'forbar' is not in the gallery" in refuses("simulate", "forbar")
+    assert "'none.csv' does not exist" in refuses("simulate", "fourbar", "--input", "none.csv")
+    assert "'fast' is not a valid float" in refuses("simulate", "fourbar", "--step", "fast")
+    assert fails("build", "fourbar", "-o", "four.fmu", "--outputs", "rocker.fi").startswith(
+        "fourbar: outputs: 'rocker.fi' is not one; did you mean 'rocker.phi'?"
+    )
+
+
+def test_a_file_that_is_no_fmu_is_told(fails: Callable[..., str], tmp_path: Path) -> None:
+    (tmp_path / "text.fmu").write_text("no archive")
+    assert "text.fmu" in fails("simulate", "text.fmu")
+
+
+def test_review_of_a_run_that_is_missing_is_told(fails: Callable[..., str]) -> None:
+    assert fails("review", "none.mcap", "--save", "none.rrd").startswith("none.mcap: ")
+
+
+def test_every_command_explains_itself(command: Command) -> None:
+    assert command("--version").stdout == f"kinfmu, version {kinfmu.VERSION}\n"
+    told = command("-h").stdout
+    for name, one in main.commands.items():
+        assert f"  {name} " in told
+        explained = command(name, "--help")
+        assert explained.exit_code == 0
+        assert (one.help or "").split("\n")[0][:60] in " ".join(explained.stdout.split())
+
+
+def test_an_unknown_command_is_wrong_usage(refuses: Callable[..., str]) -> None:
+    assert refuses("chek").startswith("No such command 'chek'")
+
+
+def test_the_program_checks_a_mechanism_in_a_process_of_its_own(tmp_path: Path) -> None:
+    done = program("check", "double_pendulum", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert "mobility    1, driven by crank" in done.stdout
+
+
+def test_the_program_tells_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: Callable[..., Path]) -> None:
+    path = fourbar_file("length = 1\n", "length = 1.01\n")
+    done = program("solve", path.name, "-o", "run.csv", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert re.fullmatch(r"kinfmu: mine\.toml: \[joints\.AB\] contradicts .* open by 0\.01 m.*\n", done.stderr)
+
+
+def test_the_program_tells_wrong_usage_with_status_two(tmp_path: Path) -> None:
+    done = program("solve", "fourbar", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.endswith("Error: Missing option '-o'.\n")

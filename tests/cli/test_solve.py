@@ -1,0 +1,164 @@
+"""kinfmu solve: tables of times, driver values, settings and outputs; wrong ones are told."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.cli.conftest import Command
+
+
+def read_csv(path: Path) -> dict[str, NDArray[np.float64]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    return dict(zip(names, np.array(rows, dtype=float).T, strict=True))
+
+
+def test_the_run_of_the_file_is_solved_to_its_end(command: Command, tmp_path: Path) -> None:
+    result = command("solve", "fourbar", "-o", "run.csv")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("181 samples: 175 ok, 6 bridged; largest residual ")
+    assert result.stdout.endswith("of the size; written to run.csv\n")
+    table = read_csv(tmp_path / "run.csv")
+    assert table["time"].tolist() == list(range(181))
+    np.testing.assert_allclose(table["coupler.x"], 1.0 + np.cos(np.radians(table["time"])), atol=1e-12)
+    np.testing.assert_allclose(table["rocker.omega"], math.radians(1.0), atol=1e-12)
+
+
+def test_driver_values_in_degrees_go_all_the_way_round(command: Command, tmp_path: Path) -> None:
+    assert command("solve", "fourbar", "-o", "run.npz", "--angle", "0deg:360deg:361").exit_code == 0
+    with np.load(tmp_path / "run.npz") as table:
+        np.testing.assert_allclose(table["crank_angle"], np.radians(np.arange(361.0)), atol=1e-14)
+        np.testing.assert_allclose(table["coupler.y"], np.sin(table["crank.phi"]), atol=1e-12)
+        assert set(table["solver.status"]) <= {0, 2}
+
+
+def test_driver_values_without_units_are_radians(command: Command, tmp_path: Path) -> None:
+    assert command("solve", "fourbar", "-o", "run.csv", "--angle", "0.5:-1.5:5").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["crank_angle"].tolist() == [0.5, 0.0, -0.5, -1.0, -1.5]
+
+
+def test_times_include_the_end_where_a_step_meets_it(command: Command, tmp_path: Path) -> None:
+    assert command("solve", "double_pendulum", "-o", "run.csv", "--times", "0:0.3:0.1").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["time"] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert command("solve", "double_pendulum", "-o", "run.csv", "--times", "0:0.35s:100ms").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["time"] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert command("solve", "double_pendulum", "-o", "run.csv", "--times", "1:1:1").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["time"].tolist() == [1.0]
+
+
+def test_a_parquet_table_has_the_columns_of_the_csv(command: Command, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is optional")
+    assert command("solve", "fourbar", "-o", "run.parquet", "--times", "0:2:1").exit_code == 0
+    assert command("solve", "fourbar", "-o", "run.csv", "--times", "0:2:1").exit_code == 0
+    assert parquet.read_table(tmp_path / "run.parquet").column_names == list(read_csv(tmp_path / "run.csv"))
+
+
+def test_a_setting_changes_the_law(command: Command, tmp_path: Path) -> None:
+    settings = ("--set", "crank.speed=0.5", "--set", "crank.start=1")
+    assert command("solve", "fourbar", "-o", "run.csv", "--times", "0:2:1", *settings).exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["crank.phi"] == pytest.approx([1.0, 1.5, 2.0])
+
+
+def test_only_the_outputs_asked_for_are_in_the_table(command: Command, tmp_path: Path) -> None:
+    outputs = ("--outputs", "rocker.phi, A.x")
+    assert command("solve", "fourbar", "-o", "run.csv", "--times", "0:2:1", *outputs).exit_code == 0
+    names = list(read_csv(tmp_path / "run.csv"))
+    assert {"rocker.phi", "rocker.omega", "rocker.alpha", "A.x", "A.vx", "A.ax"} <= set(names)
+    assert not [name for name in names if name.startswith("coupler.")]
+
+
+def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command, tmp_path: Path) -> None:
+    result = command("solve", "double_pendulum", "-o", "run.csv", "--times", "0:3:0.5")
+    assert result.exit_code == 1
+    assert "5 ok, 2 outside" in result.stdout
+    assert result.stderr.startswith("kinfmu: t = 2.5 s: crank = 6.54")
+    assert "the limit is crank = 6.283185" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    table = read_csv(tmp_path / "run.csv")
+    assert np.isnan(table["lower.phi"]).tolist() == [False] * 5 + [True] * 2
+    assert table["solver.status"].tolist() == [0.0] * 5 + [3.0] * 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ("--set", "crank.sped=1"),
+            "parameter 'crank.sped' is not known; did you mean 'crank.speed'?; parameters: crank.start, crank.speed",
+        ),
+        (("--set", "crank.speed=nan"), "parameter 'crank.speed' = nan must be a finite number"),
+        (
+            ("--outputs", "roker.phi"),
+            "fourbar: outputs: 'roker.phi' is not one; did you mean 'rocker.phi'?; outputs: crank.phi, coupler.x, "
+            "coupler.y, coupler.phi, rocker.phi, A.x, A.y",
+        ),
+    ],
+)
+def test_a_name_or_number_that_the_mechanism_has_not_is_told(
+    arguments: tuple[str, ...], told: str, fails: Callable[..., str]
+) -> None:
+    assert fails("solve", "fourbar", "-o", "run.csv", *arguments) == told
+
+
+def test_a_folder_that_is_missing_is_told(fails: Callable[..., str]) -> None:
+    assert fails("solve", "fourbar", "-o", "none/run.csv", "--times", "0:1:1").startswith("none/run.csv: the folder ")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("--times", "0:1", "'0:1' must be A:B:STEP, such as 0:1.5:0.01"),
+        ("--times", "1:0:1", "'1:0:1' must run forwards with a positive step"),
+        ("--times", "0:1:0", "'0:1:0' must run forwards with a positive step"),
+        ("--times", "0:1:1deg", "'1deg' is not a number (units: s, ms, min, h)"),
+        ("--times", "0:inf:1", "'inf' is not a finite number"),
+        ("--times", "0:1:1e-18", "'0:1:1e-18' asks for more than 10000000 samples"),
+        ("--angle", "0:1", "'0:1' must be A:B:N, such as 0deg:360deg:361"),
+        ("--angle", "0:1:1.5", "'0:1:1.5': N = 1.5 must be a whole number of samples"),
+        ("--angle", "0:1:0", "'0:1:0': N = 0 must be a whole number of samples"),
+        ("--angle", "0:1:1e12", "'0:1:1e12' asks for more than 10000000 samples"),
+        ("--angle", "0:1m:3", "'1m' is not a number (units: rad, deg, rev)"),
+        ("--set", "crank.speed", "'crank.speed' must be NAME=VALUE, such as crank.speed=2.0"),
+    ],
+)
+def test_a_value_of_an_option_that_cannot_be_meant_is_wrong_usage(
+    option: str, value: str, told: str, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for '{option}': {told}"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((), "Missing option '-o'."),
+        (("-o", "run.xyz"), "-o run.xyz: a table ends in one of .csv, .parquet, .npz"),
+        (("-o", "run"), "-o run: a table ends in one of .csv, .parquet, .npz"),
+        (("-o", "run.csv", "--times", "0:1:1", "--angle", "0:1:2"), "--times and --angle cannot both drive"),
+        (("-o", "run.csv", "--set", "crank.speed=fast"), "--set crank.speed=fast: 'fast' is not a number"),
+        (("-o", "run.csv", "--set", "crank.speed=true"), "--set crank.speed: a law constant is a number"),
+    ],
+)
+def test_options_that_do_not_fit_are_wrong_usage_and_nothing_is_written(
+    arguments: tuple[str, ...], told: str, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    assert refuses("solve", "fourbar", *arguments) == told
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_engine_that_is_not_there_is_told(refuses: Callable[..., str]) -> None:
+    assert "'magic' is not one of" in refuses("solve", "fourbar", "-o", "run.csv", "--engine", "magic")
+
+
+def test_a_run_of_too_many_samples_in_the_file_is_told(
+    fails: Callable[..., str], fourbar_file: Callable[..., Path]
+) -> None:
+    told = fails("solve", fourbar_file("step = 1\n", "step = 1e-9\n"), "-o", "run.csv")
+    assert told == "[run] 0 to 180 s in steps of 1e-09 s: more than 10000000 samples"
