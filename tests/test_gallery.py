@@ -1,0 +1,66 @@
+"""The gallery, and finding, writing and reading mechanisms by name or file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.errors import MechanismError
+
+
+def test_the_two_reference_mechanisms_are_in_the_gallery() -> None:
+    assert {"fourbar", "double_pendulum"} <= set(gallery.names())
+    assert gallery.names() == sorted(gallery.names())
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_mechanism_of_the_gallery_has_its_folders_name_a_title_and_a_comment(name: str) -> None:
+    mechanism = gallery.load(name)
+    assert mechanism.name == name
+    assert mechanism.title
+    assert (gallery.folder() / name / "mechanism.toml").read_text(encoding="utf-8").startswith("# ")
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_mechanism_of_the_gallery_can_be_solved_over_its_run(name: str) -> None:
+    mechanism = gallery.load(name)
+    assert kinfmu.check(mechanism).problem is None
+    run = kinfmu.solve(mechanism, [mechanism.run.start, mechanism.run.stop])
+    assert run.good.all()
+
+
+def test_a_name_that_is_not_there_suggests_one_that_is() -> None:
+    with pytest.raises(MechanismError) as caught:
+        kinfmu.load("forbar")
+    assert str(caught.value) == (
+        "'forbar' is not in the gallery; did you mean 'fourbar'?; gallery: double_pendulum, fourbar; files end in .toml"
+    )
+    with pytest.raises(MechanismError, match=r"^'' is not in the gallery; gallery: "):
+        kinfmu.load("")
+
+
+def test_a_mechanism_is_loaded_from_a_file_by_text_or_path(tmp_path: Path) -> None:
+    mechanism = kinfmu.load("fourbar")
+    path = kinfmu.save(mechanism, tmp_path / "mine.toml")
+    assert path == tmp_path / "mine.toml"
+    assert kinfmu.load(path) == kinfmu.load(str(path)) == mechanism
+    other = tmp_path / "no_suffix"
+    kinfmu.save(mechanism, other)
+    assert kinfmu.load(other) == kinfmu.load(str(other)) == mechanism
+
+
+def test_saving_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+    mechanism = kinfmu.load("fourbar")
+    path = tmp_path / "none" / "mine.toml"
+    with pytest.raises(MechanismError) as caught:
+        kinfmu.save(mechanism, path)
+    assert str(caught.value) == f"{path}: cannot be written (No such file or directory)"
+
+
+def test_a_saved_file_has_the_same_bytes_on_every_system(tmp_path: Path) -> None:
+    content = kinfmu.save(kinfmu.load("fourbar"), tmp_path / "mine.toml").read_bytes()
+    assert b"\r" not in content
+    assert content.endswith(b'\n[outputs]\ncoordinates = "moving"\n')

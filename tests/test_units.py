@@ -1,0 +1,84 @@
+"""Units that files may write, and units that variables declare; names of derivatives."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.units import METRES, Quantity, display_units, factors, unit_of
+
+EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
+
+
+@pytest.mark.parametrize("inside", METRES)
+def test_a_length_is_turned_into_the_files_unit_to_the_last_digit(inside: str) -> None:
+    assert METRES.keys() == EXACT.keys()
+    for unit, factor in factors(Quantity("length"), inside).items():
+        exact = float(Fraction(EXACT[unit]) / Fraction(EXACT[inside]))
+        assert factor == pytest.approx(exact, rel=4e-16, abs=0.0)
+    assert factors(Quantity("length"), inside)[inside] == 1.0
+
+
+def test_angles_may_be_written_in_degrees_and_turns() -> None:
+    assert factors(Quantity("angle"), "m") == {"rad": 1.0, "deg": math.radians(1.0), "rev": 2.0 * math.pi}
+
+
+def test_times_may_be_written_in_other_units() -> None:
+    assert factors(Quantity("time"), "mm") == {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+
+
+def test_speeds_may_be_written_per_second_and_per_minute() -> None:
+    speeds = factors(Quantity("angle", 1), "m")
+    assert list(speeds) == ["rad/s", "rad/min", "deg/s", "deg/min", "rev/s", "rev/min", "rpm"]
+    assert speeds["rpm"] == speeds["rev/min"] == 2.0 * math.pi / 60.0
+    assert factors(Quantity("length", 1), "mm")["m/min"] == pytest.approx(1000.0 / 60.0)
+    assert "rpm" not in factors(Quantity("length", 1), "m")
+
+
+def test_accelerations_may_be_written_per_second_squared_only() -> None:
+    assert list(factors(Quantity("angle", 2), "m")) == ["rad/s2", "deg/s2", "rev/s2"]
+    assert factors(Quantity("length", 2), "mm")["m/s2"] == 1000.0
+
+
+def test_plain_numbers_take_no_unit() -> None:
+    assert factors(Quantity("number"), "m") == {}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"),
+    [
+        (Quantity("length"), "mm"),
+        (Quantity("length", 1), "mm/s"),
+        (Quantity("length", 2), "mm/s2"),
+        (Quantity("angle"), "rad"),
+        (Quantity("angle", 2), "rad/s2"),
+        (Quantity("time"), "s"),
+        (Quantity("number"), "1"),
+    ],
+)
+def test_a_variable_declares_the_unit_used_inside(quantity: Quantity, unit: str) -> None:
+    assert unit_of(quantity, "mm") == unit
+
+
+def test_display_units_are_degrees_and_millimetres() -> None:
+    assert display_units("rad") == {"deg": 180.0 / math.pi}
+    assert display_units("rad/s2") == {"deg/s2": 180.0 / math.pi}
+    assert display_units("m/s") == {"mm/s": 1000.0}
+    assert display_units("mm") == {}
+    assert display_units("1") == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "acceleration"),
+    [("a.x", "a.vx", "a.ax"), ("a.y", "a.vy", "a.ay"), ("a.phi", "a.omega", "a.alpha")],
+)
+def test_rates_and_accelerations_have_names_of_their_own(name: str, rate: str, acceleration: str) -> None:
+    assert [derivative_name(name, order) for order in range(3)] == [name, rate, acceleration]
+
+
+def test_what_a_coordinate_measures_follows_from_its_name() -> None:
+    assert quantity_of("crank.phi", 1) == Quantity("angle", 1)
+    assert quantity_of("phi.x") == Quantity("length")
