@@ -61,6 +61,12 @@ def test_matrices_are_told_plain_and_row_reduced(command: Command) -> None:
     assert result.stdout.count("\nrow-reduced\n") == result.stdout.count(", rank ") == 6
 
 
+def test_the_check_of_the_fourbar_with_its_matrices_is_the_golden_file(
+    command: Command, golden: Callable[[str, str], None]
+) -> None:
+    golden("fourbar_check.txt", command("check", "fourbar", "--matrices").stdout)
+
+
 def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command) -> None:
     matrices = json.loads(command("check", "fourbar", "--json", "--matrices").stdout)["matrices"]
     joints, system = matrices[:2]

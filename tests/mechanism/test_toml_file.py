@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -87,6 +88,10 @@ def test_a_mechanism_that_is_written_and_read_is_the_same(mechanism: Mechanism) 
 def test_the_gallery_is_the_same_after_writing_and_reading(name: str) -> None:
     mechanism = gallery.load(name)
     assert parse(text(mechanism)) == mechanism
+
+
+def test_the_fourbar_as_kinfmu_writes_it_is_the_golden_file(golden: Callable[[str, str], None]) -> None:
+    golden("fourbar_written.toml", text(parse(FOURBAR)))
 
 
 @given(title=titles)
