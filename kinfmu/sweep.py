@@ -120,8 +120,8 @@ def _swept(
 ) -> Run:
     n, m = len(times), len(plan.outputs)
     tables = _tables(out, (n, m))
-    gap: Vector = (_GAP,) * m
-    rows: tuple[list[Vector], list[Vector], list[Vector]] = ([], [], [])
+    gap: Vector = (_GAP,) * (3 * m)
+    motions: list[Vector] = []
     diagnostics, errors, watches, events = [], [], [], []
     good, failing = solver.anchor, False
     samples = zip(times.tolist(), *(map(tuple, table.tolist()) for table in driven), strict=True)
@@ -130,23 +130,21 @@ def _swept(
         diagnostics.append(solver.diagnostics(pose))
         if pose.good:
             good, failing = pose, False
-            rows[0].append(solver.outputs(pose))
-            rows[1].append(solver.rates(pose, ud))
-            rows[2].append(solver.accelerations(pose, ud, udd))
+            motions.append(solver.motion(pose, ud, udd))
             errors.append(solver.errors(pose, ud, udd))
             watches.append(solver.watch(pose))
         else:
             if not failing:
                 events.append(Event(t, "error", pose.message))
             failing = True
-            for table in rows:
-                table.append(gap)
+            motions.append(gap)
             errors.append((_GAP,) * 3)
             watches.append((_GAP,) * len(plan.watches))
-    for array, table in zip(tables, rows, strict=True):
-        array[:] = np.array(table, dtype=float).reshape(n, m)
+    whole = np.array(motions, dtype=float).reshape(n, 3, m)
+    for k, array in enumerate(tables):
+        array[:] = whole[:, k]
     told = np.array(diagnostics, dtype=float).reshape(n, 4)
-    inputs = np.stack(driven, axis=2).reshape(n, -1)  # value, speed, acceleration of each driver
+    inputs = np.stack(driven, axis=2).reshape(n, 3 * len(plan.drivers))  # value, speed, acceleration of each driver
     return Run(
         t=times,
         outputs=plan.outputs,

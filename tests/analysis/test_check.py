@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.analysis.matrices import row_reduced
+from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar
+
+
+def test_the_fourbar_is_told_with_its_redundant_row_and_why() -> None:
+    text = str(kinfmu.check(reference_fourbar()))
+    assert "mobility    1, driven by crank" in text
+    assert "Gruebler's count gives 0" in text
+    assert "redundant   AB (row AB.length): at every pose it follows from O, P, C, Q" in text
+    assert "determinant sin(coupler.phi - rocker.phi)" in text
+    assert "singular    crank = k pi: 0 (0 deg), pi (180 deg)" in text
+    assert "turns all the way round" in text
+
+
+def test_findings_are_plain_data_too() -> None:
+    findings = json.loads(json.dumps(kinfmu.check(reference_fourbar()).as_json()))
+    assert findings["mobility"] == 1
+    assert findings["coordinates"] == ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]
+    assert findings["redundant"][0]["name"] == "AB"
+    assert findings["redundant"][0]["implied_by"] == ["O", "P", "C", "Q"]
+    assert findings["blocks"] == [
+        {
+            "unknowns": ["coupler.phi", "rocker.phi"],
+            "rows": ["Q.x", "Q.y"],
+            "determinant": "sin(coupler.phi - rocker.phi)",
+        }
+    ]
+    assert findings["problem"] is None
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "expected"),
+    [
+        (reference_fourbar(), [0.0, math.pi]),
+        (fourbar(4, 1, 3, 2), [math.pi]),
+        (fourbar(2, 1, 2, 1), [0.0, math.pi]),
+        (fourbar(2, 1, 2, 1, branch=-1), [0.0, math.pi]),
+        (fourbar(4, 1, 3.5, 3), []),
+    ],
+)
+def test_change_points_are_found_to_rounding(mechanism: kinfmu.Mechanism, expected: list[float]) -> None:
+    report = kinfmu.check(mechanism)
+    assert [point.kind for point in report.singular] == ["change point"] * len(expected)
+    np.testing.assert_allclose([point.value for point in report.singular], expected, rtol=0, atol=1e-11)
+
+
+def test_the_range_of_a_triple_rocker_ends_at_its_dead_centres() -> None:
+    ground, crank, coupler, rocker = 4.0, 3.0, 1.5, 1.0  # longest + shortest > the others: no link turns round
+    report = kinfmu.check(fourbar(ground, crank, coupler, rocker, start=0.2))
+    reach = coupler + rocker
+    exact = math.acos((ground**2 + crank**2 - reach**2) / (2 * ground * crank))
+    assert report.range is not None
+    assert report.range.high == pytest.approx(exact, abs=1e-10)
+    assert report.range.low == pytest.approx(-exact, abs=1e-10)
+    assert {point.kind for point in report.singular} == {"limit"}
+
+
+def test_a_driver_off_the_loop_of_a_triad_has_its_range() -> None:
+    report = kinfmu.check(six_bar())
+    assert report.range is not None
+    assert report.range.low is not None
+    run = kinfmu.solve(six_bar(), drive_angle=[report.range.low + 1e-6, report.range.low - 1e-6])
+    assert run.status.tolist()[1] == 3
+    assert run.status.tolist()[0] < 3
+
+
+def test_several_drivers_have_no_range_yet() -> None:
+    report = kinfmu.check(five_bar())
+    assert report.range is None
+    assert report.mobility == 2
+
+
+def test_a_contradiction_stands_in_the_report_and_does_not_raise() -> None:
+    report = kinfmu.check(reference_fourbar(bar=1.01))
+    assert report.plan is None
+    assert report.inconsistent[0].row.owner == "AB"
+    assert "contradicts AB" in str(report)
+    assert "0.01 m" in str(report.problem)
+    assert report.as_json()["inconsistent"][0]["gap"] == pytest.approx(-0.01)
+
+
+def test_matrices_are_the_reports() -> None:
+    matrices = {matrix.title: matrix for matrix in kinfmu.check(reference_fourbar()).matrices()}
+    plain = matrices["Phi_K,q at crank = pi/3 (60 deg)"]
+    s, c = math.sin(math.pi / 3), 0.5
+    expected = [
+        [s, 1, 0, 0, 0],
+        [-c, 0, 1, -1, 0],
+        [0, 1, 0, 0, s],
+        [0, 0, 1, 0, -c],
+        [0, 1, 2 * s, 2 * s, 0],
+    ]
+    np.testing.assert_allclose(plain.entries, expected, atol=1e-12)
+    assert plain.rows == ("P.x", "P.y", "Q.x", "Q.y", "AB.length")
+    assert plain.rank == 4
+    assert matrices["Phi_q at crank = pi (180 deg), singular point"].rank == 4
+    beside = matrices["Phi_q at crank = 3.15904595 rad (181 deg), a small turn beside it"]
+    assert beside.rank == 5
+    np.testing.assert_array_equal(beside.reduced, np.eye(5))
+
+
+def test_rank_is_lost_at_a_dead_centre_and_restored_beside_it() -> None:
+    ranks = [matrix.rank for matrix in kinfmu.check(kinfmu.load("double_pendulum")).matrices()]
+    assert ranks == [5, 6, 5, 6, 5, 6]
+
+
+def test_row_reduction_equals_exact_arithmetic() -> None:
+    matrix = np.array([[2.0, 1.0, -1.0, 8.0], [-3.0, -1.0, 2.0, -11.0], [-2.0, 1.0, 2.0, -3.0]])
+    np.testing.assert_allclose(row_reduced(matrix), [[1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 1, -1]], atol=1e-14)
+    np.testing.assert_array_equal(row_reduced(np.zeros((2, 3))), np.zeros((2, 3)))
+    assert row_reduced(np.array([[1.0, 2.0], [2.0, 4.0]])).tolist() == [[1.0, 2.0], [0.0, 0.0]]
+
+
+@pytest.mark.parametrize("turn", [0.0, math.pi / 2])
+def test_a_bar_as_a_body_is_singular_where_the_linkage_is_and_nowhere_else(turn: float) -> None:
+    values = [point.value for point in kinfmu.check(bar_as_body(turn)).singular]
+    np.testing.assert_allclose(values, [turn, math.pi + turn], atol=1e-11)

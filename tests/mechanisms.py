@@ -1,0 +1,171 @@
+"""Mechanisms that several rooms are tested on, built in Python."""
+
+from __future__ import annotations
+
+import math
+
+from kinfmu import Angle, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
+from kinfmu.mechanism.toml_file import parse, text
+
+
+def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanism:
+    """The gallery's four-bar, with another length of its redundant bar AB or another start pose."""
+    start = math.radians(start_degrees)
+    written = text(load("fourbar")).replace("length = 1.0\n", f"length = {bar!r}\n")
+    written = written.replace("phi = 1.0471975511965976 ", f"phi = {start!r} ")
+    return parse(written.replace("x = 1.5, y = 0.866", f"x = {1 + math.cos(start)!r}, y = {math.sin(start)!r}"))
+
+
+def bar_as_body(turn: float = 0.0) -> Mechanism:
+    """The reference four-bar with AB as a body of its own and the ground turned [rad]: 12 coordinates, 12 rows."""
+    c, s, start = math.cos(turn), math.sin(turn), math.radians(60.0) + turn
+
+    def turned(x: float, y: float) -> tuple[float, float]:
+        return c * x - s * y, s * x + c * y
+
+    return Mechanism(
+        "bar_as_body",
+        [
+            Body("ground", {"O": turned(0, 0), "C": turned(1, 0), "B": turned(2, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (*turned(0, 0), start)),
+            Body("coupler", {"P": (-1, 0), "Q": (0, 0), "A": (1, 0)}, (*turned(1.5, 0.866), turn)),
+            Body("rocker", {"C": (0, 0), "Q": (1, 0)}, (*turned(1, 0), start)),
+            Body("bar", {"B": (0, 0), "A": (1, 0)}, (*turned(2, 0), start)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("C", ("ground.C", "rocker.C")),
+            Revolute("Q", ("rocker.Q", "coupler.Q")),
+            Revolute("B", ("ground.B", "bar.B")),
+            Revolute("A", ("coupler.A", "bar.A")),
+        ],
+        [Angle("crank", "crank", ConstantSpeed(turn, math.radians(1.0)))],
+    )
+
+
+def fourbar(
+    ground: float,
+    crank: float,
+    coupler: float,
+    rocker: float,
+    start: float = 1.0,
+    branch: int = 1,
+    at: tuple[float, float] = (0.0, 0.0),
+) -> Mechanism:
+    """Any four-bar, started closed at a crank angle [rad]; branch 1: rocker pin left of the diagonal, as in the oracle.
+
+    Frames of crank and rocker sit at their pivots, that of the coupler at the crank's tip; `at` moves the whole.
+    """
+    px, py = crank * math.cos(start), crank * math.sin(start)
+    dx, dy = ground - px, -py
+    diagonal = math.hypot(dx, dy)
+    along = (coupler**2 - rocker**2 + diagonal**2) / (2.0 * diagonal)
+    across = branch * math.sqrt(max(coupler**2 - along**2, 0.0))
+    qx = px + (along * dx - across * dy) / diagonal
+    qy = py + (along * dy + across * dx) / diagonal
+    x0, y0 = at
+    return Mechanism(
+        "fourbar_general",
+        [
+            Body("ground", {"O": (x0, y0), "C": (x0 + ground, y0)}),
+            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (x0, y0, start)),
+            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (x0 + px, y0 + py, math.atan2(qy - py, qx - px))),
+            Body("rocker", {"C": (0, 0), "Q": (rocker, 0)}, (x0 + ground, y0, math.atan2(qy, qx - ground))),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+        ],
+        [Angle("crank", "crank", ConstantSpeed(start, 1.0))],
+    )
+
+
+def six_bar() -> Mechanism:
+    """A six-bar driven where no dyad order exists: one block of four unknowns."""
+    return Mechanism(
+        "six_bar",
+        [
+            Body("ground", {"A": (0, 0), "B": (4, 0), "C": (5.5, 1)}),
+            Body("crank", {"A": (0, 0), "P": (1.5, 0)}, (0, 0, 1.0)),
+            Body("ternary", {"P": (0, 0), "Q": (3.5, 0), "R": (3, 2)}, (0.8, 1.26, 0.4)),
+            Body("rocker", {"B": (0, 0), "Q": (3, 0)}, (4, 0, 1.3)),
+            Body("link", {"R": (-1.5, 0), "S": (2, 0)}, (4.5, 3, -0.3)),
+            Body("output", {"C": (0, 0), "S": (2.5, 0)}, (5.5, 1, 1.6)),
+        ],
+        [
+            Revolute("A", ("ground.A", "crank.A")),
+            Revolute("B", ("ground.B", "rocker.B")),
+            Revolute("C", ("ground.C", "output.C")),
+            Revolute("P", ("crank.P", "ternary.P")),
+            Revolute("Q", ("rocker.Q", "ternary.Q")),
+            Revolute("R", ("ternary.R", "link.R")),
+            Revolute("S", ("link.S", "output.S")),
+        ],
+        [Angle("drive", "output", ConstantSpeed(1.6, 0.1))],
+    )
+
+
+def five_bar() -> Mechanism:
+    """A five-bar with two drivers."""
+    return Mechanism(
+        "five_bar",
+        [
+            Body("ground", {"A": (0, 0), "B": (3, 0)}),
+            Body("left", {"A": (0, 0), "P": (1, 0)}, (0, 0, 2.0)),
+            Body("right", {"B": (0, 0), "Q": (1, 0)}, (3, 0, 1.0)),
+            Body("forearm", {"P": (-1.5, 0), "T": (1.5, 0)}, (1, 2, 0.7)),
+            Body("strut", {"Q": (0, 0), "T": (2.5, 0)}, (3.5, 0.8, 2.2)),
+        ],
+        [
+            Revolute("A", ("ground.A", "left.A")),
+            Revolute("B", ("ground.B", "right.B")),
+            Revolute("P", ("left.P", "forearm.P")),
+            Revolute("Q", ("right.Q", "strut.Q")),
+            Revolute("T", ("forearm.T", "strut.T")),
+        ],
+        [Angle("shoulder", "left", ConstantSpeed(2.0, 0.3)), Angle("elbow", "right", ConstantSpeed(1.0, -0.2))],
+        points={"tip": "forearm.T"},
+    )
+
+
+def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0) -> Mechanism:
+    """A slider-crank from a revolute crank and a rod whose end stays on y = offset."""
+    start = 0.7
+    px, py = crank * math.cos(start), crank * math.sin(start)
+    lean = math.asin((offset - py) / rod)
+    return Mechanism(
+        "slider_crank",
+        [
+            Body("ground", {"O": (0, 0)}),
+            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (0, 0, start)),
+            Body("rod", {"P": (0, 0), "S": (rod, 0)}, (px, py, lean)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "rod.P")),
+            Coordinate("guide", "rod.S", "y", offset),
+        ],
+        [Angle("crank", "crank", ConstantSpeed(start, 1.0))],
+        points={"slider": "rod.S"},
+    )
+
+
+def bar_linkage() -> Mechanism:
+    """A four-bar whose coupler is only a distance: one unknown."""
+    return Mechanism(
+        "bar_linkage",
+        [
+            Body("ground", {"O": (0, 0), "C": (4, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 1.0)),
+            Body("rocker", {"C": (0, 0), "Q": (3, 0)}, (4, 0, 1.9)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("C", ("ground.C", "rocker.C")),
+            Distance("coupler", ("crank.P", "rocker.Q"), 3.5),
+        ],
+        [Angle("crank", "crank", ConstantSpeed(1.0, 1.0))],
+    )

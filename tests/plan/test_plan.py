@@ -1,0 +1,187 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from kinfmu import Angle, Body, ConstantSpeed, Mechanism, Revolute, load, solve
+from kinfmu.errors import AmbiguousStartError, AssemblyError, MechanismError, MobilityError
+from kinfmu.plan import compile_plan, determinant_formula
+from tests.oracle import fourbar as exact_fourbar
+from tests.oracle import largest_error
+from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
+
+
+def test_nine_coordinates_of_the_fourbar_become_one_solve_of_two() -> None:
+    plan = compile_plan(reference_fourbar())
+    assert plan.unknowns == ("coupler.phi", "rocker.phi")
+    assert plan.fixed == {"crank.x": 0.0, "crank.y": 0.0, "rocker.x": 1.0, "rocker.y": 0.0}
+    assert [block.coordinates for block in plan.blocks] == [
+        ("crank.phi",),
+        ("coupler.x", "coupler.y", "coupler.phi", "rocker.phi"),
+    ]
+    assert plan.watch_names == ("AB.length",)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "sizes"),
+    [
+        (bar_as_body(0.3), [(2, 2), (2, 1)]),  # the bar's pin keeps both rows: least squares
+        (six_bar(), [(4, 4)]),
+        (five_bar(), [(2, 2)]),
+        (slider_crank(), [(1, 1)]),
+        (bar_linkage(), [(1, 1)]),
+        (load("double_pendulum"), [(1, 1)]),
+    ],
+)
+def test_blocks_are_as_small_as_the_topology_allows(mechanism: Mechanism, sizes: list[tuple[int, int]]) -> None:
+    plan = compile_plan(mechanism)
+    assert [(len(block.residuals), len(block.unknowns)) for block in plan.blocks if block.unknowns] == sizes
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "formula"),
+    [
+        (reference_fourbar(), "sin(coupler.phi - rocker.phi)"),
+        (fourbar(4.0, 1.0, 3.5, 3.0), "10.5 sin(coupler.phi - rocker.phi)"),
+        (load("double_pendulum"), "-cos(lower.phi)"),
+        (five_bar(), "7.5 sin(forearm.phi - strut.phi)"),
+    ],
+)
+def test_the_determinant_of_a_small_block_is_a_formula(mechanism: Mechanism, formula: str) -> None:
+    (block,) = (block for block in compile_plan(mechanism).blocks if block.unknowns)
+    assert determinant_formula(block) == formula
+
+
+def test_what_the_outputs_do_not_need_is_not_solved() -> None:
+    plan = compile_plan(reference_fourbar(), ["crank.phi"])
+    assert plan.outputs == ("crank.phi",)
+    assert plan.unknowns == ()
+    assert plan.watches == ()
+    with pytest.raises(MechanismError, match=r"'coupler\.z' is not one; did you mean 'coupler\.[xy]'\?; outputs:"):
+        compile_plan(reference_fourbar(), ["coupler.z"])
+
+
+def test_dependencies_are_structural() -> None:
+    plan = compile_plan(five_bar())
+    assert plan.depends("left.phi") == (0,)
+    assert plan.depends("right.phi") == (1,)
+    assert plan.depends("tip.x") == (0, 1)
+    fixed_angle = compile_plan(reference_fourbar())
+    assert fixed_angle.depends("coupler.phi") == (0,)  # though it happens to stay 0
+
+
+def test_equal_mechanisms_have_equal_plans_and_others_have_not() -> None:
+    assert compile_plan(reference_fourbar()) == compile_plan(reference_fourbar())
+    assert hash(compile_plan(reference_fourbar())) == hash(compile_plan(reference_fourbar()))
+    assert compile_plan(fourbar(4, 1, 3.5, 3)) != compile_plan(fourbar(4, 1, 3.5, 3.25))
+
+
+def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
+    script = (
+        "import hashlib, kinfmu; from kinfmu.plan import compile_plan; from kinfmu.backends.python import emit\n"
+        "from tests.oracle import fourbar as exact_fourbar
+from tests.oracle import largest_error
+from tests.mechanisms import six_bar, bar_as_body\n"
+        "for m in (kinfmu.load('fourbar'), six_bar(), bar_as_body(0.3)):\n"
+        "    p = compile_plan(m); print(hashlib.sha256((p.text + emit(p)).encode()).hexdigest())\n"
+    )
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", script],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={"PYTHONHASHSEED": seed, "PYTHONPATH": ":".join(sys.path)},
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert told[0] == told[1]
+    assert told[0].count("\n") == 3
+
+
+def test_too_few_and_too_many_drivers_are_told_apart() -> None:
+    bodies, joints = fourbar(4, 1, 3.5, 3).bodies, fourbar(4, 1, 3.5, 3).joints
+    with pytest.raises(MobilityError, match=r"mobility is 1 but there is no driver \(none\): 1 more driver is needed"):
+        compile_plan(Mechanism("m", bodies, joints))
+    two = [Angle("a", "crank"), Angle("b", "rocker")]
+    with pytest.raises(MobilityError, match=r"mobility is 1 but there are 2 drivers \(a, b\): remove 1"):
+        compile_plan(Mechanism("m", bodies, joints, two))
+    five = five_bar()
+    with pytest.raises(MobilityError, match=r"mobility is 2 but there is 1 driver \(shoulder\): 1 more driver"):
+        compile_plan(Mechanism("m", five.bodies, five.joints, five.drivers[:1]))
+
+
+def test_two_drivers_on_one_freedom_are_refused() -> None:
+    five = five_bar()
+    with pytest.raises(MobilityError, match="a, b do not determine the motion"):
+        compile_plan(Mechanism("m", five.bodies, five.joints, [Angle("a", "left"), Angle("b", "left")]))
+
+
+def test_a_rough_start_pose_is_assembled() -> None:
+    plan = compile_plan(fourbar(4, 1, 3.5, 3))
+    rough = Mechanism(
+        "rough",
+        [
+            body
+            if body.is_ground
+            else Body(body.name, body.points, [round(float(v or 0.0) + 0.2, 1) for v in body.start])
+            for body in fourbar(4, 1, 3.5, 3).bodies
+        ],
+        plan.mechanism.joints,
+        plan.mechanism.drivers,
+    )
+    again = compile_plan(rough)
+    np.testing.assert_allclose(again.anchor.u, 1.2, atol=1e-12)
+    assert again.anchor.margin > 0.01
+
+
+def test_what_does_not_close_is_told_with_its_widest_gap() -> None:
+    mechanism = Mechanism(
+        "apart",
+        [
+            Body("ground", {"O": (0, 0), "C": (9, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 1.0)),
+            Body("coupler", {"P": (0, 0), "Q": (2, 0)}, (0.5, 0.8, 0.4)),
+            Body("rocker", {"C": (0, 0), "Q": (3, 0)}, (9, 0, 1.9)),
+        ],
+        fourbar(4, 1, 3.5, 3).joints,
+        [Angle("crank", "crank", ConstantSpeed(1.0, 1.0))],
+    )
+    with pytest.raises(
+        AssemblyError, match=r"does not close .* \(crank = 1 rad .*\): joint '.' stays open by [\d.]+ m"
+    ):
+        compile_plan(mechanism)
+
+
+@pytest.mark.parametrize(("lengths", "start"), [((4, 1, 3, 2), np.pi), ((2, 1, 2, 1), np.pi), ((2, 1, 2, 1), 0.0)])
+def test_a_start_where_branches_cross_is_refused_as_ambiguous(lengths: tuple[float, ...], start: float) -> None:
+    with pytest.raises(
+        AmbiguousStartError, match=r"is singular .* and 2 branches leave it: .* can be .*; give a start"
+    ):
+        compile_plan(fourbar(*lengths, start=start))
+
+
+@pytest.mark.parametrize("beside", [0.1, 1e-2, 1e-4, -1e-3])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_start_beside_a_crossing_keeps_its_branch(beside: float, branch: int) -> None:
+    start = np.pi + beside
+    u = [start + step * np.sign(beside) for step in (0.2, 0.8, 1.5)]  # away from the crossing
+    run = solve(fourbar(2, 1, 2, 1, start=start, branch=branch), crank_angle=u)
+    exact = exact_fourbar(2, 1, 2, 1, u, branch=branch)
+    assert largest_error(run["rocker.phi"], exact.q[:, 2], modulo_turns=True) < 1e-13
+
+
+def test_a_mechanism_of_assignments_alone_needs_no_solve() -> None:
+    mechanism = Mechanism(
+        "pendulum",
+        [Body("ground", {"O": (0, 0)}), Body("bob", {"O": (0, 0), "tip": (2, 0)})],
+        [Revolute("O", ("ground.O", "bob.O"))],
+        [Angle("motor", "bob", ConstantSpeed(0.5, 1.0))],
+        points={"tip": "bob.tip"},
+    )
+    plan = compile_plan(mechanism)
+    assert plan.unknowns == ()
+    assert plan.outputs == ("bob.phi", "tip.x", "tip.y")

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import KinfmuError
+from tests.mechanisms import bar_linkage, five_bar, fourbar, slider_crank
+from tests.oracle import fourbar as exact_fourbar
+from tests.oracle import largest_error
+from tests.oracle import slider_crank as exact_slider_crank
+
+
+def test_a_general_fourbar_equals_50_digits() -> None:
+    u = list(np.random.default_rng(3).uniform(-20, 20, 60))
+    run = kinfmu.solve(fourbar(4, 1, 3.5, 3), crank_angle=u, crank_speed=0.7, crank_acceleration=-0.4)
+    exact = exact_fourbar(4, 1, "3.5", 3, u, 0.7, -0.4)
+    angles = [run.names.index(name) for name in ("crank.phi", "coupler.phi", "rocker.phi")]
+    assert largest_error(run.q[:, angles], exact.q, modulo_turns=True) < 2e-14
+    assert largest_error(run.qd[:, angles], exact.qd) < 1e-14
+    assert largest_error(run.qdd[:, angles], exact.qdd) < 1e-14
+
+
+def test_a_distance_in_place_of_the_coupler_moves_the_rocker_the_same() -> None:
+    u = np.linspace(-3.0, 9.0, 50)
+    run = kinfmu.solve(bar_linkage(), crank_angle=u)
+    exact = exact_fourbar(4, 1, "3.5", 3, list(u))
+    for ours, theirs in (("rocker.phi", exact.q), ("rocker.omega", exact.qd), ("rocker.alpha", exact.qdd)):
+        assert largest_error(run[ours], theirs[:, 2], modulo_turns=True) < 1e-13
+
+
+def test_a_slider_crank_equals_50_digits() -> None:
+    u = np.linspace(0.0, 12.0, 80)
+    run = kinfmu.solve(slider_crank(1.0, 3.0, 0.25), crank_angle=u)
+    exact = exact_slider_crank(1, 3, "0.25", list(u))
+    for ours, theirs in zip(("slider.x", "slider.vx", "slider.ax"), exact, strict=True):
+        assert largest_error(run[ours], theirs[:, -1]) < 1e-13
+
+
+def test_angles_keep_their_turns() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=[0.5, 0.5 + 40 * np.pi, 0.5])
+    np.testing.assert_allclose(run["rocker.phi"], [0.5, 0.5 + 40 * np.pi, 0.5], rtol=1e-14)
+
+
+def test_times_and_inputs_drive_alike() -> None:
+    mechanism = kinfmu.load("fourbar")
+    t = np.linspace(10.0, 20.0, 5)
+    by_time = kinfmu.solve(mechanism, t, parameters={"crank.speed": 0.1, "crank.start": 0.2})
+    by_inputs = kinfmu.solve(mechanism, crank_angle=0.2 + 0.1 * t, crank_speed=0.1)
+    np.testing.assert_allclose(by_time.values, by_inputs.values, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(by_time.rates, by_inputs.rates, rtol=0, atol=1e-14)
+
+
+def test_given_arrays_are_filled() -> None:
+    out = tuple(np.empty((3, 7)) for _ in range(3))
+    run = kinfmu.solve(kinfmu.load("fourbar"), [40.0, 50.0, 60.0], out=out)
+    assert run.values is out[0]
+    assert run.accelerations is out[2]
+    with pytest.raises(KinfmuError, match=r"out: values must be float64 of shape \(2, 7\), not float64 of \(3, 7\)"):
+        kinfmu.solve(kinfmu.load("fourbar"), [40.0, 50.0], out=out)
+
+
+def test_chosen_outputs_are_all_that_is_solved() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), [40.0], outputs=["coupler.x", "A.y"])
+    assert run.outputs == ("coupler.x", "A.y")
+    assert run.names == ("coupler.x",)
+
+
+def test_two_drivers_take_arrays_and_numbers() -> None:
+    run = kinfmu.solve(five_bar(), shoulder_angle=[2.0, 2.1], elbow_angle=1.0, shoulder_speed=0.3, elbow_speed=0.0)
+    assert run.inputs.shape == (2, 6)
+    assert run.good.all()
+    h = 1e-4
+    near = kinfmu.solve(five_bar(), shoulder_angle=[2.0 - h, 2.0 + h], elbow_angle=1.0)
+    slope = (near["tip.x"][1] - near["tip.x"][0]) / (2 * h) * 0.3
+    assert run["tip.vx"][0] == pytest.approx(slope, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "input 'crank_angle' is missing"),
+        ({"t": [0.0], "crank_angle": [0.0]}, "give times or inputs, not both"),
+        ({"crank_angel": [0.0]}, "did you mean 'crank_angle'"),
+        ({"crank_angle": [0.0, np.nan]}, r"crank_angle\[1\] is not a finite number"),
+        ({"crank_angle": [0.0, 1.0, 2.0], "crank_speed": [1.0, 2.0]}, "equal lengths or be single numbers"),
+        ({"crank_angle": [[0.0]]}, "must be one-dimensional"),
+        ({"crank_angle": "fast"}, "crank_angle must be numbers"),
+        ({"t": [0.0], "engine": "native"}, "engine 'native' is not known"),
+        ({"t": [0.0], "parameters": {"crank.sped": 1.0}}, r"did you mean 'crank\.speed'"),
+        ({"t": [0.0], "parameters": {"crank.speed": np.inf}}, "must be a finite number"),
+    ],
+)
+def test_wrong_arguments_are_told_in_one_line(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(KinfmuError, match=message) as caught:
+        kinfmu.solve(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
+
+
+def test_no_samples_are_an_empty_run() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), [])
+    assert len(run) == 0
+    assert run.q.shape == (0, 5)
