@@ -46,32 +46,31 @@ class Layout(NamedTuple):
 
 
 class Fetch(NamedTuple):
-    """How to read one list of Real variables: read these parts into a row, pick these places."""
+    """How to read one list of Real variables: read one part and the others into a row, pick these places."""
 
-    readers: tuple[Callable[[], Row], ...]
+    read: Callable[[], Row]
+    others: tuple[Callable[[], Row], ...]
     pick: Callable[[Row], Sequence[float]]
 
 
 class Shown:
-    """A pose that is shown, with what has been computed of it."""
+    """A pose that is shown, with what has been computed of it so far.
 
-    __slots__ = ("_drive", "_driven", "accelerations", "errors", "motion", "pose", "rates", "values")
+    drive: u, ud, udd of the drivers; stale: a pose that could not be reached was asked for, and this is the last good
+    one.
+    """
 
-    def __init__(self, pose: Pose, driven: Callable[[], tuple[Row, Row, Row]]) -> None:
+    __slots__ = ("accelerations", "drive", "errors", "motion", "pose", "rates", "stale", "values")
+
+    def __init__(self, pose: Pose, stale: bool) -> None:
         self.pose = pose
-        self._driven = driven
-        self._drive: tuple[Row, Row, Row] | None = None
+        self.stale = stale
+        self.drive: tuple[Row, Row, Row] | None = None
         self.values: Row | None = None
         self.rates: Row | None = None
         self.accelerations: Row | None = None
         self.motion: Row | None = None
         self.errors: Row | None = None
-
-    def drive(self) -> tuple[Row, Row, Row]:
-        """u, ud, udd of the drivers."""
-        if self._drive is None:
-            self._drive = self._driven()
-        return self._drive
 
 
 class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
@@ -97,6 +96,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._driven_by_time: bool = parts["drive"].starts[0]
         self._references = _Places(self.layout)
         self._fetches: dict[tuple[int, ...], Fetch] = {}
+        self._last_read: list[int] = []  # value references of the last get_real
+        self._last_fetch = self._plan_fetch(())
         self._solver = Solver(self.model, tolerance=self._tolerance)
 
         self._initialized = False
@@ -125,21 +126,20 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if self._driven_by_time:
             return self.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
         if self._touched or not self._history:
-            return self._by_inputs(self._inputs, self._history, self._time, tuple(self._inputs[::3]))
+            return self._by_inputs(self._inputs, self._time, tuple(self._inputs[::3]))
         t, u = self._history[-1]  # nothing set since the commit: still the committed sample, at the time of its doStep
-        return self._by_inputs(self._inputs, self._history[:-1], t, u)
+        return self._by_inputs(self._inputs, t, u)
 
-    def _by_inputs(
-        self, inputs: Sequence[float], earlier: tuple[Sample, ...], t: float, u: Row
-    ) -> tuple[Row, Row, Row]:
-        """u, ud, udd with estimates for the rates that are not wired."""
+    def _by_inputs(self, inputs: Sequence[float], t: float, u: Row) -> tuple[Row, Row, Row]:
+        """u, ud, udd at time t, with estimates for the rates that are not wired."""
         wired = self._wired
+        if not wired:
+            return u, *estimated_rates(self._history, t, u)
         if len(wired) == 2 * len(u):
             return u, tuple(inputs[1::3]), tuple(inputs[2::3])
-        ud, udd = estimated_rates(earlier, t, u)
-        if wired:
-            ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
-            udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
+        ud, udd = estimated_rates(self._history, t, u)
+        ud = tuple([inputs[k] if k in wired else ud[k // 3] for k in range(1, len(inputs), 3)])
+        udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
         return u, ud, udd
 
     def _committed_drive(self) -> tuple[Row, Row, Row]:
@@ -150,22 +150,31 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         t, u = self._history[-1]
         if self._driven_by_time:
             return self.model.drive(t, self._constants)  # type: ignore[no-any-return]
-        return self._by_inputs(self._committed_inputs, self._history[:-1], t, u)
+        return self._by_inputs(self._committed_inputs, t, u)
 
     def _asked(self) -> Pose:
         """The pose asked for, good or not: followed from the committed one."""
-        if self._pose is None:
+        pose = self._pose
+        if pose is None:
             u = self._driven()[0] if self._driven_by_time else tuple(self._inputs[::3])
-            self._pose = self._solver.solve(self._committed, u)
-        return self._pose
+            pose = self._pose = self._solver.solve(self._committed, u)
+        return pose
 
     def _look(self) -> Shown:
         """What is shown: the pose asked for, or the last good one."""
-        if self._shown is None:
+        shown = self._shown
+        if shown is None:
             pose = self._pose or self._asked()
-            good = pose.status <= LAST_GOOD
-            self._shown = Shown(pose if good else self._committed, self._driven if good else self._committed_drive)
-        return self._shown
+            stale = pose.status > LAST_GOOD
+            shown = self._shown = Shown(self._committed if stale else pose, stale)
+        return shown
+
+    def _drive(self, shown: Shown) -> tuple[Row, Row, Row]:
+        """u, ud, udd of what is shown."""
+        drive = shown.drive
+        if drive is None:
+            drive = shown.drive = self._committed_drive() if shown.stale else self._driven()
+        return drive
 
     # Parts of the list of variables, each computed when first read
 
@@ -173,31 +182,36 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return tuple(self._inputs)
 
     def _read_values(self) -> Row:
-        shown = self._shown or self._look()
+        shown = self._look()
         if shown.values is None:
             shown.values = self._solver.outputs(shown.pose)
         return shown.values
 
     def _read_rates(self) -> Row:
-        shown = self._shown or self._look()
+        shown = self._look()
         if shown.rates is None:
-            shown.rates = self._solver.rates(shown.pose, shown.drive()[1])
+            shown.rates = self._solver.rates(shown.pose, self._drive(shown)[1])
         return shown.rates
 
     def _read_accelerations(self) -> Row:
-        shown = self._shown or self._look()
+        shown = self._look()
         if shown.accelerations is None:
-            _, ud, udd = shown.drive()
+            _, ud, udd = self._drive(shown)
             shown.accelerations = self._solver.accelerations(shown.pose, ud, udd)
         return shown.accelerations
 
     def _read_motion(self) -> Row:
         """Values, rates and accelerations in one row: what they share is computed once."""
         shown = self._shown or self._look()
-        if shown.motion is None:
-            _, ud, udd = shown.drive()
-            shown.motion = self._solver.motion(shown.pose, ud, udd)
-        return shown.motion
+        row = shown.motion
+        if row is None:
+            if shown.values is None and shown.rates is None:
+                _, ud, udd = self._drive(shown)
+                row = self._solver.motion(shown.pose, ud, udd)
+            else:  # parts of it were read before
+                row = self._read_values() + self._read_rates() + self._read_accelerations()
+            shown.motion = row
+        return row
 
     def _read_residual(self) -> Row:
         return (self._asked().residual,)
@@ -206,14 +220,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return (self._solver.diagnostics(self._asked())[3],)  # a stage of its own: it costs more than a pose
 
     def _read_errors(self) -> Row:
-        shown = self._shown or self._look()
+        shown = self._look()
         if shown.errors is None:
-            _, ud, udd = shown.drive()
+            _, ud, udd = self._drive(shown)
             shown.errors = self._solver.errors(shown.pose, ud, udd)
         return shown.errors
 
     def _read_watch(self) -> Row:
-        return self._solver.watch((self._shown or self._look()).pose)
+        return self._solver.watch(self._look().pose)
 
     def _read_driven(self) -> Row:
         return tuple(value for driver in zip(*self._driven(), strict=True) for value in driver)
@@ -246,7 +260,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 indices.append(offsets[found] + place)
         if width in indices or not readers:
             readers.append(_no_number)
-        fetch = Fetch(tuple(readers), _picker(indices))
+        fetch = Fetch(readers[0], tuple(readers[1:]), _picker(indices))
         if len(self._fetches) >= MOST_FETCHES:
             self._fetches.clear()
         self._fetches[vrs] = fetch
@@ -266,11 +280,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def get_real(self, vrs: Sequence[int]) -> list[float]:
         try:
-            key = tuple(vrs)
-            readers, pick = self._fetches.get(key) or self._plan_fetch(key)
-            row = readers[0]()
-            for read in readers[1:]:
-                row += read()
+            if vrs != self._last_read:  # most hosts read the same list over and over
+                key = tuple(vrs)
+                self._last_fetch = self._fetches.get(key) or self._plan_fetch(key)
+                self._last_read = list(vrs)
+            read, others, pick = self._last_fetch
+            row = read()
+            for read_more in others:
+                row += read_more()
             return list(pick(row))
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
@@ -315,13 +332,13 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self._inputs
-        for k, vr in enumerate(vrs):
-            value = values[k]
+        for vr, value in zip(vrs, values):  # noqa: B905  # the host's lists are equally long
             if not (0 <= vr < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
                 self._set_other_real(vr, value)
                 continue
             if value != inputs[vr]:
                 inputs[vr] = value
+                self._shown = None
                 if vr % 3 == 0:
                     self._pose = None
                 elif value != 0.0:
@@ -330,8 +347,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                     self._stray = self._references.name(vr)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
-        self._touched = True
-        self._shown = None
+        if not self._touched:  # from now on the rates are those at the current time, not at the commit
+            self._touched = True
+            self._shown = None
 
     def _set_other_real(self, vr: int, value: float) -> None:
         """Parameters, which are set rarely, and what is refused."""
@@ -444,10 +462,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return self._solver.solve(self._committed, u)
 
     def _commit(self, pose: Pose, t: float) -> None:
-        earlier = self._history
-        while earlier and earlier[-1][0] >= t:  # the host went back
-            earlier = earlier[:-1]
-        self._history = (*earlier[-2:], (t, pose.u))
+        history = self._history
+        while history and history[-1][0] >= t:  # the host went back
+            history = history[:-1]
+        self._history = (*history[-2:], (t, pose.u))
         self._committed = pose
         self._committed_inputs = tuple(self._inputs)
         self._touched = False

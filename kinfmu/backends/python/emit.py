@@ -3,7 +3,8 @@
 The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
 
     drive(t, constants)                            -> u, ud, udd
-    position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch, values
+    position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch,
+                                                      values
     tangent(values)                                -> z' and z'' (one driver only)
     velocity(values, ud, given, held)              -> zd
     acceleration(values, ud, udd, zd, given, held) -> zdd
@@ -15,14 +16,17 @@ The module holds constants and these functions, each a stage; nothing is compute
     jacobians(values)                              -> one matrix a block
 
 z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; margin is the
-smallest |determinant|, moved the largest correction, watch the largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for. first and second are zd and zdd;
-with one driver they are the derivatives of z with respect to u, and the chain rule is part of the code.
+smallest |determinant|, residual the largest length of a block's residuals, moved the largest correction, watch the
+largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for.
+first and second are zd and zdd; with one driver they are the derivatives of z with respect to u, and the chain rule is
+part of the code.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from kinfmu.backends.python.alone import Alone
 from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.naming import derivative_name
@@ -50,6 +54,12 @@ class _Emitter:
                 self.names.assign(motion[0], name)
             self.position_nodes += [motion[0] for _, motion in block.assigned]
             self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+        self.definitions = {
+            derivative_name(name, order): motion[order]
+            for block in plan.blocks
+            for name, motion in block.assigned
+            for order in (1, 2)
+        }  # rates and accelerations of assigned coordinates by name, in the order of evaluation
         self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
         self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
 
@@ -79,7 +89,9 @@ class _Emitter:
         for block in self.solved:
             starts.append((count, count + len(block.unknowns)))
             count += len(block.unknowns)
-        large = [block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)]
+        large = [
+            block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)
+        ]
         imports = ["from math import cos, inf, sin, sqrt"]
         if large:
             imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
@@ -131,11 +143,13 @@ class _Emitter:
         lines = [
             "",
             "def position(u, z, zd, zdd, s, held=0):",
-            '    """Unknowns by Newton from a prediction, block after block; ArithmeticError(block, residual) if it fails."""',
+            '    """Unknowns by Newton from a prediction, block by block; ArithmeticError(block, residual) if it fails."""',
             *_unpack(map(identifier, self.inputs[0]), "u"),
         ]
         if self.solved:
-            lines += ["    half = 0.5 * s", "    residual, iterations = 0.0, 0"]
+            lines += ["    half = 0.5 * s"]
+            if len(self.solved) > 1:
+                lines += ["    largest, iterations = 0.0, 0"]
             for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
                 lines += _unpack([f"{letter}{k}" for k in range(len(self.plan.unknowns))], source)
             for k, name in enumerate(self.plan.unknowns):
@@ -146,11 +160,16 @@ class _Emitter:
         values = _tuple(self.exports)
         margin = "1.0"
         if self.solved:
-            lines += [f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)]
+            lines += [
+                f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
+            ]
             sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
             margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
         determinants = _tuple(f"m{k}" for k in range(1, len(self.solved) + 1))
-        summary = f"{margin}, residual, iterations, {self._moved()}" if self.solved else "1.0, 0.0, 0, 0.0"
+        summary = "1.0, 0.0, 0, 0.0"
+        if self.solved:
+            error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
+            summary = f"{margin}, sqrt({error}), {count}, {self._moved()} if {count} else 0.0"
         rows = [node for _, node in self.plan.watches]
         lines += _indented(writer.statements(rows))
         watched = [f"abs({writer.expression(node)})" for node in rows]
@@ -186,35 +205,48 @@ class _Emitter:
         inside += writer.statements([*block.residuals, *entries])
         r = [f"r{i}" for i in range(len(block.residuals))]
         inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
-        inside.append(f"error = {_largest(r, block.row_scales)}")
+        inside.append(f"error = {_square(r, block.row_scales)}")
         jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
         z = [identifier(name) for name in block.unknowns]
         inside += _determinant(k, jacobian)
-        return [
+        done = f"error <= {ROUND_OFF**2} or held & {1 << (k - 1)} or (error <= {SETTLED**2} and 16.0 * error > last)"
+        lines = [
             f"    # block {k}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}",
             *_indented(before),
             "    last = inf",
             f"    for iteration in range({ITERATIONS}):",
             *_indented(inside, 8),
-            f"        if error <= {ROUND_OFF} or held & {1 << (k - 1)} or (error <= {SETTLED} and 4.0 * error > last):",
+            f"        if {done}:",
             "            break",
             "        last = error",
             *_indented(_correction(k, jacobian, r, z), 8),
             "    else:",
-            f"        raise ArithmeticError({k - 1}, error)",
-            "    iterations += iteration",
-            "    if error > residual:",
-            "        residual = error",
+            f"        raise ArithmeticError({k - 1}, sqrt(error))",
         ]
+        if len(self.solved) > 1:
+            lines += ["    iterations += iteration", "    if error > largest:", "        largest = error"]
+        return lines
 
     def _velocity(self) -> list[str]:
-        lines = ["", "def velocity(values, ud, given=(), held=0):", '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""']
+        lines = [
+            "",
+            "def velocity(values, ud, given=(), held=0):",
+            '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""',
+        ]
         lines += [_VALUES, *_unpack(map(identifier, self.inputs[1]), "ud")]
         return lines + self._linear(1, lambda block: block.velocity)
 
     def _acceleration(self) -> list[str]:
-        lines = ["", "def acceleration(values, ud, udd, zd, given=(), held=0):", '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""']
-        lines += [_VALUES, *_unpack(map(identifier, self.inputs[1]), "ud"), *_unpack(map(identifier, self.inputs[2]), "udd")]
+        lines = [
+            "",
+            "def acceleration(values, ud, udd, zd, given=(), held=0):",
+            '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""',
+        ]
+        lines += [
+            _VALUES,
+            *_unpack(map(identifier, self.inputs[1]), "ud"),
+            *_unpack(map(identifier, self.inputs[2]), "udd"),
+        ]
         lines += _unpack([identifier(derivative_name(name, 1)) for name in self.plan.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
@@ -222,11 +254,16 @@ class _Emitter:
         """With one driver: velocity and acceleration for ud = 1, udd = 0 in one go, for it is needed at every pose."""
         if len(self.plan.drivers) != 1:
             return []
-        lines = ["", "def tangent(values):", '    """First and second derivative of the unknowns with respect to the driver."""', _VALUES]
-        lines += [f"    {identifier(self.inputs[1][0])} = 1.0", f"    {identifier(self.inputs[2][0])} = 0.0"]
+        lines = [
+            "",
+            "def tangent(values):",
+            '    """First and second derivative of the unknowns with respect to the driver."""',
+            _VALUES,
+        ]
+        alone = Alone(*(inputs[0] for inputs in self.inputs[1:]), self.definitions)
         writer = Writer(self.names, reachable(self.position_nodes))
-        lines += _indented(self._linear_lines(writer, 1, lambda block: block.velocity, held=False))
-        lines += _indented(self._linear_lines(writer, 2, lambda block: block.acceleration, held=False))
+        for order, right in ((1, alone.velocity), (2, alone.acceleration)):
+            lines += _indented(self._linear_lines(writer, order, right, alone.definitions, held=False))
         self._import(writer)
         first, second = (
             _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns) for order in (1, 2)
@@ -236,18 +273,19 @@ class _Emitter:
     def _linear(self, order: int, right: _Right) -> list[str]:
         """Linear solves of one order as a function's body."""
         writer = Writer(self.names, reachable(self.position_nodes))
-        lines = self._linear_lines(writer, order, right, held=True)
+        lines = self._linear_lines(writer, order, right, self.definitions, held=True)
         self._import(writer)
         result = _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns)
         return [*_indented(lines), f"    return {result}", ""]
 
-    def _linear_lines(self, writer: Writer, order: int, right: _Right, *, held: bool) -> list[str]:
+    def _linear_lines(
+        self, writer: Writer, order: int, right: _Right, definitions: Mapping[str, Node], *, held: bool
+    ) -> list[str]:
         """Linear solves of one order, block after block, with the definitions that they need on the way."""
-        definitions = self._definitions([node for block in self.solved for node in right(block)])
         lines, count = [], 0
         done: set[str] = set()
         for block in self.solved:
-            lines += self._defined(writer, right(block), definitions, done)
+            lines += _defined(writer, right(block), definitions, done)
             k = self.number[id(block)] + 1
             entries = [entry for row in block.jacobian for entry in row]
             lines += writer.statements([*right(block), *entries])
@@ -278,7 +316,7 @@ class _Emitter:
         if highest:
             lines += self._chained(highest)
         writer = Writer(self.names, reachable(self.position_nodes))
-        body = self._defined(writer, targets, self._definitions(targets), set()) + writer.statements(targets)
+        body = _defined(writer, targets, self.definitions, set()) + writer.statements(targets)
         returned = _tuple(writer.expression(node) for node in targets)
         self._import(writer)
         return [*lines, *_indented(body), f"    return {returned}", ""]
@@ -299,9 +337,7 @@ class _Emitter:
         lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
         if order == 2:
             lines += _unpack([f"a{k}" for k in range(len(rates))], "second")
-            lines += [
-                f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)
-            ]
+            lines += [f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)]
         return lines
 
     def _watches(self) -> list[str]:
@@ -339,34 +375,6 @@ class _Emitter:
             "",
         ]
 
-    def _definitions(self, targets: Sequence[Node]) -> dict[str, Node]:
-        """Rates and accelerations of assigned coordinates behind the targets, by name, in the order of evaluation."""
-        all_of_them: dict[str, Node] = {}
-        for block in self.plan.blocks:
-            for name, motion in block.assigned:
-                for order in (1, 2):
-                    all_of_them[derivative_name(name, order)] = motion[order]
-        needed: set[str] = set()
-        stack = [symbol.name for symbol in symbols(targets)]
-        while stack:
-            name = stack.pop()
-            if name in all_of_them and name not in needed:
-                needed.add(name)
-                stack += [symbol.name for symbol in symbols([all_of_them[name]])]
-        return {name: node for name, node in all_of_them.items() if name in needed}
-
-    def _defined(
-        self, writer: Writer, targets: Sequence[Node], definitions: dict[str, Node], done: set[str]
-    ) -> list[str]:
-        """Statements for the definitions that the targets need and that are not done yet."""
-        lines = []
-        for name in self._definitions(targets):
-            if name not in done:
-                done.add(name)
-                lines += writer.statements([definitions[name]])
-                lines.append(f"{identifier(name)} = {writer.expression(definitions[name])}")
-        return lines
-
     def _import(self, writer: Writer) -> None:
         """Note what a later stage takes from the position stage."""
         coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
@@ -382,6 +390,29 @@ class _Emitter:
 
 _VALUES = "    <values>"
 _Right = Callable[[Block], tuple[Node, ...]]
+
+
+def _needed(targets: Sequence[Node], definitions: Mapping[str, Node]) -> list[str]:
+    """Those of the definitions that the targets are made of, in the order of evaluation."""
+    needed: set[str] = set()
+    stack = [symbol.name for symbol in symbols(targets)]
+    while stack:
+        name = stack.pop()
+        if name in definitions and name not in needed:
+            needed.add(name)
+            stack += [symbol.name for symbol in symbols([definitions[name]])]
+    return [name for name in definitions if name in needed]
+
+
+def _defined(writer: Writer, targets: Sequence[Node], definitions: Mapping[str, Node], done: set[str]) -> list[str]:
+    """Statements for the definitions that the targets need and that are not done yet."""
+    lines = []
+    for name in _needed(targets, definitions):
+        if name not in done:
+            done.add(name)
+            lines += writer.statements([definitions[name]])
+            lines.append(f"{identifier(name)} = {writer.expression(definitions[name])}")
+    return lines
 
 
 def _is_small(block: Block) -> bool:
@@ -439,14 +470,12 @@ def _matrix(rows: Sequence[Sequence[str]]) -> str:
     return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
 
 
-def _largest(r: Sequence[str], scales: Sequence[float]) -> str:
-    """Largest residual relative to the size; equal scales are divided out once."""
-    sizes = [f"abs({name})" for name in r]
+def _square(r: Sequence[str], scales: Sequence[float]) -> str:
+    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
     if len(set(scales)) == 1:
-        largest = f"max({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
-        return largest if scales[0] == 1.0 else f"{largest} * {1.0 / scales[0]!r}"
-    weighted = [f"{size} * {1.0 / scale!r}" for size, scale in zip(sizes, scales, strict=True)]
-    return f"max({', '.join(weighted)})"
+        total = " + ".join(f"{name} * {name}" for name in r)
+        return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
+    return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
 
 
 def _tuple(items: Iterable[str]) -> str:

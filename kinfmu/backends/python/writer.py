@@ -123,4 +123,3 @@ class Writer:
 
 def _wrapped(part: tuple[str, int], level: int) -> str:
     return part[0] if part[1] >= level else f"({part[0]})"
-

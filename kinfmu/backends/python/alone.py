@@ -1,0 +1,55 @@
+"""A single driver at speed 1 and acceleration 0: what is constant then is folded before code is written."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+
+from kinfmu.equations.graph import Node, reachable
+from kinfmu.plan import Block
+
+_OPERATIONS: dict[str, Callable[..., Node]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "neg": operator.neg,
+}
+
+
+class Alone:
+    """Right sides and definitions of a plan whose only driver has speed 1 and acceleration 0.
+
+    definitions: rates and accelerations of assigned coordinates by name, in the order of evaluation.
+    """
+
+    def __init__(self, speed: str, acceleration: str, definitions: Mapping[str, Node]) -> None:
+        self._given = {speed: 1.0, acceleration: 0.0}
+        self.definitions: dict[str, Node] = {}
+        for name, node in definitions.items():
+            (folded,) = self._folded([node])
+            self.definitions[name] = folded
+            if folded.constant is not None:
+                self._given[name] = folded.constant
+
+    def velocity(self, block: Block) -> tuple[Node, ...]:
+        """The block's right side for velocities, folded."""
+        return tuple(self._folded(block.velocity))
+
+    def acceleration(self, block: Block) -> tuple[Node, ...]:
+        """The block's right side for accelerations, folded."""
+        return tuple(self._folded(block.acceleration))
+
+    def _folded(self, targets: Sequence[Node]) -> list[Node]:
+        """The targets with numbers in place of the symbols that are given; the graph simplifies what it can."""
+        new: dict[Node, Node] = {}
+        for node in reachable(targets):
+            if node.op == "symbol" and node.name in self._given:
+                new[node] = node.graph.constant(self._given[node.name])
+            elif node.op in _OPERATIONS:
+                new[node] = _OPERATIONS[node.op](*(new[arg] for arg in node.args))
+            elif node.args:
+                new[node] = node.graph.function(node.op, new[node.args[0]])
+            else:
+                new[node] = node
+        return [new[target] for target in targets]
