@@ -5,8 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+import numpy as np
+import pytest
+
 import kinfmu
 from kinfmu.backends.python import emit
+from kinfmu.mechanism.toml_file import parse, text
 from kinfmu.plan import compile_plan
 
 
@@ -28,6 +32,24 @@ def test_generating_twice_gives_the_same_bytes() -> None:
     one, other = (emit(compile_plan(kinfmu.load("fourbar"))) for _ in range(2))
     assert one == other
     compile(one, "fourbar.py", "exec")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("sin", "cos", "u"), ("lambda", "None", "class"), ("t1", "r0", "z0"), ("a", "a_x", "cos_a"), ("_", "s", "__")],
+)
+def test_bodies_and_drivers_may_be_called_anything_that_is_a_name(names: tuple[str, str, str]) -> None:
+    """Words of Python and names that the generated code uses itself, too."""
+    fourbar = kinfmu.load("fourbar")
+    told = text(fourbar)
+    for old, new in zip(("crank", "coupler", "rocker"), names, strict=True):
+        told = re.sub(rf"\b{old}\b", f"<{new}>", told)
+    renamed = parse(re.sub(r"<(\w+)>", r"\1", told))
+    assert renamed.coordinate_names[0] == f"{names[0]}.x"
+    angles = [0.5, 1.5]
+    run, expected = kinfmu.solve(renamed, angles), kinfmu.solve(fourbar, angles)
+    np.testing.assert_allclose(run.accelerations, expected.accelerations, atol=1e-15)
+    np.testing.assert_allclose(run.values, expected.values, atol=1e-15)
 
 
 def test_long_numbers_are_rounded_and_short_ones_left_alone() -> None:
