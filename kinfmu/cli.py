@@ -140,6 +140,15 @@ def _about(mechanism: str) -> Iterator[None]:
         raise type(error)(f"{mechanism}: {error}", **error.data) from None
 
 
+@contextmanager
+def _instead(path: str, name: str) -> Iterator[None]:
+    """What is found wrong is told of what the user named, not of a file made on the way."""
+    try:
+        yield
+    except KinfmuError as error:
+        raise type(error)(str(error).replace(path, name), **error.data) from None
+
+
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(VERSION, prog_name="kinfmu")
 def main() -> None:
@@ -317,6 +326,9 @@ def simulate(
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log import write_mcap, write_rrd
 
+    for path, suffix in ((mcap, ".mcap"), (rrd, ".rrd")):
+        if path is not None and path.suffix.lower() != suffix:
+            raise click.UsageError(f"--{suffix[1:]} {path}: such a file ends in {suffix}")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu = Path(model)
         if fmu.suffix != ".fmu":
@@ -325,7 +337,7 @@ def simulate(
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
         elif not _exists(fmu):
             raise click.UsageError(f"{fmu}: there is no such file")
-        with _Progress() as progress:
+        with _Progress() as progress, _instead(str(fmu), model):
             run = simulated(
                 fmu,
                 start=start,

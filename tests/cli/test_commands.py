@@ -120,6 +120,21 @@ def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str], fails:
     )
 
 
+def test_simulate_tells_of_the_mechanism_and_not_of_an_fmu_on_the_way(fails: Callable[..., str]) -> None:
+    assert fails("simulate", "fourbar", "--set", "crank.sped=1") == (
+        "fourbar: 'crank.sped' is no parameter of this FMU; did you mean 'crank.speed'?; "
+        "parameters: crank.start, crank.speed, solver.tolerance, driven_by_time"
+    )
+
+
+@pytest.mark.parametrize(("option", "suffix"), [("--mcap", ".mcap"), ("--rrd", ".rrd")])
+def test_a_log_of_another_kind_is_wrong_usage(
+    option: str, suffix: str, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    assert refuses("simulate", "fourbar", option, "run.txt") == f"{option} run.txt: such a file ends in {suffix}"
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_file_that_is_no_fmu_is_told(fails: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("no archive")
     assert "text.fmu" in fails("simulate", "text.fmu")
