@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 LONG_RUN = 2000  # samples from which a progress bar is worth a line
 TABLES = (".csv", ".parquet", ".npz")
-MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
 
 
 class _MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
@@ -93,6 +92,8 @@ class _Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generi
             self.fail(f"'{value}': N = {parts[2]} must be a whole number of samples", param, ctx)
         if self.last == "STEP" and (x <= 0.0 or b < a):
             self.fail(f"'{value}' must run forwards with a positive step", param, ctx)
+        from kinfmu.run import MOST_SAMPLES
+
         if (x if self.last == "N" else (b - a) / x) > MOST_SAMPLES:
             self.fail(f"'{value}' asks for more than {MOST_SAMPLES} samples", param, ctx)
         return a, b, x
@@ -414,6 +415,8 @@ def steps(start: float, stop: float, step: float) -> Any:
     """start + k step up to stop, which is included where a step hits it."""
     import numpy as np
 
+    from kinfmu.run import MOST_SAMPLES
+
     count = (stop - start) / step + 1e-6
     if count > MOST_SAMPLES:
         raise KinfmuError(f"[run] {start:g} to {stop:g} s in steps of {step:g} s: more than {MOST_SAMPLES} samples")
@@ -434,7 +437,8 @@ def verdict(run: Run) -> str:
 def _fail_if_failed(run: Run) -> None:
     for event in run.events:
         if event.level == "error":
-            raise KinfmuError(f"t = {event.t:g} s: {event.text}")
+            told = event.text.startswith("at t = ")  # an FMU says itself when
+            raise KinfmuError(event.text if told else f"at t = {event.t:g} s: {event.text}")
 
 
 def _parameters(settings: tuple[tuple[str, str], ...]) -> dict[str, float | bool]:

@@ -17,6 +17,8 @@ from kinfmu.units import unit_of
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
+
 
 class Column(NamedTuple):
     """One column of a run."""
@@ -122,6 +124,8 @@ class Run:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """The column of that name, (n,); a fixed coordinate is a column of its constant, its rates are zero."""
+        if not isinstance(name, str):
+            raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
         names = []
         for column in self.columns():
             if column.name == name:

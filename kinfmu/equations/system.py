@@ -75,7 +75,8 @@ class System:
         unit = np.eye(len(self.coordinates))
         along = [Taylor(value, unit[k]) for k, value in enumerate(_floats(q))]
         n = len(self.coordinates)
-        return np.array([_lines(phi, n) for phi in self.evaluate(along, [0.0] * len(self.mechanism.drivers))])
+        rows = [_lines(phi, n) for phi in self.evaluate(along, [0.0] * len(self.mechanism.drivers))]
+        return np.array(rows).reshape(len(self.rows), n)
 
     def nu(self, q: ArrayLike, ud: ArrayLike) -> FloatArray:
         """Right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""

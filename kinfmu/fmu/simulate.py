@@ -21,7 +21,7 @@ from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
-from kinfmu.run import Event, Run
+from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.solver.status import Status
 
 if TYPE_CHECKING:
@@ -98,6 +98,8 @@ def _times(interface: Interface, start: float | None, stop: float | None, step: 
             f"start = {first:g} s, stop = {last:g} s, step = {h:g} s: "
             "a run needs finite times, start <= stop and a positive step"
         )
+    if (last - first) / h > MOST_SAMPLES:
+        raise FmuError(f"{first:g} to {last:g} s in steps of {h:g} s: more than {MOST_SAMPLES} samples")
     count = int((last - first) / h + LAST_STEP)
     t: NDArray[np.float64] = first + h * np.arange(count + 1, dtype=np.float64)
     if last - t[-1] > LAST_STEP * h:
@@ -121,7 +123,7 @@ def _parameters(
             if value not in (False, True):
                 raise FmuError(f"{where}: {name} = {value!r} must be true or false")
             chosen[name] = bool(value)
-        elif not np.isfinite(value):
+        elif isinstance(value, bool) or not np.isfinite(value):
             raise FmuError(f"{where}: {name} = {value!r} must be a finite number")
         else:
             chosen[name] = float(value)

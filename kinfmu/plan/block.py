@@ -147,4 +147,4 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
         }
         entries = evaluate([entry for row in jacobian for entry in row], turned)
         largest = max(largest, abs(block_determinant(np.reshape(entries, (len(jacobian), -1)))))
-    return largest or 1.0
+    return float(f"{largest:.2g}") or 1.0  # a scale: more digits would differ between machines

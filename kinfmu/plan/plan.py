@@ -112,9 +112,16 @@ class SolvePlan:
 
     @property
     def anchor_values(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Driver values and unknowns of the anchor."""
+        """Driver values and unknowns of the anchor.
+
+        The unknowns are rounded to what every machine agrees on; the solver's first Newton step gives back the rest.
+        """
         place = {name: k for k, name in enumerate(self.mechanism.coordinate_names)}
-        return tuple(map(float, self.anchor.u)), tuple(float(self.anchor.q[place[name]]) for name in self.unknowns)
+        z = []
+        for name in self.unknowns:
+            scale = 1.0 if name.endswith(".phi") else self.size
+            z.append(round(float(self.anchor.q[place[name]]) / scale, 11) * scale + 0.0)
+        return tuple(map(float, self.anchor.u)), tuple(z)
 
     def depends(self, output: str) -> tuple[int, ...]:
         """Drivers (by position) on which an output depends structurally."""
@@ -196,8 +203,9 @@ def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
     for dependent in redundancy.inconsistent:
         unit = system.mechanism.length_unit
         raise InconsistentError(
-            f"[joints.{dependent.row.owner}] contradicts the other joints: {listed(dependent.implied_by_joints)} "
-            f"leave its row '{dependent.row.label}' open by {abs(dependent.gap):.6g} {unit}, whatever the pose; "
+            f"[joints.{dependent.row.owner}] contradicts the other joints: "
+            f"{listed(dependent.implied_by_joints) if dependent.implied_by_joints else 'all'} leave its row "
+            f"'{dependent.row.label}' open by {abs(dependent.gap):.6g} {unit}, whatever the pose; "
             f"change a length by that gap or remove the joint",
             joint=dependent.row.owner,
             gap=dependent.gap,
@@ -208,29 +216,30 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
     """Raise a MobilityError if there are not as many drivers as degrees of freedom."""
     names = [driver.name for driver in system.mechanism.drivers]
     mobility = redundancy.mobility
-    if len(names) == mobility:
+    if len(names) == mobility > 0:
         return
     if len(names) < mobility:
         missing = mobility - len(names)
         raise MobilityError(
-            f"[drivers] mobility is {mobility} but there {_are(len(names), 'driver')} ({listed(names)}): "
+            f"[drivers] mobility is {mobility} but there {_are(names)}: "
             f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed",
             mobility=mobility,
         )
     if mobility == 0:
         raise MobilityError(
-            f"[drivers] mobility is 0: the joints leave no motion, so nothing can be driven ({listed(names)})",
+            "[drivers] mobility is 0: the joints leave no motion, so there is nothing to drive",
             mobility=0,
         )
     raise MobilityError(
-        f"[drivers] mobility is {mobility} but there {_are(len(names), 'driver')} ({listed(names)}): "
-        f"remove {len(names) - mobility}",
+        f"[drivers] mobility is {mobility} but there {_are(names)}: remove {len(names) - mobility}",
         mobility=mobility,
     )
 
 
-def _are(count: int, noun: str) -> str:
-    return f"is 1 {noun}" if count == 1 else f"are {count} {noun}s" if count else f"is no {noun}"
+def _are(drivers: Sequence[str]) -> str:
+    if not drivers:
+        return "is no driver"
+    return f"is 1 driver ({drivers[0]})" if len(drivers) == 1 else f"are {len(drivers)} drivers ({listed(drivers)})"
 
 
 def _outputs(

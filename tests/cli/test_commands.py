@@ -103,7 +103,7 @@ def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> N
 def test_simulate_tells_a_limit_and_keeps_what_was_reached(command: Command, tmp_path: Path) -> None:
     result = command("simulate", "double_pendulum", "--stop", "3", "--step", "0.5")
     assert result.exit_code == 1
-    assert result.stderr.startswith("kinfmu: t = 2")
+    assert result.stderr.startswith("kinfmu: at t = 2.5 s: crank")
     assert "crank = 6.54498469498 rad (375 deg) cannot be reached: the limit is crank = 6.28" in result.stderr
     assert len(result.stderr.splitlines()) == 1
     run = log.read(tmp_path / "logs" / "double_pendulum.mcap")

@@ -78,7 +78,7 @@ def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command,
     result = command("solve", "double_pendulum", "-o", "run.csv", "--times", "0:3:0.5")
     assert result.exit_code == 1
     assert "5 ok, 2 outside" in result.stdout
-    assert result.stderr.startswith("kinfmu: t = 2.5 s: crank = 6.54")
+    assert result.stderr.startswith("kinfmu: at t = 2.5 s: crank = 6.54")
     assert "the limit is crank = 6.283185" in result.stderr
     assert len(result.stderr.splitlines()) == 1
     table = read_csv(tmp_path / "run.csv")
