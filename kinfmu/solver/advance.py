@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .bridge import HALF_WIDTH, REGULAR, build, secant_zero, zero_near
+from .bridge import HALF_WIDTH, build, moved, secant_zero, zero_near
 from .pose import ALONE, Model, Pose, Vector, directed, on_road
 from .road import Blocked, Road
+from .span import REGULAR
 from .status import Status
 
 LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
@@ -14,12 +15,15 @@ TRUST = 10.0  # a correction of the prediction must be this much smaller than th
 FALL = 0.3  # a step may not bring a determinant below this part of what it was
 SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near and its place is extrapolated
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
+MOST_STEPS = 1_000_000  # of a way: seconds, and more than any motion that is meant
+NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to blame; the way has too many steps
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
+_MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
 
 
 class Limit(NamedTuple):
-    """Driver values where a way ends, and the block whose determinant vanishes there (-1: none)."""
+    """Driver values where a way ends, and the block whose determinant vanishes there (or NO_BLOCK, TOO_FAR)."""
 
     u: Vector
     block: int
@@ -37,15 +41,17 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
     pose, step, iterations = start, longest, 0
     before, limit = start, None
-    while True:
+    if abs(target[0] - start.u[0] if one else distance) > MOST_STEPS * longest:
+        return Limit(start.u, TOO_FAR)
+    for _ in range(MOST_STEPS):
         if one:
             road = pose.road
             if road is not None and not road.low <= target[0] <= road.high:
                 bridge = pose.bridge or road.next_bridge(pose.u[0], target[0])
                 if bridge.covers(target[0]):
-                    pose = bridge.pose(target)
-                    pose.road = road.around(target[0])
-                    return pose
+                    inside = bridge.pose(target)
+                    inside.road = road if pose.bridge is bridge else road.around(target[0])
+                    return inside
                 pose = bridge.exit(target[0])
                 pose = on_road(pose, road.around(pose.u[0]))
                 continue
@@ -77,6 +83,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
             limit = limit or _limit(before, pose)
             if step < _GIVE_UP * longest or _beyond(target, limit.u, direction, s):
                 return limit
+    return Limit(pose.u, TOO_FAR)
 
 
 def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:
@@ -103,8 +110,8 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
 
 
 def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
-    """The road with what is new at a trial pose: a bridge, if it has come into the window of a singular point; a blocked
-    place, if no bridge holds there. The road as it was, if nothing is new.
+    """The road with what is new at a trial pose: a bridge, if it has come into the window of a singular point; a
+    blocked place, if no bridge holds there. The road as it was, if nothing is new.
     """
 
     def walk(start: Pose, u: float) -> Pose | None:
@@ -114,6 +121,11 @@ def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
     known = trial.road or Road()
     if known.knows(trial.u[0]):
         return trial.road
+    if model.DRIVER_KINDS[0] == "angle":
+        for old in known.bridges:
+            bridge = moved(old, pose, trial.u[0], walk)
+            if bridge is not None:
+                return known.with_bridge(bridge, pose.u[0])
     block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
     far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * reach
     zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk, reach)
@@ -130,7 +142,9 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
     """From a pose to a value of the only driver by trusted steps, without bridges; or None."""
     longest: float = LONGEST_STEP * model.REACH[0]
     pose, step = start, longest
-    while pose.u[0] != u:
+    for _ in range(_MOST_WALKED):
+        if pose.u[0] == u:
+            return pose
         distance = u - pose.u[0]
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
@@ -141,7 +155,7 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
             step = 0.5 * abs(s)
             if step < _ROUGHEST * longest:
                 return None
-    return pose
+    return None
 
 
 def _limit(before: Pose, pose: Pose) -> Limit:
@@ -150,7 +164,7 @@ def _limit(before: Pose, pose: Pose) -> Limit:
     Near a dead centre determinant^2 falls linearly along the way: the secant rule on the last two poses gives its zero.
     """
     if not pose.determinants:
-        return Limit(pose.u, -1)
+        return Limit(pose.u, NO_BLOCK)
     block = min(range(len(pose.determinants)), key=lambda k: abs(pose.determinants[k]))
     near, far = pose.determinants[block] ** 2, before.determinants[block] ** 2
     if far <= near:
@@ -165,6 +179,11 @@ def _beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
 
 
 def limit_message(model: Model, limit: Limit, target: Vector) -> str:
+    """Why a target cannot be reached, in one line."""
+    if limit.block == TOO_FAR:
+        return (
+            f"{place(model, target)} is too far from {place(model, limit.u)}: more than {MOST_STEPS} steps on one way"
+        )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
     return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {names} would part"
 

@@ -8,47 +8,48 @@ proves that it is a pose of the mechanism: where lengths miss a change point by 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
-from .hermite import Hermite, weights
-from .pose import ALONE, AT_REST, Model, Pose, Vector, evaluated, tangent_of
+from .hermite import weights
+from .pose import ALONE, AT_REST, EPS, Model, Pose, Vector, evaluated
+from .span import Span, combined, restored_span
 from .status import Status
+from .turns import turned, whole_turns
 
 HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
 NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would win
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
-AGREED = 1e-9  # largest difference of two widths in z
-REGULAR = 0.25  # determinant from which a block inside a window is solved as elsewhere
+AGREED = 1e-9  # largest difference of two widths, and of a pose and a node turns away, in z
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
-_PLACES = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the nodes, in half widths
-_INNER = _PLACES[1:5]
-_OUTER = (*_PLACES[:2], *_PLACES[4:])
 
 Walk = Callable[[Pose, float], "Pose | None"]  # from a pose to a driver value, plainly
 
 
 class Bridge:
-    """The unknowns of singular blocks over (low, high) = centre -+ half, for a single driver.
+    """A span over (low, high), half a width to either side of its centre, moved by whole turns of the driver.
 
-    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: bit a block that is interpolated. The inner four nodes
-    give the numbers, the outer four a second opinion: their difference is the error estimate.
+    A mechanism driven by an angle repeats: what was interpolated once holds `turns` turns on, with each unknown angle
+    moved by its own whole turns, `raised`. nodes: the poses of the span, moved.
     """
 
-    __slots__ = ("_inner", "_outer", "centre", "half", "held", "high", "low", "model", "nodes")
+    __slots__ = ("centre", "half", "high", "low", "nodes", "raised", "span", "turns")
 
-    def __init__(self, model: Model, centre: float, half: float, nodes: list[Pose]) -> None:
-        self.model = model
-        self.centre = centre
-        self.half = half
-        self.low, self.high = centre - half, centre + half
-        self.nodes = nodes
-        self.held = 0
-        for block in range(len(model.BLOCKS)):
-            if min(abs(nodes[2].determinants[block]), abs(nodes[3].determinants[block])) < REGULAR:
-                self.held |= 1 << block
-        self._inner: list[Hermite] | None = None  # made when first read: many bridges are only crossed
-        self._outer: list[Hermite] | None = None
+    def __init__(self, span: Span, turns: int = 0, raised: tuple[int, ...] = ()) -> None:
+        self.span = span
+        self.turns = turns
+        self.raised = raised
+        self.centre = turned(span.centre, turns)
+        self.half = span.half
+        self.nodes = span.nodes if not turns else [self._moved(node) for node in span.nodes]
+        self.low, self.high = self.nodes[2].u[0], self.nodes[3].u[0]  # so that these nodes lie outside, to the bit
+
+    def _moved(self, node: Pose) -> Pose:
+        u, z = (turned(node.u[0], self.turns),), self._raised(node.z)
+        return Pose(u, evaluated(self.span.model, u, z, held=0))
+
+    def _raised(self, z: Vector) -> Vector:
+        return tuple([turned(a, n) for a, n in zip(z, self.raised, strict=True)]) if self.turns else z
 
     def covers(self, u: float) -> bool:
         """True inside the window, where the bridge is used."""
@@ -56,57 +57,77 @@ class Bridge:
 
     def exit(self, target: float) -> Pose:
         """The farthest node on the target's side that does not lie beyond the target."""
-        away = (target - self.centre) / self.half
-        node = (4 if away >= 2.0 else 3) if away > 0.0 else (1 if away <= -2.0 else 2)
-        return self.nodes[node]
+        near, far = (3, 4) if target > self.centre else (2, 1)
+        passed = abs(target - self.centre) >= abs(self.nodes[far].u[0] - self.centre)
+        return self.nodes[far if passed else near]
+
+    def _place(self, u: float) -> float:
+        """Where a driver value lies on the span: x = (u - centre) / half."""
+        return (turned(u, -self.turns) - self.span.centre) / self.half
 
     def pose(self, u: Vector) -> Pose:
         """The interpolated pose inside the window; blocks that are regular are solved from it."""
-        if self._inner is None:
-            self._inner = _polynomials(self.model, self.half, _INNER, self.nodes[1:5])
-        z, zd, zdd = _read(self._inner, (u[0] - self.centre) / self.half, self.half)
-        return self._at(u, z, zd, zdd)
-
-    def _at(self, u: Vector, z: Vector, zd: Vector, zdd: Vector) -> Pose:
-        model = self.model
-        pose = Pose(u, evaluated(model, u, z, self.held))
+        z, zd, zdd = self.span.read(self._place(u[0]))
+        model, held = self.span.model, self.span.held
+        pose = Pose(u, evaluated(model, u, self._raised(z), held))
         pose.bridge = self
         pose.status = Status.BRIDGED
-        zd = model.velocity(pose.values, ALONE, zd, self.held)
-        pose.tangent = zd, model.acceleration(pose.values, ALONE, AT_REST, zd, zdd, self.held)
+        zd = model.velocity(pose.values, ALONE, zd, held)
+        pose.tangent = zd, model.acceleration(pose.values, ALONE, AT_REST, zd, zdd, held)
         return pose
 
-    def proved(self) -> bool:
-        """True if the interpolated pose at the centre closes and both widths agree there."""
-        inner = _combined(self.model, self.half, weights(_INNER, 0.0), self.nodes[1:5])
-        outer = _combined(self.model, self.half, weights(_OUTER, 0.0), [*self.nodes[:2], *self.nodes[4:]])
-        if max(abs(a - b) for a, b in zip(inner, outer, strict=True)) > AGREED:
-            return False
+    def closes(self) -> bool:
+        """True if the interpolated pose at the centre closes, up to what rounding leaves of large angles."""
+        u, z = (self.centre,), self._raised(self.span.middle()[0])
         try:
-            return bool(evaluated(self.model, (self.centre,), inner, self.held)[3] <= CLOSED)
+            residual = evaluated(self.span.model, u, z, self.span.held)[3]
         except (ArithmeticError, ValueError):
             return False
+        return bool(residual <= CLOSED + 4.0 * EPS * max(abs(self.centre), *map(abs, z)))
 
     def disagreement(self, u: float) -> tuple[float, float, float]:
         """Largest difference of the two widths in z and its two derivatives: the error estimate."""
-        if self._inner is None:
-            self._inner = _polynomials(self.model, self.half, _INNER, self.nodes[1:5])
-        if self._outer is None:
-            self._outer = _polynomials(self.model, self.half, _OUTER, [*self.nodes[:2], *self.nodes[4:]])
-        x = (u - self.centre) / self.half
-        a, b = _read(self._inner, x, self.half), _read(self._outer, x, self.half)
-        largest = [max((abs(p - q) for p, q in zip(v, w, strict=True)), default=0.0) for v, w in zip(a, b, strict=True)]
-        return largest[0], largest[1], largest[2]
+        return self.span.disagreement(self._place(u))
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `restored` makes the same bridge."""
-        return [self.centre, self.half, [[list(node.u), list(node.z)] for node in self.nodes]]
+        return [self.span.dump(), self.turns, list(self.raised)]
 
 
 def restored(model: Model, data: list[Any]) -> Bridge:
     """The bridge that was dumped."""
-    centre, half, nodes = data
-    return Bridge(model, centre, half, [Pose(tuple(u), evaluated(model, tuple(u), tuple(z))) for u, z in nodes])
+    span, turns, raised = data
+    return Bridge(restored_span(model, span), turns, tuple(raised))
+
+
+def moved(bridge: Bridge, pose: Pose, u: float, walk: Walk) -> Bridge | None:
+    """The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats.
+
+    It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
+    if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
+    """
+    span = bridge.span
+    model = span.model
+    turns = whole_turns(u - span.centre)
+    place = turned(u, -turns)
+    if turns == bridge.turns or not span.nodes[0].u[0] <= place <= span.nodes[-1].u[0]:
+        return None
+    here = turned(pose.u[0], -turns)
+    side = span.nodes[3:] if here > span.centre else span.nodes[:3]
+    node = min(side, key=lambda node: abs(node.u[0] - here))
+    arrived = walk(pose, turned(node.u[0], turns))
+    if arrived is None:
+        return None
+    raised = []
+    for name, scale, a, b in zip(model.UNKNOWNS, model.UNKNOWN_SCALES, arrived.z, node.z, strict=True):
+        raised.append(whole_turns(a - b) if name.endswith(".phi") else 0)
+        if not abs(a - turned(b, raised[-1])) <= AGREED * scale:
+            return None
+    try:
+        there = Bridge(span, turns, tuple(raised))
+    except (ArithmeticError, ValueError):
+        return None
+    return there if there.closes() else None
 
 
 def build(model: Model, pose: Pose, block: int, zero: float, walk: Walk) -> Bridge | None:
@@ -147,8 +168,12 @@ def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float, w
     if far is None or near[-1].determinants[block] * far[0].determinants[block] >= 0.0:
         return None  # not reached, or touched and not crossed: no change point of two smooth branches
     nodes = near + far if side > 0.0 else (near + far)[::-1]
-    bridge = Bridge(model, centre, half, nodes)
-    return bridge if bridge.proved() else None
+    span = Span(model, centre, half, nodes)
+    inner, outer = span.middle()
+    if max(abs(a - b) for a, b in zip(inner, outer, strict=True)) > AGREED:
+        return None
+    bridge = Bridge(span)
+    return bridge if bridge.closes() else None
 
 
 def zero_near(pose: Pose, block: int, walk: Walk, reach: float) -> float | None:
@@ -173,7 +198,7 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
     for distance in (1.0, 2.0, 4.0):
         ahead = weights(tuple(places[-4:]), distance)
         u = (centre + side * distance * half,)
-        guess = _combined(model, side * half, ahead, poses[-4:])
+        guess = combined(model, side * half, ahead, poses[-4:])
         try:
             pose = Pose(u, evaluated(model, u, guess, held=0))
         except (ArithmeticError, ValueError):
@@ -185,39 +210,3 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
         places.append(distance)
         poses.append(pose)
     return poses[3:]
-
-
-def _polynomials(model: Model, half: float, places: tuple[float, ...], poses: Sequence[Pose]) -> list[Hermite]:
-    """One polynomial an unknown, over x = (u - centre) / half; the derivatives are with respect to x."""
-    tangents = [tangent_of(model, pose) for pose in poses]
-    return [
-        Hermite(
-            places,
-            tuple(
-                (pose.z[k], zd[k] * half, zdd[k] * half * half)
-                for pose, (zd, zdd) in zip(poses, tangents, strict=True)
-            ),
-        )
-        for k in range(len(model.UNKNOWNS))
-    ]
-
-
-def _combined(model: Model, half: float, by: Sequence[Vector], poses: Sequence[Pose]) -> Vector:
-    """z of the Hermite polynomials at a place whose weights are known."""
-    total = [0.0] * len(model.UNKNOWNS)
-    for pose, (w0, w1, w2) in zip(poses, by, strict=True):
-        zd, zdd = tangent_of(model, pose)
-        w1, w2 = w1 * half, w2 * half * half
-        total = [t + w0 * a + w1 * b + w2 * c for t, a, b, c in zip(total, pose.z, zd, zdd, strict=True)]
-    return tuple(total)
-
-
-def _read(polynomials: list[Hermite], x: float, half: float) -> tuple[Vector, Vector, Vector]:
-    """z and its two derivatives with respect to the driver at x."""
-    per_x = 1.0 / half
-    values = [polynomial(x) for polynomial in polynomials]
-    return (
-        tuple(value for value, _, _ in values),
-        tuple(slope * per_x for _, slope, _ in values),
-        tuple(curve * per_x * per_x for _, _, curve in values),
-    )

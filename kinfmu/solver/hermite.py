@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 Samples = tuple[float, float, float]  # f, f', f'' at a node
 
@@ -46,7 +46,7 @@ class Hermite:
         return value, slope, curve
 
 
-@lru_cache(maxsize=None)
+@cache  # few combinations of nodes and places are ever asked for
 def weights(nodes: tuple[float, ...], x: float) -> tuple[Samples, ...]:
     """What f, f' and f'' of each node count for the value of the interpolating polynomial at x."""
     zero: Samples = (0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@ from math import sqrt
 Matrix = list[list[float]]
 
 
-class Singular(ArithmeticError):
+class Singular(ArithmeticError):  # noqa: N818  # a state of the matrix, not a fault
     """A matrix has no usable pivot left."""
 
 

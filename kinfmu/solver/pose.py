@@ -10,6 +10,7 @@ Vector = tuple[float, ...]
 Model = Any  # a generated module: see kinfmu.backends.python.emit
 Found = tuple[Any, ...]  # what its `position` gives
 
+EPS = 2.220446049250313e-16
 ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
 AT_REST: Vector = (0.0,)
 
@@ -18,10 +19,10 @@ class Pose:
     """A value; what is derived from it is computed when first asked for.
 
     u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular, 0 at a singular point;
-    margin: the smallest of their sizes; residual: largest, relative to the size; moved: largest correction of the prediction, in radians and sizes; watch: largest residual of
-    the rows set aside, relative to the size; values: numbers of the position stage that later stages use. road: the
-    singular stretches known on the way here; bridge: the one that this pose was interpolated by. status and message:
-    see Status.
+    margin: the smallest of their sizes; residual: the largest length of a block's residuals, relative to the size;
+    moved: largest correction of the prediction, in radians and sizes; watch: largest residual of the rows set aside,
+    relative to the size; values: numbers of the position stage that later stages use. road: the singular stretches
+    known on the way here; bridge: the one that this pose was interpolated by. status and message: see Status.
     """
 
     __slots__ = (

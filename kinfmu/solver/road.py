@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from .bridge import Bridge, restored
 from .pose import Model
 
-_KEPT = 4  # of each kind, the latest
+_KEPT = 8  # of each kind, the latest; what is met again after a turn should still be known
 
 
 class Blocked(NamedTuple):
@@ -45,8 +45,9 @@ class Road(NamedTuple):
         return Road(self.bridges, self.blocked, self.surveyed, low, high)
 
     def with_bridge(self, bridge: Bridge, u: float) -> Road:
-        """The road with one more bridge, seen from a driver value."""
-        return _made((*self.bridges, bridge)[-_KEPT:], self.blocked).around(u)
+        """The road with one more bridge, seen from a driver value; one of the same span makes way for it."""
+        others = [known for known in self.bridges if known.span is not bridge.span]
+        return _made((*others, bridge)[-_KEPT:], self.blocked).around(u)
 
     def with_blocked(self, place: Blocked, u: float) -> Road:
         """The road with one more blocked place, seen from a driver value."""
@@ -54,8 +55,8 @@ class Road(NamedTuple):
 
     def knows(self, u: float) -> bool:
         """True if the singular point near a driver value has been looked at."""
-        for low, high in self.surveyed:
-            if low <= u <= high:
+        for low, high in self.surveyed:  # noqa: SIM110
+            if low <= u <= high:  # not any(...): a generator costs more than the two or three comparisons
                 return True
         return False
 

@@ -6,14 +6,13 @@ from math import isfinite
 from typing import Any
 
 from .advance import LONGEST_STEP, NEAR_SINGULAR, Limit, advance, limit_message, place, trusted_step
-from .bridge import REGULAR
 from .linear import reciprocal_condition
-from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
+from .pose import ALONE, EPS, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
+from .span import REGULAR
 from .status import Status
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
-EPS = 2.220446049250313e-16
 
 
 class Solver:
@@ -42,7 +41,10 @@ class Solver:
                 near = trusted_step(self.model, start, ALONE, s, u)
                 if (
                     near is not None
-                    and (near.margin >= REGULAR or (near.margin > NEAR_SINGULAR and road is not None and road.knows(u[0])))
+                    and (
+                        near.margin >= REGULAR
+                        or (near.margin > NEAR_SINGULAR and road is not None and road.knows(u[0]))
+                    )
                     and near.watch <= self.tolerance >= near.residual
                 ):
                     return near

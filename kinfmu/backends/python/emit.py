@@ -143,7 +143,7 @@ class _Emitter:
         lines = [
             "",
             "def position(u, z, zd, zdd, s, held=0):",
-            '    """Unknowns by Newton from a prediction, block by block; ArithmeticError(block, residual) if it fails."""',
+            '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
             *_unpack(map(identifier, self.inputs[0]), "u"),
         ]
         if self.solved:
@@ -209,7 +209,9 @@ class _Emitter:
         jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
         z = [identifier(name) for name in block.unknowns]
         inside += _determinant(k, jacobian)
-        done = f"error <= {ROUND_OFF**2} or held & {1 << (k - 1)} or (error <= {SETTLED**2} and 16.0 * error > last)"
+        angles = " + ".join(["1.0", *(f"{name} * {name}" for name in z)])  # large angles are rounded more
+        settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
+        done = f"error <= {ROUND_OFF**2} or held & {1 << (k - 1)} or ({settled})"
         lines = [
             f"    # block {k}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}",
             *_indented(before),

@@ -1,0 +1,101 @@
+"""Span: what is interpolated across a singular point, from six regular poses around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from .hermite import Hermite, weights
+from .pose import Model, Pose, Vector, evaluated, tangent_of
+
+REGULAR = 0.25  # determinant from which a block inside a window is solved as elsewhere
+PLACES = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the nodes, in half widths
+_INNER = PLACES[1:5]
+_OUTER = (*PLACES[:2], *PLACES[4:])
+
+
+class Span:
+    """The unknowns of singular blocks around `centre`, for a single driver.
+
+    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: bit a block that is interpolated. The inner four nodes
+    give the numbers, the outer four a second opinion: their difference is the error estimate.
+    """
+
+    __slots__ = ("_inner", "_outer", "centre", "half", "held", "model", "nodes")
+
+    def __init__(self, model: Model, centre: float, half: float, nodes: Sequence[Pose]) -> None:
+        self.model = model
+        self.centre = centre
+        self.half = half
+        self.nodes = nodes
+        self.held = 0
+        for block in range(len(model.BLOCKS)):
+            if min(abs(nodes[2].determinants[block]), abs(nodes[3].determinants[block])) < REGULAR:
+                self.held |= 1 << block
+        self._inner: list[Hermite] | None = None  # made when first read: many bridges are only crossed
+        self._outer: list[Hermite] | None = None
+
+    def read(self, x: float) -> tuple[Vector, Vector, Vector]:
+        """z and its two derivatives with respect to the driver at x = (u - centre) / half."""
+        if self._inner is None:
+            self._inner = _polynomials(self.model, self.half, _INNER, self.nodes[1:5])
+        return _read(self._inner, x, self.half)
+
+    def disagreement(self, x: float) -> tuple[float, float, float]:
+        """Largest difference of the two widths in z and its two derivatives: the error estimate."""
+        if self._outer is None:
+            self._outer = _polynomials(self.model, self.half, _OUTER, [*self.nodes[:2], *self.nodes[4:]])
+        a, b = self.read(x), _read(self._outer, x, self.half)
+        largest = [max((abs(p - q) for p, q in zip(v, w, strict=True)), default=0.0) for v, w in zip(a, b, strict=True)]
+        return largest[0], largest[1], largest[2]
+
+    def middle(self) -> tuple[Vector, Vector]:
+        """z at the centre by the inner nodes, and by the outer ones."""
+        inner = combined(self.model, self.half, weights(_INNER, 0.0), self.nodes[1:5])
+        outer = combined(self.model, self.half, weights(_OUTER, 0.0), [*self.nodes[:2], *self.nodes[4:]])
+        return inner, outer
+
+    def dump(self) -> list[Any]:
+        """Plain numbers from which `restored_span` makes the same span."""
+        return [self.centre, self.half, [[list(node.u), list(node.z)] for node in self.nodes]]
+
+
+def restored_span(model: Model, data: list[Any]) -> Span:
+    """The span that was dumped."""
+    centre, half, nodes = data
+    return Span(model, centre, half, [Pose(tuple(u), evaluated(model, tuple(u), tuple(z))) for u, z in nodes])
+
+
+def combined(model: Model, half: float, by: Sequence[Vector], poses: Sequence[Pose]) -> Vector:
+    """z of the Hermite polynomials through poses, at a place whose weights are known."""
+    total = [0.0] * len(model.UNKNOWNS)
+    for pose, (w0, w1, w2) in zip(poses, by, strict=True):
+        zd, zdd = tangent_of(model, pose)
+        w1, w2 = w1 * half, w2 * half * half
+        total = [t + w0 * a + w1 * b + w2 * c for t, a, b, c in zip(total, pose.z, zd, zdd, strict=True)]
+    return tuple(total)
+
+
+def _polynomials(model: Model, half: float, places: tuple[float, ...], poses: Sequence[Pose]) -> list[Hermite]:
+    """One polynomial an unknown, over x = (u - centre) / half; the derivatives are with respect to x."""
+    tangents = [tangent_of(model, pose) for pose in poses]
+    return [
+        Hermite(
+            places,
+            tuple(
+                (pose.z[k], zd[k] * half, zdd[k] * half * half) for pose, (zd, zdd) in zip(poses, tangents, strict=True)
+            ),
+        )
+        for k in range(len(model.UNKNOWNS))
+    ]
+
+
+def _read(polynomials: list[Hermite], x: float, half: float) -> tuple[Vector, Vector, Vector]:
+    """z and its two derivatives with respect to the driver at x."""
+    per_x = 1.0 / half
+    values = [polynomial(x) for polynomial in polynomials]
+    return (
+        tuple([value for value, _, _ in values]),
+        tuple([slope * per_x for _, slope, _ in values]),
+        tuple([curve * per_x * per_x for _, _, curve in values]),
+    )
