@@ -86,6 +86,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     model: ClassVar[Any]
     layout: ClassVar[Layout]
 
+    def __init_subclass__(cls) -> None:
+        """Give the leaf the methods of a step as its own: the C side looks them up by name, base after base."""
+        super().__init_subclass__()
+        for name in ("set_real", "do_step", "get_real"):
+            setattr(cls, name, getattr(cls, name))
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         parts = {part.name: part for part in self.layout.parts}
@@ -125,10 +131,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
         if self._driven_by_time:
             return self.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
-        if self._touched or not self._history:
-            return self._by_inputs(self._inputs, self._time, tuple(self._inputs[::3]))
-        t, u = self._history[-1]  # nothing set since the commit: still the committed sample, at the time of its doStep
-        return self._by_inputs(self._inputs, t, u)
+        history = self._history
+        if self._touched or not history:
+            t, u = self._time, self._wanted()
+        else:  # nothing set since the commit: still the committed sample, at the time of its doStep
+            t, u = history[-1]
+        if self._wired:
+            return self._by_inputs(self._inputs, t, u)
+        return u, *estimated_rates(history, t, u)
 
     def _by_inputs(self, inputs: Sequence[float], t: float, u: Row) -> tuple[Row, Row, Row]:
         """u, ud, udd at time t, with estimates for the rates that are not wired."""
@@ -152,11 +162,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return self.model.drive(t, self._constants)  # type: ignore[no-any-return]
         return self._by_inputs(self._committed_inputs, t, u)
 
+    def _wanted(self) -> Row:
+        """u by the inputs."""
+        inputs = self._inputs
+        return (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])  # one driver, as a rule: no slice
+
     def _asked(self) -> Pose:
         """The pose asked for, good or not: followed from the committed one."""
         pose = self._pose
         if pose is None:
-            u = self._driven()[0] if self._driven_by_time else tuple(self._inputs[::3])
+            u = self._driven()[0] if self._driven_by_time else self._wanted()
             pose = self._pose = self._solver.solve(self._committed, u)
         return pose
 
@@ -206,8 +221,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         row = shown.motion
         if row is None:
             if shown.values is None and shown.rates is None:
-                _, ud, udd = self._drive(shown)
-                row = self._solver.motion(shown.pose, ud, udd)
+                drive = shown.drive
+                if drive is None:
+                    drive = shown.drive = self._committed_drive() if shown.stale else self._driven()
+                row = self._solver.motion(shown.pose, drive[1], drive[2])
             else:  # parts of it were read before
                 row = self._read_values() + self._read_rates() + self._read_accelerations()
             shown.motion = row
@@ -416,7 +433,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         try:
             if self._driven_by_time or self._refused:
                 return self._step(current_time, step_size)
-            pose = self._pose or self._asked()
+            pose = self._pose
+            if pose is None:
+                pose = self._pose = self._solver.solve(self._committed, self._wanted())
             if pose.status > LAST_GOOD:
                 return self._discard(pose, current_time)
             if not self._touched or current_time != self._time:
@@ -465,7 +484,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         history = self._history
         while history and history[-1][0] >= t:  # the host went back
             history = history[:-1]
-        self._history = (*history[-2:], (t, pose.u))
+        self._history = (history[-2], history[-1], (t, pose.u)) if len(history) > 1 else (*history, (t, pose.u))
         self._committed = pose
         self._committed_inputs = tuple(self._inputs)
         self._touched = False

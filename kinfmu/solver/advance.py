@@ -65,7 +65,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         if trial is not None:
             iterations += trial.iterations
             if trial.margin < REGULAR and one:
-                road = _road_at(model, pose, trial)
+                road = surveyed(model, pose, trial)
                 if road is not trial.road:
                     pose = on_road(pose, road)
                     continue
@@ -109,7 +109,7 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     return trial
 
 
-def _road_at(model: Model, pose: Pose, trial: Pose) -> Road | None:
+def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
     """The road with what is new at a trial pose: a bridge, if it has come into the window of a singular point; a
     blocked place, if no bridge holds there. The road as it was, if nothing is new.
     """

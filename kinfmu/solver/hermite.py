@@ -15,7 +15,7 @@ class Hermite:
     c by divided differences, where a difference over equal nodes is the derivative over its factorial.
     """
 
-    __slots__ = ("coefficients", "nodes")
+    __slots__ = ("_terms",)
 
     def __init__(self, nodes: tuple[float, ...], samples: tuple[Samples, ...]) -> None:
         repeated = [x for x in nodes for _ in range(3)]
@@ -32,13 +32,12 @@ class Hermite:
                     new.append((column[i + 1] - column[i]) / (b - a))
             column = new
             coefficients.append(column[0])
-        self.nodes = repeated
-        self.coefficients = coefficients
+        self._terms = tuple(zip(reversed(coefficients), reversed(repeated), strict=True))  # as they are evaluated
 
     def __call__(self, x: float) -> Samples:
         """p, p', p'' at x."""
         value = slope = curve = 0.0
-        for coefficient, node in zip(reversed(self.coefficients), reversed(self.nodes), strict=True):
+        for coefficient, node in self._terms:
             d = x - node
             curve = curve * d + 2.0 * slope
             slope = slope * d + value

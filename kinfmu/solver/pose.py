@@ -116,4 +116,4 @@ def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> Found:
     s = -0.0 at rest leaves z as it is, to the bit.
     """
     rest = (0.0,) * len(z)
-    return tuple(model.position(u, z, rest, rest, -0.0, held))
+    return model.position(u, z, rest, rest, -0.0, held)  # type: ignore[no-any-return]  # generated code has no types

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from .advance import LONGEST_STEP, NEAR_SINGULAR, Limit, advance, limit_message, place, trusted_step
+from .advance import LONGEST_STEP, NEAR_SINGULAR, Limit, advance, limit_message, place, surveyed, trusted_step
 from .linear import reciprocal_condition
 from .pose import ALONE, EPS, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
@@ -34,20 +34,16 @@ class Solver:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
         if u == start.u:
             return start
-        road = start.road
-        if self._one and (road is None or road.low <= u[0] <= road.high):  # most samples: one trusted step
-            s = u[0] - start.u[0]
-            if -self._longest <= s <= self._longest:
+        if self._one:  # most samples: one trusted step, away from all that is singular
+            s, road = u[0] - start.u[0], start.road
+            if -self._longest <= s <= self._longest and (road is None or road.low <= u[0] <= road.high):
                 near = trusted_step(self.model, start, ALONE, s, u)
-                if (
-                    near is not None
-                    and (
-                        near.margin >= REGULAR
-                        or (near.margin > NEAR_SINGULAR and road is not None and road.knows(u[0]))
-                    )
-                    and near.watch <= self.tolerance >= near.residual
-                ):
-                    return near
+                if near is not None and near.watch <= self.tolerance >= near.residual:
+                    margin = near.margin
+                    if margin >= REGULAR:
+                        return near
+                    if margin > NEAR_SINGULAR and surveyed(self.model, start, near) is road:  # nothing new there
+                        return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
         pose = advance(self.model, start, u)
@@ -100,6 +96,9 @@ class Solver:
 
     def motion(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Positions, rates and accelerations of the OUTPUTS in one row: what they share is computed once."""
+        if self._one and pose.tangent is None:  # the rule in an FMU: each pose is read once, and before the next step
+            pose.tangent, row = self.model.first_motion(pose.values, ud, udd)
+            return row  # type: ignore[no-any-return]
         first, second = pose.tangent or self._both(pose, ud, udd)
         return self.model.motion(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 

@@ -8,7 +8,7 @@ from typing import Any
 from .hermite import Hermite, weights
 from .pose import Model, Pose, Vector, evaluated, tangent_of
 
-REGULAR = 0.25  # determinant from which a block inside a window is solved as elsewhere
+REGULAR = 0.19  # determinant from which a block is solved as elsewhere; less than the sine at a bridge's last node
 PLACES = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the nodes, in half widths
 _INNER = PLACES[1:5]
 _OUTER = (*PLACES[:2], *PLACES[4:])
@@ -21,7 +21,7 @@ class Span:
     give the numbers, the outer four a second opinion: their difference is the error estimate.
     """
 
-    __slots__ = ("_inner", "_outer", "centre", "half", "held", "model", "nodes")
+    __slots__ = ("_inner", "_middle", "_outer", "centre", "half", "held", "model", "nodes")
 
     def __init__(self, model: Model, centre: float, half: float, nodes: Sequence[Pose]) -> None:
         self.model = model
@@ -34,6 +34,7 @@ class Span:
                 self.held |= 1 << block
         self._inner: list[Hermite] | None = None  # made when first read: many bridges are only crossed
         self._outer: list[Hermite] | None = None
+        self._middle: tuple[Vector, Vector] | None = None
 
     def read(self, x: float) -> tuple[Vector, Vector, Vector]:
         """z and its two derivatives with respect to the driver at x = (u - centre) / half."""
@@ -51,9 +52,11 @@ class Span:
 
     def middle(self) -> tuple[Vector, Vector]:
         """z at the centre by the inner nodes, and by the outer ones."""
-        inner = combined(self.model, self.half, weights(_INNER, 0.0), self.nodes[1:5])
-        outer = combined(self.model, self.half, weights(_OUTER, 0.0), [*self.nodes[:2], *self.nodes[4:]])
-        return inner, outer
+        if self._middle is None:
+            inner = combined(self.model, self.half, weights(_INNER, 0.0), self.nodes[1:5])
+            outer = combined(self.model, self.half, weights(_OUTER, 0.0), [*self.nodes[:2], *self.nodes[4:]])
+            self._middle = inner, outer
+        return self._middle
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `restored_span` makes the same span."""

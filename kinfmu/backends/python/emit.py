@@ -6,6 +6,7 @@ The module holds constants and these functions, each a stage; nothing is compute
     position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch,
                                                       values
     tangent(values)                                -> z' and z'' (one driver only)
+    first_motion(values, ud, udd)                  -> tangent and motion in one go (one driver only)
     velocity(values, ud, given, held)              -> zd
     acceleration(values, ud, udd, zd, given, held) -> zdd
     outputs(values)                                -> positions of the outputs
@@ -67,7 +68,7 @@ class _Emitter:
         later = [
             self._velocity(),
             self._acceleration(),
-            self._tangent(),
+            *(self._alone() if len(self.plan.drivers) == 1 else ()),
             self._stage("outputs", "Positions of the outputs.", (0,)),
             self._stage("rates", "Rates of the outputs.", (1,)),
             self._stage("accelerations", "Accelerations of the outputs.", (2,)),
@@ -252,25 +253,41 @@ class _Emitter:
         lines += _unpack([identifier(derivative_name(name, 1)) for name in self.plan.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
-    def _tangent(self) -> list[str]:
-        """With one driver: velocity and acceleration for ud = 1, udd = 0 in one go, for it is needed at every pose."""
-        if len(self.plan.drivers) != 1:
-            return []
-        lines = [
-            "",
-            "def tangent(values):",
-            '    """First and second derivative of the unknowns with respect to the driver."""',
-            _VALUES,
-        ]
-        alone = Alone(*(inputs[0] for inputs in self.inputs[1:]), self.definitions)
+    def _alone(self) -> list[list[str]]:
+        """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
         writer = Writer(self.names, reachable(self.position_nodes))
+        alone = Alone(*(inputs[0] for inputs in self.inputs[1:]), self.definitions)
+        lines = []
         for order, right in ((1, alone.velocity), (2, alone.acceleration)):
             lines += _indented(self._linear_lines(writer, order, right, alone.definitions, held=False))
         self._import(writer)
         first, second = (
             _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns) for order in (1, 2)
         )
-        return [*lines, f"    return {first}, {second}", ""]
+        told = "First and second derivative of the unknowns with respect to the driver."
+        tangent = [
+            "",
+            "def tangent(values):",
+            f'    """{told}"""',
+            _VALUES,
+            *lines,
+            f"    return {first}, {second}",
+            "",
+        ]
+        motion = self._stage("motion", "", (0, 1, 2))
+        head, row = motion.index(_VALUES) + 1, motion[-2].removeprefix("    return ")
+        first_read = [
+            "",
+            "def first_motion(values, ud, udd):",
+            '    """Tangent and motion in one go, for the first reading of a pose."""',
+            _VALUES,
+            *lines,
+            f"    first, second = {first}, {second}",
+            *motion[head:-2],
+            f"    return (first, second), {row}",
+            "",
+        ]
+        return [tangent, first_read]
 
     def _linear(self, order: int, right: _Right) -> list[str]:
         """Linear solves of one order as a function's body."""
