@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .bridge import HALF_WIDTH, build, moved, secant_zero, zero_near
+from .bridge import HALF_WIDTH, Bridge, build, moved, secant_zero, zero_near
 from .pose import ALONE, Model, Pose, Vector, directed, on_road
 from .road import Blocked, Road
 from .span import REGULAR
@@ -45,11 +45,14 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         return Limit(start.u, TOO_FAR)
     for _ in range(MOST_STEPS):
         if one:
-            road = pose.road
+            road: Road | None = pose.road
             if road is not None and not road.low <= target[0] <= road.high:
-                bridge = pose.bridge or road.next_bridge(pose.u[0], target[0])
+                bridge: Bridge = pose.bridge or road.next_bridge(pose.u[0], target[0])
                 if bridge.covers(target[0]):
-                    inside = bridge.pose(target)
+                    try:
+                        inside = bridge.pose(target)
+                    except (ArithmeticError, ValueError):  # a block that is not interpolated ends there
+                        return Limit(pose.u, NO_BLOCK)
                     inside.road = road if pose.bridge is bridge else road.around(target[0])
                     return inside
                 pose = bridge.exit(target[0])
@@ -118,19 +121,20 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
         return _plainly(model, start, u)
 
     reach: float = model.REACH[0]
-    known = trial.road or Road()
+    road: Road | None = trial.road
+    known = road or Road()
     if known.knows(trial.u[0]):
-        return trial.road
+        return road
     if model.DRIVER_KINDS[0] == "angle":
         for old in known.bridges:
-            bridge = moved(old, pose, trial.u[0], walk)
-            if bridge is not None:
-                return known.with_bridge(bridge, pose.u[0])
+            again = moved(old, pose, trial.u[0], walk)
+            if again is not None:
+                return known.with_bridge(again, pose.u[0])
     block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
     far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * reach
     zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk, reach)
     if zero is None or abs(zero - trial.u[0]) > 1.05 * HALF_WIDTH * reach or known.knows(zero):
-        return trial.road
+        return road
     bridge = build(model, pose, block, zero, walk)
     if bridge is not None:
         return known.with_bridge(bridge, pose.u[0])

@@ -151,7 +151,7 @@ class Solver:
         u, z, iterations, status, message, dumped, standing = data
         road = None if dumped is None else laid(self.model, dumped)
         if road is not None and standing >= 0:
-            pose = road.bridges[standing].pose(tuple(u))
+            pose: Pose = road.bridges[standing].pose(tuple(u))
         else:
             pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
         pose.road = None if road is None else road.around(pose.u[0])

@@ -256,7 +256,7 @@ class _Emitter:
     def _alone(self) -> list[list[str]]:
         """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
         writer = Writer(self.names, reachable(self.position_nodes))
-        alone = Alone(*(inputs[0] for inputs in self.inputs[1:]), self.definitions)
+        alone = Alone(self.inputs[1][0], self.inputs[2][0], self.definitions)
         lines = []
         for order, right in ((1, alone.velocity), (2, alone.acceleration)):
             lines += _indented(self._linear_lines(writer, order, right, alone.definitions, held=False))
@@ -325,7 +325,7 @@ class _Emitter:
 
     def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
         """A function that returns all outputs at some orders of derivative, one after another."""
-        targets = [motion[1 + order] for order in orders for motion in self.plan.outputs_motion]
+        targets: list[Node] = [motion[1:][order] for order in orders for motion in self.plan.outputs_motion]
         highest = max(orders)
         arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]

@@ -62,7 +62,8 @@ class Writer:
         inline = {
             node for node in new if uses[node] == 1 and node not in self.keep and node.op not in ("sin", "cos", "sqrt")
         }
-        lines, text = [], {}
+        lines: list[str] = []
+        text: dict[Node, tuple[str, int]] = {}
         for node in new:
             text[node] = self._operation(node, text)
             if node not in inline or len(text[node][0]) > _LONGEST_INLINE:

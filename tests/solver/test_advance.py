@@ -1,0 +1,65 @@
+"""Advance: the branch is kept, limits are found, every way ends."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+
+import pytest
+
+from kinfmu.solver import Pose, Solver, Status
+
+Errors = Callable[[Solver, Pose], list[float]]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_branch_is_kept_over_random_grids_there_and_back(fourbar: Solver, errors: Errors, seed: int) -> None:
+    rng = random.Random(seed)  # noqa: S311  # a grid, not a secret
+    pose, u, h = fourbar.anchor, 0.5, 10.0 ** rng.uniform(-1.0, 0.7)
+    places: list[float] = []
+    while abs(u) < 15.0 and len(places) < 60:
+        places.append(u)
+        u += rng.uniform(0.5, 1.5) * h
+    for u in (*places, *reversed(places)):
+        pose = fourbar.solve(pose, (u,))
+        assert pose.good
+        q, qd, qdd = errors(fourbar, pose)
+        assert (q < 1e-13, qd < 1e-11, qdd < 1e-9) == (True, True, True)
+
+
+@pytest.mark.parametrize(("target", "limit"), [(7.0, 2.0 * math.pi), (3.0, math.pi)])
+def test_limit_is_located_and_named_and_the_way_back_is_open(pendulum: Solver, target: float, limit: float) -> None:
+    beyond = pendulum.solve(pendulum.anchor, (target,))
+    assert beyond.status == Status.OUTSIDE
+    assert not beyond.good
+    assert "cannot be reached: the limit is" in beyond.message
+    told = float(beyond.message.split("the limit is ")[1].split(" = ")[1].split()[0])
+    assert told == pytest.approx(limit, abs=1e-10)
+    back = pendulum.solve(pendulum.anchor, (5.0,))
+    assert back.good
+    assert back.z == pytest.approx((2.0 * math.pi + math.asin(-1.0 - math.sin(5.0)),), abs=1e-13)
+
+
+def test_what_is_too_far_is_told_at_once(fourbar: Solver) -> None:
+    pose = fourbar.solve(fourbar.anchor, (1e300,))
+    assert pose.status == Status.OUTSIDE
+    assert "is too far from" in pose.message
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_driver_value_that_is_no_number_is_outside(fourbar: Solver, value: float) -> None:
+    assert fourbar.solve(fourbar.anchor, (value,)).status == Status.OUTSIDE
+
+
+def test_same_value_is_the_same_pose(fourbar: Solver) -> None:
+    pose = fourbar.solve(fourbar.anchor, (2.0,))
+    assert fourbar.solve(pose, (2.0,)) is pose
+
+
+def test_result_is_a_function_of_the_start_pose_alone(fourbar: Solver) -> None:
+    start = fourbar.solve(fourbar.anchor, (2.5,))
+    first = fourbar.solve(start, (9.0,))
+    for trial in (3.2, 40.0, -7.0):
+        fourbar.solve(start, (trial,))
+    assert fourbar.solve(start, (9.0,)).z == first.z

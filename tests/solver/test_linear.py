@@ -1,0 +1,41 @@
+"""Small dense linear algebra against numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinfmu.solver.linear import Singular, factor, qr_factor, qr_solve, reciprocal_condition, solve
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 5, 8])
+def test_solution_and_determinant_are_those_of_numpy(k: int) -> None:
+    rng = np.random.default_rng(k)
+    a, b = rng.normal(size=(k, k)), rng.normal(size=k)
+    assert solve(a.tolist(), b.tolist()) == pytest.approx(np.linalg.solve(a, b).tolist(), abs=1e-12)
+    rows = a / np.linalg.norm(a, axis=1, keepdims=True)
+    assert factor(a.tolist()).determinant == pytest.approx(np.linalg.det(rows), abs=1e-13)
+
+
+def test_least_squares_are_those_of_numpy() -> None:
+    rng = np.random.default_rng(7)
+    a, b = rng.normal(size=(6, 4)), rng.normal(size=6)
+    x = qr_solve(qr_factor(a.tolist()), b.tolist())
+    assert x == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0].tolist(), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "matrix", [[[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [1.0, 0.0]], [[float("nan"), 1.0], [1.0, 1.0]]]
+)
+def test_matrix_without_a_pivot_is_singular(matrix: list[list[float]]) -> None:
+    with pytest.raises(Singular):
+        factor(matrix)
+
+
+@pytest.mark.parametrize("k", [2, 3, 4])
+def test_reciprocal_condition_is_that_of_the_equilibrated_matrix(k: int) -> None:
+    a = np.random.default_rng(k).normal(size=(k, k))
+    rows = a / np.linalg.norm(a, axis=1, keepdims=True)
+    columns = rows / np.linalg.norm(rows, axis=0, keepdims=True)
+    assert reciprocal_condition(a.tolist()) == pytest.approx(1.0 / np.linalg.cond(columns, 1), rel=1e-12)
+    assert reciprocal_condition([[1.0] * k for _ in range(k)]) == pytest.approx(0.0, abs=1e-15)
