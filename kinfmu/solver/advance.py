@@ -59,8 +59,8 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
                 pose = on_road(pose, road.around(pose.u[0]))
                 continue
             distance = target[0] - pose.u[0]
-            if distance == 0.0:
-                return pose
+            if distance == 0.0:  # a node, or a step that ended there by rounding
+                return _arrived(pose, iterations)
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
         u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
@@ -73,10 +73,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
                     pose = on_road(pose, road)
                     continue
             if whole:
-                trial.iterations = iterations
-                if trial.margin < NEAR_SINGULAR:
-                    trial.status = Status.NEAR_SINGULAR
-                return trial
+                return _arrived(trial, iterations)
             before, pose = pose, trial
             distance -= s
             step = min(2.0 * step, longest)
@@ -87,6 +84,14 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
             if step < _GIVE_UP * longest or _beyond(target, limit.u, direction, s):
                 return limit
     return Limit(pose.u, TOO_FAR)
+
+
+def _arrived(pose: Pose, iterations: int) -> Pose:
+    """The pose at the end of a way, with the iterations of the whole way."""
+    pose.iterations = iterations
+    if pose.margin < NEAR_SINGULAR:
+        pose.status = Status.NEAR_SINGULAR
+    return pose
 
 
 def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:

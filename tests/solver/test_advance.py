@@ -63,3 +63,13 @@ def test_result_is_a_function_of_the_start_pose_alone(fourbar: Solver) -> None:
     for trial in (3.2, 40.0, -7.0):
         fourbar.solve(start, (trial,))
     assert fourbar.solve(start, (9.0,)).z == first.z
+
+
+def test_from_a_pose_at_the_limit_nothing_beyond_it_is_reached_and_all_before_it_is(pendulum: Solver) -> None:
+    pose = pendulum.anchor
+    for k in range(1, 5):
+        pose = pendulum.solve(pose, (math.radians(300.0 + 15.0 * k),))
+    assert pose.status == Status.NEAR_SINGULAR
+    beyond = pendulum.solve(pose, (math.radians(375.0),))
+    assert beyond.status == Status.OUTSIDE
+    assert "the limit is" in beyond.message

@@ -210,7 +210,9 @@ class _Emitter:
         jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
         z = [identifier(name) for name in block.unknowns]
         inside += _determinant(k, jacobian)
-        angles = " + ".join(["1.0", *(f"{name} * {name}" for name in z)])  # large angles are rounded more
+        # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
+        starts = [f"z{self.plan.unknowns.index(name)}" for name in block.unknowns]
+        angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
         settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
         done = f"error <= {ROUND_OFF**2} or held & {1 << (k - 1)} or ({settled})"
         lines = [
