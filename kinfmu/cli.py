@@ -220,7 +220,9 @@ def check(mechanism: str, as_json: bool, matrices: bool) -> None:
 )
 @click.option("--times", type=_Range(Quantity("time"), "STEP"), help="Times [s]; the file's run if nothing is said.")
 @click.option(
-    "--angle", type=_Range(Quantity("angle"), "N"), help="N values of the driver [rad], or such as 0deg:360deg:361."
+    "--angle",
+    type=_Range(Quantity("angle"), "N"),
+    help="N values of the driver [rad], or such as 0deg:360deg:361; rates are for 1 rad/s, time counts the samples.",
 )
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A law constant, such as crank.speed=2.0.")
 @click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
@@ -238,6 +240,8 @@ def solve(
     import numpy as np
 
     from kinfmu.log import write_table
+    from kinfmu.mechanism import RunSettings
+    from kinfmu.sweep import run_times
     from kinfmu.sweep import solve as solved
 
     if output.suffix.lower() not in TABLES:
@@ -254,10 +258,11 @@ def solve(
         if len(mech.drivers) != 1:
             raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
         t = None
+        if settings:
+            raise click.UsageError("--set changes the law, which --angle does not use")
         samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
     else:
-        start, stop, step = times or (mech.run.start, mech.run.stop, mech.run.step)
-        t, samples = steps(start, stop, step), {}
+        t, samples = (run_times(RunSettings(*times)) if times else None), {}
     with _about(mechanism):
         run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, **samples)
     write_table(run, output)
@@ -409,18 +414,6 @@ class _Progress:
         if done - self._done >= count // 200 or done == count:
             self._bar.update(done - self._done)
             self._done = done
-
-
-def steps(start: float, stop: float, step: float) -> Any:
-    """start + k step up to stop, which is included where a step hits it."""
-    import numpy as np
-
-    from kinfmu.run import MOST_SAMPLES
-
-    count = (stop - start) / step + 1e-6
-    if count > MOST_SAMPLES:
-        raise KinfmuError(f"[run] {start:g} to {stop:g} s in steps of {step:g} s: more than {MOST_SAMPLES} samples")
-    return start + step * np.arange(int(count) + 1)
 
 
 def verdict(run: Run) -> str:

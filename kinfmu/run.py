@@ -36,7 +36,7 @@ class Event(NamedTuple):
     text: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """n samples of a mechanism's motion.
 
@@ -93,6 +93,12 @@ class Run:
     def good(self) -> NDArray[np.bool_]:
         """(n,) True where the sample holds numbers (status 0 to 2)."""
         return np.asarray(self.status <= Status.BRIDGED)
+
+    def __repr__(self) -> str:
+        name = self.info.get("name", "run")
+        span = f", t = {self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else ""
+        bad = int((~self.good).sum())
+        return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {', '.join(self.outputs)}>"
 
     def __len__(self) -> int:
         return len(self.t)

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from kinfmu.backends.python import load_model
 from kinfmu.errors import KinfmuError, listed, suggestion
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.run import Event, FloatArray, Run
+from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 from kinfmu.solver import Solver
 from kinfmu.solver.pose import Vector
 
@@ -33,10 +33,12 @@ def solve(
 ) -> Run:
     """Positions, velocities and accelerations at the given times, or at the given driver values.
 
-    t: (n,) times [s] at which the laws of the file drive; or the inputs by name, such as crank_angle=(n,) with
-    crank_speed= and crank_acceleration=, arrays or numbers (speed 1 and acceleration 0 if not given). parameters: law
-    constants by name, such as {'crank.speed': 2.0}. outputs: names to solve for, all if None; what they do not need is
-    not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take values, rates and accelerations.
+    t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
+    the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
+    and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
+    parameters: law constants by name, such as {'crank.speed': 2.0}. outputs: names to solve for, all if None; what they
+    do not need is not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take values, rates and
+    accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
     last good sample.
@@ -46,6 +48,8 @@ def solve(
     plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
     constants = law_constants(plan, parameters or {})
     solver = Solver(load_model(plan), tolerance)
+    if t is None and not inputs:
+        t = run_times(plan.mechanism.run)
     if t is None:
         times, u, ud, udd = driven_by_inputs(plan, inputs)
     else:
@@ -53,6 +57,16 @@ def solve(
             raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
         times, u, ud, udd = _driven_by_time(solver.model, _column("t", t), constants)
     return _swept(plan, solver, times, (u, ud, udd), out, constants)
+
+
+def run_times(run: RunSettings) -> FloatArray:
+    """(n,) start + k step up to stop, which is included where a step hits it."""
+    if (run.stop - run.start) / run.step > MOST_SAMPLES:
+        raise KinfmuError(
+            f"[run] {run.start:g} to {run.stop:g} s in steps of {run.step:g} s: more than {MOST_SAMPLES} samples"
+        )
+    count = int((run.stop - run.start) / run.step + 1e-6)
+    return run.start + run.step * np.arange(count + 1, dtype=np.float64)
 
 
 def law_constants(plan: SolvePlan, given: Mapping[str, float]) -> dict[str, float]:
@@ -74,7 +88,9 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike]) -> tuple[
     known = [name for driver in plan.drivers for name in driver.inputs]
     for name in inputs:
         if name not in known:
-            raise KinfmuError(f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}")
+            raise KinfmuError(
+                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
+            )
     for driver in plan.drivers:
         if driver.inputs[0] not in inputs:
             raise KinfmuError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
@@ -127,9 +143,9 @@ def _swept(
     samples = zip(times.tolist(), *(map(tuple, table.tolist()) for table in driven), strict=True)
     for t, u, ud, udd in samples:
         pose = solver.solve(good, u)
-        diagnostics.append(solver.diagnostics(pose))
         if pose.good:
             good, failing = pose, False
+            diagnostics.append(solver.diagnostics(pose))
             motions.append(solver.motion(pose, ud, udd))
             errors.append(solver.errors(pose, ud, udd))
             watches.append(solver.watch(pose))
@@ -137,6 +153,7 @@ def _swept(
             if not failing:
                 events.append(Event(t, "error", pose.message))
             failing = True
+            diagnostics.append((pose.status, _GAP, 0, _GAP))
             motions.append(gap)
             errors.append((_GAP,) * 3)
             watches.append((_GAP,) * len(plan.watches))

@@ -79,7 +79,8 @@ def test_two_drivers_take_arrays_and_numbers() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "input 'crank_angle' is missing"),
+        ({"crank_speed": 1.0}, "input 'crank_angle' is missing"),
+        ({"times": [0.0]}, "times go by t"),
         ({"t": [0.0], "crank_angle": [0.0]}, "give times or inputs, not both"),
         ({"crank_angel": [0.0]}, "did you mean 'crank_angle'"),
         ({"crank_angle": [0.0, np.nan]}, r"crank_angle\[1\] is not a finite number"),
@@ -95,6 +96,32 @@ def test_wrong_arguments_are_told_in_one_line(arguments: dict[str, object], mess
     with pytest.raises(KinfmuError, match=message) as caught:
         kinfmu.solve(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
+
+
+def test_the_files_own_run_is_solved_if_nothing_is_said() -> None:
+    run = kinfmu.solve(kinfmu.load("double_pendulum"))
+    assert (run.t[0], run.t[-1], len(run)) == (0.0, 1.5, 151)
+    assert repr(run).startswith("<Run of double_pendulum: 151 samples, t = 0 to 1.5 s, 0 without numbers; upper.x")
+
+
+def test_a_run_that_lands_on_a_dead_centre_comes_back() -> None:
+    degrees = [300.0, 359.0, 360.0, 359.0, 300.0, 180.001, 370.0, 300.0]
+    run = kinfmu.solve(kinfmu.load("double_pendulum"), crank_angle=np.radians(degrees))
+    assert run.status.tolist() == [0, 0, 1, 0, 0, 1, 3, 0]
+    np.testing.assert_allclose(run["lower.phi"][[3, 4]], run["lower.phi"][[1, 0]], rtol=0, atol=1e-12)
+    assert np.isnan(run.residual[6])
+
+
+@pytest.mark.parametrize("offset", [1e3, -1e5, 1e6])
+def test_a_mechanism_far_from_the_origin_moves_as_one_near_by(offset: float) -> None:
+    u = np.linspace(-1.0, 7.0, 30)
+    near = kinfmu.solve(fourbar(4, 1, 3.5, 3), crank_angle=u)
+    far = kinfmu.solve(fourbar(4, 1, 3.5, 3, at=(offset, -2 * offset)), crank_angle=u)
+    np.testing.assert_allclose(far["rocker.phi"], near["rocker.phi"], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(far["coupler.ax"], near["coupler.ax"], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(far["coupler.y"], near["coupler.y"] - 2 * offset, rtol=1e-15)
+    assert far.fixed["rocker.x"] == offset + 4.0
+    assert kinfmu.check(fourbar(4, 1, 3, 2, at=(offset, 0.0))).singular[0].value == pytest.approx(np.pi, abs=1e-11)
 
 
 def test_no_samples_are_an_empty_run() -> None:

@@ -14,7 +14,7 @@ from kinfmu.equations.assembly import assemble, close
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import KinfmuError, listed
 from kinfmu.mechanism import Mechanism
-from kinfmu.plan import SolvePlan, determinant_formula, plan_from
+from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
 from kinfmu.redundancy import DependentRow, Redundancy, find_redundancy
 from kinfmu.sweep import solve
 
@@ -112,10 +112,11 @@ def check(mechanism: Mechanism) -> Report:
 
     Faults of the mechanism do not raise; they stand in the report's `problem`.
     """
-    system = System(mechanism)
+    local, origin = localized(mechanism)
+    system = System(local)
     redundancy = find_redundancy(system)
     try:
-        plan = plan_from(system, redundancy)
+        plan = plan_from(mechanism, system, origin, redundancy)
     except KinfmuError as problem:
         return Report(mechanism, redundancy, problem, None, None)
     return Report(mechanism, redundancy, None, plan, driver_range(plan))
@@ -153,6 +154,7 @@ def _lines(report: Report) -> list[str]:
         lines.append(f"  contradicts {row.row.owner} (row {row.row.name}): {reason}")
     plan = report.plan
     if plan is not None:
+        lines.append(f"  start       {listed(_starts(report, plan))}")
         lines.append(f"  coordinates {listed(plan.coordinates)}")
         if plan.fixed:
             lines.append("  fixed       " + listed(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
@@ -181,11 +183,34 @@ def _singular_lines(report: Report) -> list[str]:
     if both != (None, None):
         low, high = ("no limit" if end is None else written(end, unit, kind) for end in both)
         lines.append(f"  range       {driver.name} from {low} to {high}; dead centre at each limit")
+        beyond = _leaves_range(report, report.range)
+        if beyond is not None:
+            lines.append(beyond)
     elif kind == "angle":
         lines.append(f"  range       {driver.name} turns all the way round")
     if not report.singular:
         lines.append("  singular    nowhere on the way")
     return lines
+
+
+def _starts(report: Report, plan: SolvePlan) -> list[str]:
+    """Driver values from which runs are followed."""
+    return [
+        f"{driver.name} = {written(float(u), report.mechanism.length_unit, driver.quantity.kind)}"
+        for driver, u in zip(report.mechanism.drivers, plan.anchor.u, strict=True)
+    ]
+
+
+def _leaves_range(report: Report, reach: DriverRange) -> str | None:
+    """What to say when the file's run takes the driver past a limit."""
+    driver, run = report.mechanism.drivers[0], report.mechanism.run
+    constants = {key: getattr(driver.law, key) for key in driver.law.orders}
+    ends = [float(driver.law.target(t, **constants)) for t in (run.start, run.stop)]
+    low, high = (-math.inf if reach.low is None else reach.low), (math.inf if reach.high is None else reach.high)
+    if low <= min(ends) and max(ends) <= high:
+        return None
+    asked = " to ".join(written(end, report.mechanism.length_unit, driver.quantity.kind) for end in ends)
+    return f"  note        [run] takes {driver.name} from {asked}: beyond the range"
 
 
 def _all_multiples_of_pi(values: list[float]) -> bool:
@@ -194,7 +219,7 @@ def _all_multiples_of_pi(values: list[float]) -> bool:
 
 
 def _matrices(report: Report, plan: SolvePlan) -> tuple[Matrix, ...]:
-    system = System(report.mechanism)
+    system = System(localized(report.mechanism)[0])
     assembled = assemble(system)
     moving = [name for name in system.coordinates if name not in plan.fixed]
     if assembled is None or not moving:
@@ -209,7 +234,7 @@ def _matrices(report: Report, plan: SolvePlan) -> tuple[Matrix, ...]:
         if report.range and report.range.high is not None and beside > report.range.high:
             beside = point.value - SMALL_TURN
         for value, note in ((point.value, "singular point"), (beside, "a small turn beside it")):
-            q = _pose(report, plan, value)
+            q = _pose(system, plan, value)
             if q is not None:
                 told.append(moving_jacobian(system, q, solved, moving, f"Phi_q at {_at(report, value)}, {note}"))
     return tuple(told)
@@ -220,13 +245,14 @@ def _at(report: Report, value: float) -> str:
     return f"{driver.name} = {written(value, report.mechanism.length_unit, driver.quantity.kind)}"
 
 
-def _pose(report: Report, plan: SolvePlan, value: float) -> FloatArray | None:
+def _pose(system: System, plan: SolvePlan, value: float) -> FloatArray | None:
     """All coordinates at a driver value, exactly at a limit too: closed from the pose a little before it."""
     driver = plan.drivers[0]
     for nearer in (0.0, 1e-9, -1e-9):
         asked: dict[str, Any] = {driver.inputs[0]: [value + nearer]}
         run = solve(plan, **asked)
         if run.good[0]:
-            q = np.array([run[name][0] for name in report.mechanism.coordinate_names])
-            return q if nearer == 0.0 else close(System(report.mechanism), q, np.array([value]))[0]
+            offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
+            q = np.array([run[name][0] - offset[name.rpartition(".")[2]] for name in system.coordinates])
+            return q if nearer == 0.0 else close(system, q, np.array([value]))[0]
     return None

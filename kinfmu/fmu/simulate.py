@@ -21,6 +21,7 @@ from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.interrupt import interruptible
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.solver.status import Status
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of fmi2OK, Warning, Discard, Error, Fatal, Pending
-_WARNING, _DISCARD = 1, 2
+_WARNING, _DISCARD, _ERROR = 1, 2, 3
 
 
 def simulate(
@@ -50,6 +51,8 @@ def simulate(
     of such arrays; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name, such
     as {"crank.speed": 2.0}. progress: called with (samples done, samples in all).
 
+    Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
+
     Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
     of level "error" names driver, value and limit.
     """
@@ -64,9 +67,9 @@ def simulate(
         if table is None and not _time_drives(interface, chosen):
             samples.now = float(t[0])
             samples.log(_WARNING, "driven by inputs, and none are given: the drivers stay at their start values")
-        with _slave(about, folder, samples.log) as slave:
+        with interruptible() as interrupted, _slave(about, folder, samples.log) as slave:
             _initialize(slave, interface, chosen, t)
-            _step_through(slave, interface, samples, t, table, progress)
+            _step_through(slave, interface, samples, t, table, progress, interrupted)
         mechanism_text = (folder / "resources" / "mechanism.toml").read_text(encoding="utf-8")
     return samples.run(about, mechanism_text, chosen)
 
@@ -232,6 +235,7 @@ def _step_through(
     t: NDArray[np.float64],
     table: InputTable | None,
     progress: Callable[[int, int], None] | None,
+    interrupted: Callable[[], bool],
 ) -> None:
     """The loop: set at t_k, get, record, step."""
     from fmpy.fmi1 import FMICallException
@@ -244,6 +248,9 @@ def _step_through(
     settings = np.empty((len(t), 0)) if table is None else table.at(t)
     for k, time in enumerate(t.tolist()):
         samples.now = time
+        if interrupted():
+            samples.log(_ERROR, f"at t = {time:g} s: interrupted; the run ends here")
+            return
         if inputs:
             slave.setReal(inputs, settings[k].tolist())
         status, iterations = slave.getInteger(counts)
@@ -296,7 +303,7 @@ class _Samples:
         t, status = self._t[:n], self._counts[:n, 0]
         pieces = np.split(self._reals[:n].copy(), self._ends[:-1], axis=1)
         part = dict(zip(_REALS, pieces, strict=True))
-        for name in ("values", "rates", "accelerations", "errors", "watch"):
+        for name in ("values", "rates", "accelerations", "residual", "margin", "errors", "watch"):
             part[name][status > Status.BRIDGED] = np.nan
         interface = self._interface
         return Run(

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value
@@ -28,6 +28,9 @@ class Coordinate(Joint):
 
     def bodies(self) -> tuple[str, ...]:
         return (body_of(self.of),)
+
+    def moved(self, dx: float, dy: float) -> Coordinate:
+        return replace(self, value=self.value + (dx if self.axis == "x" else dy))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
         x, y = at.point(self.of)

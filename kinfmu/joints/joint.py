@@ -80,6 +80,10 @@ class Joint(ABC):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         """Phi, one value a row; zero where the joint holds."""
 
+    def moved(self, dx: float, dy: float) -> Joint:  # noqa: ARG002  absolute joints depend on it
+        """The joint when the whole mechanism stands elsewhere; the same unless it is absolute."""
+        return self
+
     def scales(self) -> tuple[float, ...]:
         """Residual per unit of length, one a row: |residual| / scale is the gap as a length, to first order."""
         return (1.0,) * len(self.labels)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kinfmu.plan.block import Block
 from kinfmu.plan.determinant import determinant_formula
+from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, LawConstant, Motion, SolvePlan, compile_plan, plan_from
 
 __all__ = [
@@ -14,5 +15,6 @@ __all__ = [
     "SolvePlan",
     "compile_plan",
     "determinant_formula",
+    "localized",
     "plan_from",
 ]

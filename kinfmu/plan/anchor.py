@@ -43,16 +43,19 @@ def find_anchor(system: System) -> Assembled:
 
 
 def _does_not_close(system: System) -> AssemblyError:
+    """The joint that is open widest where all give way alike, with its gap once the others are closed."""
     u = start_targets(system)
     pose, _ = close(system, rough_start(system), u)
-    gaps = np.abs(system.gaps(system.residual(pose, u)))
-    worst = int(gaps.argmax())
-    unit = system.mechanism.length_unit
+    widest = system.rows[int(np.abs(system.gaps(system.residual(pose, u))).argmax())].owner
+    others = [k for k, row in enumerate(system.rows) if row.owner != widest]
+    pose, _ = close(system, pose, u, others)
+    gaps = zip(system.rows, system.gaps(system.residual(pose, u)), strict=False)
+    gap = math.hypot(*(value for row, value in gaps if row.owner == widest))
     return AssemblyError(
-        f"the mechanism does not close near its start pose ({_at(system, u)}): joint '{system.rows[worst].owner}' "
-        f"stays open by {gaps[worst]:.4g} {unit}; check lengths and start poses",
-        joint=system.rows[worst].owner,
-        gap=float(gaps[worst]),
+        f"the mechanism does not close near its start pose ({_at(system, u)}): with the other joints closed, "
+        f"'{widest}' stays open by {gap:.4g} {system.mechanism.length_unit}; check lengths and start poses",
+        joint=widest,
+        gap=gap,
     )
 
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from kinfmu.equations.assembly import Assembled
+from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.equations.system import System
 from kinfmu.errors import InconsistentError, MechanismError, MobilityError, listed, suggestion
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
+from kinfmu.plan.origin import localized
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer
 from kinfmu.redundancy import Redundancy, find_redundancy
@@ -49,6 +50,7 @@ class Motion(NamedTuple):
 class SolvePlan:
     """A value: everything that a back end needs to print the code of a mechanism. Equal plans have equal `text`.
 
+    origin: where the plan's own origin lies in the world; only outputs, `fixed` and start values know of the world's.
     outputs: the generalized coordinates q, then the points of interest; fixed: coordinates that never move; blocks in
     the order of solving; watches: rows set aside as redundant, relative to the size; laws: u, ud, udd of each driver
     over the symbol `time`; anchor: an assembled, regular pose.
@@ -56,6 +58,7 @@ class SolvePlan:
 
     mechanism: Mechanism
     size: float
+    origin: Point
     drivers: tuple[DriverInfo, ...]
     law_constants: tuple[LawConstant, ...]
     laws: tuple[Motion, ...]
@@ -154,22 +157,29 @@ def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> 
 
     Raises InconsistentError, MobilityError, AssemblyError or AmbiguousStartError.
     """
-    system = System(mechanism)
-    return plan_from(system, find_redundancy(system), outputs)
+    local, origin = localized(mechanism)
+    system = System(local)
+    return plan_from(mechanism, system, origin, find_redundancy(system), outputs)
 
 
-def plan_from(system: System, redundancy: Redundancy, outputs: Sequence[str] | None = None) -> SolvePlan:
-    """The plan, when redundancy is known already."""
-    mechanism = system.mechanism
+def plan_from(
+    mechanism: Mechanism,
+    system: System,
+    origin: Point,
+    redundancy: Redundancy,
+    outputs: Sequence[str] | None = None,
+) -> SolvePlan:
+    """The plan, when redundancy is known already; system: of the mechanism as seen from its `origin`."""
+    local = system.mechanism
     refuse_inconsistent(system, redundancy)
     refuse_mobility(system, redundancy)
     anchor = find_anchor(system)
-    tracer = Tracer(mechanism)
+    tracer = Tracer(local)
     set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy.kept, set_aside)
     known = {name: tracer.graph.constant(value) for name, value in structure.fixed.items()}
     rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
-    motions, coordinate_count, fixed = _outputs(mechanism, tracer, rates, known)
+    motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
     at_anchor = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
@@ -186,6 +196,7 @@ def plan_from(system: System, redundancy: Redundancy, outputs: Sequence[str] | N
     return SolvePlan(
         mechanism=mechanism,
         size=system.size,
+        origin=origin,
         drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
         law_constants=_law_constants(mechanism),
         laws=_laws(mechanism, tracer),
@@ -222,7 +233,8 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
         missing = mobility - len(names)
         raise MobilityError(
             f"[drivers] mobility is {mobility} but there {_are(names)}: "
-            f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed",
+            f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed, or joints: "
+            f"{listed(_loose(system, redundancy))} can still move",
             mobility=mobility,
         )
     if mobility == 0:
@@ -236,6 +248,17 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
     )
 
 
+def _loose(system: System, redundancy: Redundancy) -> list[str]:
+    """Bodies that joints and drivers together do not hold."""
+    rows = [*redundancy.kept, *range(system.joint_row_count, len(system.rows))]
+    pose = next(iter(motion_samples(system, rough_start(system), redundancy.kept, 1)), rough_start(system))
+    free = null_space(system.scaled_jacobian(pose)[rows])
+    moves = {
+        name.partition(".")[0] for name, way in zip(system.coordinates, free, strict=True) if abs(way).max() > 1e-6
+    }
+    return [body.name for body in system.mechanism.moving_bodies if body.name in moves]
+
+
 def _are(drivers: Sequence[str]) -> str:
     if not drivers:
         return "is no driver"
@@ -243,7 +266,7 @@ def _are(drivers: Sequence[str]) -> str:
 
 
 def _outputs(
-    mechanism: Mechanism, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
+    mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
 ) -> tuple[list[Motion], int, dict[str, float]]:
     """Outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":
@@ -252,15 +275,21 @@ def _outputs(
         wanted = list(mechanism.coordinate_names)
     else:
         wanted = list(mechanism.coordinates)
-    nodes = [(name, known.get(name, tracer.symbols[name])) for name in wanted]
-    fixed = {name: float(node.constant or 0.0) for name, node in known.items() if name not in wanted}
+
+    def in_world(name: str, node: Node) -> Node:
+        offset = {"x": origin.x, "y": origin.y}.get(name.rpartition(".")[2], 0.0)
+        return node + offset
+
+    nodes = [(name, in_world(name, known.get(name, tracer.symbols[name]))) for name in wanted]
+    fixed = {name: float(in_world(name, node).constant or 0.0) for name, node in known.items() if name not in wanted}
     coordinate_count = len(nodes)
     for name, target in mechanism.points.items():
         for coordinate, node in zip(("x", "y"), tracer.point(target, known), strict=True):
-            if node.constant is None:
-                nodes.append((f"{name}.{coordinate}", node))
+            value = in_world(coordinate, node)
+            if value.constant is None:
+                nodes.append((f"{name}.{coordinate}", value))
             else:
-                fixed[f"{name}.{coordinate}"] = node.constant
+                fixed[f"{name}.{coordinate}"] = value.constant
     positions = [node for _, node in nodes]
     motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
     return [Motion(*motion) for motion in motions], coordinate_count, fixed

@@ -40,7 +40,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
     longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
     pose, step, iterations = start, longest, 0
-    before, limit = start, None
+    before, regular, limit = start, start, None
     if abs(target[0] - start.u[0] if one else distance) > MOST_STEPS * longest:
         return Limit(start.u, TOO_FAR)
     for _ in range(MOST_STEPS):
@@ -60,7 +60,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
                 continue
             distance = target[0] - pose.u[0]
             if distance == 0.0:  # a node, or a step that ended there by rounding
-                return _arrived(pose, iterations)
+                return _arrived(pose, regular, iterations)
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
         u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
@@ -73,8 +73,10 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
                     pose = on_road(pose, road)
                     continue
             if whole:
-                return _arrived(trial, iterations)
+                return _arrived(trial, regular, iterations)
             before, pose = pose, trial
+            if pose.margin >= NEAR_SINGULAR:
+                regular = pose
             distance -= s
             step = min(2.0 * step, longest)
             continue
@@ -86,11 +88,15 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     return Limit(pose.u, TOO_FAR)
 
 
-def _arrived(pose: Pose, iterations: int) -> Pose:
-    """The pose at the end of a way, with the iterations of the whole way."""
+def _arrived(pose: Pose, regular: Pose, iterations: int) -> Pose:
+    """The pose at the end of a way, with the iterations of the whole way.
+
+    At a dead centre it has no tangent to go on by: the next way starts from the last regular pose.
+    """
     pose.iterations = iterations
     if pose.margin < NEAR_SINGULAR:
         pose.status = Status.NEAR_SINGULAR
+        pose.base = regular
     return pose
 
 

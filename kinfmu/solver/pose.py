@@ -26,6 +26,7 @@ class Pose:
     """
 
     __slots__ = (
+        "base",
         "bridge",
         "determinants",
         "iterations",
@@ -56,6 +57,7 @@ class Pose:
         ) = found
         self.road = road  # None: nothing singular is known
         self.bridge: Any = None
+        self.base: Pose | None = None  # where to go on from, if not from here: see advance
         self.status: int = 0
         self.message = ""
         self.tangent: tuple[Vector, Vector] | None = None  # of a single driver: see tangent_of

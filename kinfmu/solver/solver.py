@@ -34,6 +34,7 @@ class Solver:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
         if u == start.u:
             return start
+        start = start.base or start
         if self._one:  # most samples: one trusted step, away from all that is singular
             s, road = u[0] - start.u[0], start.road
             if -self._longest <= s <= self._longest and (road is None or road.low <= u[0] <= road.high):
@@ -144,11 +145,12 @@ class Solver:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
         road = None if pose.road is None else pose.road.dump()
         standing = -1 if pose.bridge is None else pose.road.bridges.index(pose.bridge)
-        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, road, standing]
+        base = None if pose.base is None else self.dump(pose.base)
+        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, road, standing, base]
 
     def restore(self, data: list[Any]) -> Pose:
         """The pose that was dumped."""
-        u, z, iterations, status, message, dumped, standing = data
+        u, z, iterations, status, message, dumped, standing, base = data
         road = None if dumped is None else laid(self.model, dumped)
         if road is not None and standing >= 0:
             pose: Pose = road.bridges[standing].pose(tuple(u))
@@ -156,4 +158,5 @@ class Solver:
             pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
         pose.road = None if road is None else road.around(pose.u[0])
         pose.iterations, pose.status, pose.message = iterations, status, message
+        pose.base = None if base is None else self.restore(base)
         return pose

@@ -111,7 +111,8 @@ def test_a_driver_too_many_or_too_few_is_told(fails: Callable[..., str], fourbar
     text = path.read_text(encoding="utf-8")
     path.write_text(text[: text.index("[drivers.crank]")], encoding="utf-8")
     assert fails("check", path) == (
-        f"{path}: [drivers] mobility is 1 but there is no driver: 1 more driver is needed"
+        f"{path}: [drivers] mobility is 1 but there is no driver: 1 more driver is needed, "
+        "or joints: crank, coupler, rocker can still move"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import tempfile
 import zipfile
@@ -171,3 +172,16 @@ def test_fmu_driven_by_inputs_stays_at_its_start_without_any_and_says_so(built: 
     assert run["upper.omega"] == pytest.approx(np.zeros(4))
     assert [event.level for event in run.events] == ["warning"]
     assert "none are given" in run.events[0].text
+
+
+def test_ctrl_c_ends_the_run_and_keeps_what_was_reached(fourbar: Path) -> None:
+    def press(done: int, _count: int) -> None:
+        if done == 20:
+            signal.raise_signal(signal.SIGINT)
+
+    run = simulate(fourbar, progress=press)
+    assert len(run) == 20
+    assert run.good.all()
+    assert run.events[-1].text == "at t = 20 s: interrupted; the run ends here"
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)  # afterwards Ctrl-C does what it did before

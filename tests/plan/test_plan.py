@@ -148,9 +148,7 @@ def test_what_does_not_close_is_told_with_its_widest_gap() -> None:
         fourbar(4, 1, 3.5, 3).joints,
         [Angle("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
-    with pytest.raises(
-        AssemblyError, match=r"does not close .* \(crank = 1 rad .*\): joint '.' stays open by [\d.]+ m"
-    ):
+    with pytest.raises(AssemblyError, match=r"\(crank = 1 rad .*\): with the other joints closed, '.' stays open by"):
         compile_plan(mechanism)
 
 
@@ -201,7 +199,9 @@ def test_what_cannot_move_at_all_is_refused() -> None:
 
 
 def test_a_body_without_joints_is_free() -> None:
-    with pytest.raises(MobilityError, match="mobility is 3 but there is no driver: 3 more drivers are needed"):
+    with pytest.raises(
+        MobilityError, match="mobility is 3 but there is no driver: 3 more drivers are needed, or joints: b can"
+    ):
         compile_plan(Mechanism("free", [Body("b")]))
 
 
