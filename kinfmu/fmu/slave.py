@@ -25,6 +25,7 @@ Row = tuple[float, ...]
 
 NOT_A_NUMBER = math.nan
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
+KEPT = 3  # commits that are remembered: estimates use two before the present, and a host may go back by one
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 
@@ -50,7 +51,7 @@ class Fetch(NamedTuple):
 
     read: Callable[[], Row]
     others: tuple[Callable[[], Row], ...]
-    pick: Callable[[Row], Sequence[float]]
+    pick: Callable[[Row], Sequence[float]] | None  # None: all of them
 
 
 class Shown:
@@ -60,7 +61,7 @@ class Shown:
     one.
     """
 
-    __slots__ = ("accelerations", "drive", "errors", "motion", "pose", "rates", "stale", "values")
+    __slots__ = ("accelerations", "drive", "errors", "pose", "rates", "stale", "values")
 
     def __init__(self, pose: Pose, stale: bool) -> None:
         self.pose = pose
@@ -69,7 +70,6 @@ class Shown:
         self.values: Row | None = None
         self.rates: Row | None = None
         self.accelerations: Row | None = None
-        self.motion: Row | None = None
         self.errors: Row | None = None
 
 
@@ -126,6 +126,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """The driver values may have changed: solve again when something is read."""
         self._pose: Pose | None = None
         self._shown: Shown | None = None
+        self._motion: Row | None = None  # values, rates and accelerations in one row: what most hosts read
 
     def _driven(self) -> tuple[Row, Row, Row]:
         """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
@@ -217,17 +218,20 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _read_motion(self) -> Row:
         """Values, rates and accelerations in one row: what they share is computed once."""
-        shown = self._shown or self._look()
-        row = shown.motion
+        row = self._motion
         if row is None:
-            if shown.values is None and shown.rates is None:
-                drive = shown.drive
-                if drive is None:
-                    drive = shown.drive = self._committed_drive() if shown.stale else self._driven()
-                row = self._solver.motion(shown.pose, drive[1], drive[2])
-            else:  # parts of it were read before
-                row = self._read_values() + self._read_rates() + self._read_accelerations()
-            shown.motion = row
+            pose, shown = self._pose or self._asked(), self._shown
+            if shown is None and pose.status <= LAST_GOOD:  # read first and alone, as a rule
+                _, ud, udd = self._driven()
+                row = self._solver.motion(pose, ud, udd)
+            else:
+                shown = self._look()
+                if shown.values is None and shown.rates is None:
+                    _, ud, udd = self._drive(shown)
+                    row = self._solver.motion(shown.pose, ud, udd)
+                else:  # parts of it were read before
+                    row = self._read_values() + self._read_rates() + self._read_accelerations()
+            self._motion = row
         return row
 
     def _read_residual(self) -> Row:
@@ -277,7 +281,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 indices.append(offsets[found] + place)
         if width in indices or not readers:
             readers.append(_no_number)
-        fetch = Fetch(readers[0], tuple(readers[1:]), _picker(indices))
+        fetch = Fetch(readers[0], tuple(readers[1:]), _picker(indices, width))
         if len(self._fetches) >= MOST_FETCHES:
             self._fetches.clear()
         self._fetches[vrs] = fetch
@@ -303,9 +307,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._last_read = list(vrs)
             read, others, pick = self._last_fetch
             row = read()
-            for read_more in others:
-                row += read_more()
-            return list(pick(row))
+            if others:
+                for read_more in others:
+                    row += read_more()
+            return list(pick(row) if pick else row)
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
             return [NOT_A_NUMBER] * len(vrs)
@@ -355,7 +360,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 continue
             if value != inputs[vr]:
                 inputs[vr] = value
-                self._shown = None
+                self._shown = self._motion = None
                 if vr % 3 == 0:
                     self._pose = None
                 elif value != 0.0:
@@ -366,7 +371,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._refused.pop(self._references.name(vr), None)
         if not self._touched:  # from now on the rates are those at the current time, not at the commit
             self._touched = True
-            self._shown = None
+            self._shown = self._motion = None
 
     def _set_other_real(self, vr: int, value: float) -> None:
         """Parameters, which are set rarely, and what is refused."""
@@ -439,8 +444,18 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if pose.status > LAST_GOOD:
                 return self._discard(pose, current_time)
             if not self._touched or current_time != self._time:
-                self._shown = None  # the host holds its inputs, or its clock differs: estimates see another time
-            self._commit(pose, current_time)
+                self._shown = self._motion = (
+                    None  # the host holds its inputs, or its clock differs: estimates see another time
+                )
+            history = self._history
+            if len(history) == KEPT and history[-1][0] < current_time:  # _commit, without what is rare
+                self._history = (history[1], history[2], (current_time, pose.u))
+                self._committed = pose
+                self._touched = False
+                if self._wired:
+                    self._committed_inputs = tuple(self._inputs)
+            else:
+                self._commit(pose, current_time)
             self._time = current_time + step_size
             return True
         except Exception as error:  # an exception here would be Fatal for the host
@@ -583,8 +598,10 @@ def _no_number() -> Row:
     return (NOT_A_NUMBER,)
 
 
-def _picker(indices: list[int]) -> Callable[[Row], Sequence[float]]:
-    """Pick these places of a row: a slice if they are neighbours."""
+def _picker(indices: list[int], width: int) -> Callable[[Row], Sequence[float]] | None:
+    """Pick these places of a row of that width: a slice if they are neighbours, None if they are all."""
+    if indices == list(range(width)):
+        return None
     if not indices:
         return itemgetter(slice(0, 0))
     if indices == list(range(indices[0], indices[0] + len(indices))):

@@ -115,10 +115,10 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
     needed = TRUST * trial.moved
+    if needed > trial.margin or needed > pose.margin or trial.margin == 0.0:
+        return None
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
-        if before < 0.0:
-            before, after = -before, -after
-        if after < FALL * before or after < needed or before < needed or after == 0.0:
+        if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
     return trial
 

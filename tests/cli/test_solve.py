@@ -83,7 +83,7 @@ def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command,
     assert len(result.stderr.splitlines()) == 1
     table = read_csv(tmp_path / "run.csv")
     assert np.isnan(table["lower.phi"]).tolist() == [False] * 5 + [True] * 2
-    assert table["solver.status"].tolist() == [0.0] * 5 + [3.0] * 2
+    assert table["solver.status"].tolist() == [0.0] * 4 + [1.0] + [3.0] * 2
 
 
 @pytest.mark.parametrize(
