@@ -18,6 +18,12 @@ def estimated_rates(
     those before t count; one of them gives a slope, none gives 0.
     """
     count = len(samples)
+    if count == 3 and samples[1][0] < t <= samples[2][0] and len(u) == 1:  # most calls: at the last of three samples
+        (t0, (u0,)), (t1, (u1,)) = samples[0], samples[1]
+        h2 = t - t1
+        d2 = (u[0] - u1) / h2
+        acceleration = 2.0 * (d2 - (u1 - u0) / (t1 - t0)) / (t - t0)
+        return (d2 + 0.5 * acceleration * h2,), (acceleration,)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
@@ -28,10 +34,10 @@ def estimated_rates(
     if count == 1:
         return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = samples[count - 2]
-    h1 = t1 - t0
-    if len(u) == 1:  # most mechanisms: no loop, this runs in every step
-        d2 = (u[0] - u1[0]) / h2
-        acceleration = 2.0 * (d2 - (u1[0] - u0[0]) / h1) / (h1 + h2)
-        return (d2 + 0.5 * acceleration * h2,), (acceleration,)
-    rates = [estimated_rates(((t0, (a,)), (t1, (b,))), t, (c,)) for a, b, c in zip(u0, u1, u, strict=True)]
-    return tuple([speed for (speed,), _ in rates]), tuple([acceleration for _, (acceleration,) in rates])
+    speeds, accelerations = [], []
+    for a, b, c in zip(u0, u1, u, strict=True):
+        d2 = (c - b) / h2
+        acceleration = 2.0 * (d2 - (b - a) / (t1 - t0)) / (t - t0)
+        speeds.append(d2 + 0.5 * acceleration * h2)
+        accelerations.append(acceleration)
+    return tuple(speeds), tuple(accelerations)

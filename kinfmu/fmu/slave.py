@@ -354,6 +354,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self._inputs
+        if len(vrs) == 1 and vrs[0] == 0 and not (self._driven_by_time or self._refused):  # the one driver's value
+            value = values[0]
+            if value - value == 0.0:
+                if value != inputs[0]:
+                    inputs[0] = value
+                    self._pose = self._shown = self._motion = None
+                elif not self._touched:
+                    self._shown = self._motion = None
+                self._touched = True
+                return
         for vr, value in zip(vrs, values):  # noqa: B905  # the host's lists are equally long
             if not (0 <= vr < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
                 self._set_other_real(vr, value)
@@ -440,7 +450,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 return self._step(current_time, step_size)
             pose = self._pose
             if pose is None:
-                pose = self._pose = self._solver.solve(self._committed, self._wanted())
+                inputs = self._inputs
+                u = (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])
+                pose = self._pose = self._solver.solve(self._committed, u)
             if pose.status > LAST_GOOD:
                 return self._discard(pose, current_time)
             if not self._touched or current_time != self._time:
