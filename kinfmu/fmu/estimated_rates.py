@@ -19,11 +19,10 @@ def estimated_rates(
     """
     count = len(samples)
     if count == 3 and samples[1][0] < t <= samples[2][0] and len(u) == 1:  # most calls: at the last of three samples
-        (t0, (u0,)), (t1, (u1,)) = samples[0], samples[1]
-        h2 = t - t1
-        d2 = (u[0] - u1) / h2
-        acceleration = 2.0 * (d2 - (u1 - u0) / (t1 - t0)) / (t - t0)
-        return (d2 + 0.5 * acceleration * h2,), (acceleration,)
+        (first, (a,)), (second, (b,)) = samples[0], samples[1]
+        slope = (u[0] - b) / (t - second)
+        curve = 2.0 * (slope - (b - a) / (second - first)) / (t - first)
+        return (slope + 0.5 * curve * (t - second),), (curve,)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
