@@ -71,10 +71,13 @@ def main() -> int:
     run = simulate(fmu)
     bridged = listed_times(run, Status.BRIDGED)
     print(f"\nsimulated {fmu} with fmpy: t = {run.t[0]:g} ... {run.t[-1]:g} s, {len(run)} samples")
-    print(f"bridged over the singular points at t = {bridged} s")
+    print(f"interpolated across the singular points (status bridged) at t = {bridged} s")
 
     table, agrees = compare_with_report(run)
-    print(f"\nours and the percent errors of the report's table: {'all 25 numbers agree' if agrees else 'DIFFERENT'}")
+    print(
+        "\nours beside the table printed in R. A. Alzaga's report (1999), with the percent errors of its four digits:"
+    )
+    print("all 25 numbers agree" if agrees else "DIFFERENT")
     print(table)
     difference, exact = compare_with_closed_form(run)
     print(f"\nlargest difference from the closed form: {difference} ({'fine' if exact else 'TOO LARGE'})")

@@ -43,8 +43,9 @@ class Run:
     t: (n,) [s]. outputs: names of the m output coordinates, first the generalized coordinates q, then the points of
     interest; values, rates, accelerations: (n, m) in the mechanism's unit of length, rad and s. fixed: coordinates that
     a joint holds at a constant. inputs: (n, 3 d): value, speed and acceleration of each driver. status, iterations:
-    (n,); residual: (n,) largest residual relative to the mechanism's size; margin: (n,) 1 / condition; error: (n, 3)
-    estimated error of q, qd, qdd; watch: (n, w) residual of the rows set aside as redundant, relative to the size.
+    (n,); residual: (n,) how far the rows of the worst block are open, relative to the mechanism's size; margin: (n,)
+    1 / condition; error: (n, 3) estimated error of q, qd, qdd; watch: (n, w) residual of the rows set aside as
+    redundant, relative to the size.
     Samples of status 3 to 5 are NaN in values, rates and accelerations.
     """
 

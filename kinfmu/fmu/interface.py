@@ -21,6 +21,11 @@ DRIVES: tuple[Drive, ...] = ("time", "inputs")
 
 DEFAULT_TOLERANCE = 1e-9  # residual relative to the mechanism's size above which a sample is not ok
 SMALLEST_TOLERANCE = 1e-15  # round-off: no sample would pass below
+_COORDINATE_WORDS = {
+    "x": ("x", "x velocity", "x acceleration"),
+    "y": ("y", "y velocity", "y acceleration"),
+    "phi": ("Angle", "Angular velocity", "Angular acceleration"),
+}
 _ORDER_WORDS = ("", "rate of ", "acceleration of ")
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
 
@@ -200,7 +205,7 @@ def _output(plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...]) ->
         "Real",
         "output",
         "continuous",
-        f"{kind.capitalize()} {owner}: {_ORDER_WORDS[order]}{coordinate}",
+        f"{_COORDINATE_WORDS[coordinate][order]} of {kind} {owner} in the world",
         initial="calculated",
         unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
         derivative_of=derivative_name(name, order - 1) if order else None,

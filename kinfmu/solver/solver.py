@@ -125,12 +125,13 @@ class Solver:
         Newton: eps / m, eps / m^2, eps / m^3 times the rates, with the determinant m as the distance from singular.
         Bridge: the difference of two widths, and what rounding leaves of the nodes.
         """
+        far = EPS * self.model.OFFSET  # what rounding takes from positions far off the origin
         drive, more = max(map(abs, ud), default=0.0), max(map(abs, udd), default=0.0)
         if pose.bridge is not None:
             e0, e1, e2 = pose.bridge.disagreement(pose.u[0])
             rate = drive
             floor = 8.0 * EPS / pose.bridge.half
-            error_q = e0 + 8.0 * EPS
+            error_q = e0 + 8.0 * EPS + far
             error_qd = (e1 + floor) * rate
             error_qdd = (e2 + floor / pose.bridge.half) * rate * rate + (e1 + floor) * more
             return error_q, error_qd, error_qdd
@@ -139,7 +140,7 @@ class Solver:
         m = max(pose.margin, EPS)
         error_q = 4.0 * (EPS + pose.residual) / m
         error_qd = error_q * speed / m
-        return error_q, error_qd, (error_qd * speed + error_q * more) / m
+        return error_q + far, error_qd, (error_qd * speed + error_q * more) / m
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""

@@ -105,6 +105,7 @@ class _Emitter:
             "",
             f"NAME = {plan.mechanism.name!r}",
             f"SIZE = {plan.size!r}",
+            f"OFFSET = {max(map(abs, plan.origin)) / plan.size!r}  # from the world's origin, in sizes",
             f"LENGTH_UNIT = {plan.mechanism.length_unit!r}",
             f"DRIVERS = {tuple(driver.name for driver in plan.drivers)!r}",
             f"DRIVER_KINDS = {kinds!r}",
