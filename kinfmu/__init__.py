@@ -18,16 +18,27 @@ if TYPE_CHECKING:
     from kinfmu import log as log
     from kinfmu.analysis import Report as Report
     from kinfmu.analysis import check as check
-    from kinfmu.drivers import Angle as Angle
+    from kinfmu.drivers import AngleDriver as AngleDriver
     from kinfmu.drivers import ConstantSpeed as ConstantSpeed
+    from kinfmu.drivers import CoordinateDriver as CoordinateDriver
+    from kinfmu.drivers import DistanceDriver as DistanceDriver
+    from kinfmu.drivers import RelativeAngleDriver as RelativeAngleDriver
+    from kinfmu.drivers import SlideDriver as SlideDriver
     from kinfmu.errors import KinfmuError as KinfmuError
     from kinfmu.fmu import build as build
     from kinfmu.fmu import simulate as simulate
     from kinfmu.gallery import load as load
     from kinfmu.gallery import save as save
+    from kinfmu.joints import Angle as Angle
     from kinfmu.joints import Coordinate as Coordinate
     from kinfmu.joints import Distance as Distance
+    from kinfmu.joints import Fixed as Fixed
+    from kinfmu.joints import Gear as Gear
+    from kinfmu.joints import PointOnLine as PointOnLine
+    from kinfmu.joints import RackAndPinion as RackAndPinion
+    from kinfmu.joints import RelativeAngle as RelativeAngle
     from kinfmu.joints import Revolute as Revolute
+    from kinfmu.joints import Translational as Translational
     from kinfmu.mechanism import Body as Body
     from kinfmu.mechanism import Mechanism as Mechanism
     from kinfmu.mechanism import Point as Point
@@ -41,20 +52,31 @@ VERSION = "0.1.0"
 __version__ = VERSION
 
 _HOME = {
-    "Angle": "kinfmu.drivers",
+    "Angle": "kinfmu.joints",
+    "AngleDriver": "kinfmu.drivers",
     "Body": "kinfmu.mechanism",
     "ConstantSpeed": "kinfmu.drivers",
     "Coordinate": "kinfmu.joints",
+    "CoordinateDriver": "kinfmu.drivers",
     "Distance": "kinfmu.joints",
+    "DistanceDriver": "kinfmu.drivers",
+    "Fixed": "kinfmu.joints",
+    "Gear": "kinfmu.joints",
     "KinfmuError": "kinfmu.errors",
     "Mechanism": "kinfmu.mechanism",
     "Point": "kinfmu.mechanism",
+    "PointOnLine": "kinfmu.joints",
+    "RackAndPinion": "kinfmu.joints",
+    "RelativeAngle": "kinfmu.joints",
+    "RelativeAngleDriver": "kinfmu.drivers",
     "Report": "kinfmu.analysis",
     "Revolute": "kinfmu.joints",
     "Run": "kinfmu.run",
     "RunSettings": "kinfmu.mechanism",
+    "SlideDriver": "kinfmu.drivers",
     "Start": "kinfmu.mechanism",
     "Status": "kinfmu.solver.status",
+    "Translational": "kinfmu.joints",
     "build": "kinfmu.fmu",
     "check": "kinfmu.analysis",
     "load": "kinfmu.gallery",
@@ -66,19 +88,30 @@ _HOME = {
 __all__ = [
     "VERSION",
     "Angle",
+    "AngleDriver",
     "Body",
     "ConstantSpeed",
     "Coordinate",
+    "CoordinateDriver",
     "Distance",
+    "DistanceDriver",
+    "Fixed",
+    "Gear",
     "KinfmuError",
     "Mechanism",
     "Point",
+    "PointOnLine",
+    "RackAndPinion",
+    "RelativeAngle",
+    "RelativeAngleDriver",
     "Report",
     "Revolute",
     "Run",
     "RunSettings",
+    "SlideDriver",
     "Start",
     "Status",
+    "Translational",
     "build",
     "check",
     "load",

@@ -17,7 +17,7 @@ class Quantity(NamedTuple):
 
 
 Length = Annotated[float, Quantity("length")]
-Angle = Annotated[float, Quantity("angle")]
+Radians = Annotated[float, Quantity("angle")]  # inside; files may write degrees
 Number = Annotated[float, Quantity("number")]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}

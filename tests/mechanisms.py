@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kinfmu import Angle, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
+from kinfmu import AngleDriver, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
 from kinfmu.mechanism.toml_file import parse, text
 
 
@@ -40,7 +40,7 @@ def bar_as_body(turn: float = 0.0) -> Mechanism:
             Revolute("B", ("ground.B", "bar.B")),
             Revolute("A", ("coupler.A", "bar.A")),
         ],
-        [Angle("crank", "crank", ConstantSpeed(turn, math.radians(1.0)))],
+        [AngleDriver("crank", "crank", ConstantSpeed(turn, math.radians(1.0)))],
     )
 
 
@@ -79,7 +79,7 @@ def fourbar(
             Revolute("Q", ("coupler.Q", "rocker.Q")),
             Revolute("C", ("ground.C", "rocker.C")),
         ],
-        [Angle("crank", "crank", ConstantSpeed(start, 1.0))],
+        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
     )
 
 
@@ -104,7 +104,7 @@ def six_bar() -> Mechanism:
             Revolute("R", ("ternary.R", "link.R")),
             Revolute("S", ("link.S", "output.S")),
         ],
-        [Angle("drive", "output", ConstantSpeed(1.6, 0.1))],
+        [AngleDriver("drive", "output", ConstantSpeed(1.6, 0.1))],
     )
 
 
@@ -126,7 +126,10 @@ def five_bar() -> Mechanism:
             Revolute("Q", ("right.Q", "strut.Q")),
             Revolute("T", ("forearm.T", "strut.T")),
         ],
-        [Angle("shoulder", "left", ConstantSpeed(2.0, 0.3)), Angle("elbow", "right", ConstantSpeed(1.0, -0.2))],
+        [
+            AngleDriver("shoulder", "left", ConstantSpeed(2.0, 0.3)),
+            AngleDriver("elbow", "right", ConstantSpeed(1.0, -0.2)),
+        ],
         points={"tip": "forearm.T"},
     )
 
@@ -148,7 +151,7 @@ def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0) -> M
             Revolute("P", ("crank.P", "rod.P")),
             Coordinate("guide", "rod.S", "y", offset),
         ],
-        [Angle("crank", "crank", ConstantSpeed(start, 1.0))],
+        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
         points={"slider": "rod.S"},
     )
 
@@ -167,5 +170,5 @@ def bar_linkage() -> Mechanism:
             Revolute("C", ("ground.C", "rocker.C")),
             Distance("coupler", ("crank.P", "rocker.Q"), 3.5),
         ],
-        [Angle("crank", "crank", ConstantSpeed(1.0, 1.0))],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )

@@ -150,7 +150,8 @@ def _lines(report: Report) -> list[str]:
     if not report.redundancy.dependent:
         lines.append("  redundant   none")
     for row in report.inconsistent:
-        reason = f"{listed(row.implied_by_joints)} leave it open by {abs(row.gap):.6g} {unit} at every pose"
+        gap = f"{abs(row.gap):.6g} {'rad' if row.row.kind == 'angle' else unit}"
+        reason = f"{listed(row.implied_by_joints)} leave it open by {gap} at every pose"
         lines.append(f"  contradicts {row.row.owner} (row {row.row.name}): {reason}")
     plan = report.plan
     if plan is not None:

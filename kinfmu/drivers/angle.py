@@ -6,13 +6,13 @@ from typing import ClassVar
 from kinfmu.drivers.constant_speed import ConstantSpeed
 from kinfmu.drivers.driver import Driver
 from kinfmu.drivers.law import Law
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import BodyName, Placement
+from kinfmu.joints.measures import AngleBetween
+from kinfmu.joints.placement import BodyName
 from kinfmu.units import Quantity
 
 
 @dataclass(frozen=True)
-class Angle(Driver):
+class AngleDriver(Driver):
     """The angle of a body, driven: a crank turned by a motor on the ground.
 
         Phi = phi_i - u(t)        (1 row)
@@ -28,8 +28,5 @@ class Angle(Driver):
     of: BodyName
     law: Law = field(default_factory=ConstantSpeed)
 
-    def bodies(self) -> tuple[str, ...]:
-        return (self.of,)
-
-    def measure(self, at: Placement) -> Value:
-        return at.angle(self.of)
+    def measured(self) -> AngleBetween:
+        return AngleBetween(self.of)

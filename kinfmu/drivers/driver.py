@@ -7,12 +7,15 @@ from typing import ClassVar
 
 from kinfmu.drivers.law import Law
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Placement
+from kinfmu.joints.measures import Measure
+from kinfmu.joints.placement import Placement
 from kinfmu.units import Quantity
 
 
 class Driver(ABC):
-    """One driving row Phi(q, t) = measured quantity - u(t) = 0.
+    """One driving row Phi(q, t): a measured quantity follows u(t).
+
+        Phi = measure - u(t), or what the measure has in its place        (1 row)
 
     A leaf is a frozen dataclass with fields `name`, its own keys, and last `law`. `noun` names the input of an FMU:
     a driver `crank` with noun `angle` has the inputs `crank_angle`, `crank_speed` and `crank_acceleration`.
@@ -25,16 +28,16 @@ class Driver(ABC):
     law: Law
 
     @abstractmethod
+    def measured(self) -> Measure:
+        """The driven quantity."""
+
     def bodies(self) -> tuple[str, ...]:
         """Names of the bodies that the row touches, ground included."""
-
-    @abstractmethod
-    def measure(self, at: Placement) -> Value:
-        """The driven quantity in a pose."""
+        return self.measured().bodies()
 
     def residual(self, at: Placement, target: Value) -> Value:
         """Phi of the driving row for a target u."""
-        return self.measure(at) - target
+        return self.measured().row(at, target)
 
     def inputs(self) -> tuple[str, str, str]:
         """Names of the inputs for value, speed and acceleration."""

@@ -150,7 +150,7 @@ def _walked(system: System, q: FloatArray, u: FloatArray, way: FloatArray) -> Fl
     ud, at_rest = way / _STEPS, np.zeros(len(way))
     for k in range(1, _STEPS + 1):
         jacobian = system.jacobian(q)
-        qd = np.linalg.lstsq(jacobian, system.nu(q, ud), rcond=_RANK)[0]
+        qd = np.linalg.lstsq(jacobian, system.nu(q, u + (k - 1) * ud, ud), rcond=_RANK)[0]
         gamma = system.gamma(q, qd, u + (k - 1) * ud, ud, at_rest)
         qdd = np.linalg.lstsq(jacobian, gamma, rcond=_RANK)[0]
         q, gap = close(system, q + qd + 0.5 * qdd, u + k * ud)

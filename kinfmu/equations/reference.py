@@ -44,6 +44,6 @@ def solve_reference(
         dq = np.linalg.solve(jacobian, -residual)
         q += dq
         iterations += 1
-    qd = np.asarray(np.linalg.solve(jacobian, system.nu(q, ud)[chosen]), dtype=float)
+    qd = np.asarray(np.linalg.solve(jacobian, system.nu(q, u, ud)[chosen]), dtype=float)
     qdd = np.asarray(np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen]), dtype=float)
     return Solution(q, qd, qdd, iterations)

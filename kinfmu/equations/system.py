@@ -22,7 +22,8 @@ class Row(NamedTuple):
 
     owner: str
     label: str
-    scale: float  # residual per unit of length
+    scale: float  # residual per unit of length; an angle counts as the way of a point at distance `size`
+    kind: str  # 'length' or 'angle': what its gap is
     is_driver: bool = False
 
     @property
@@ -44,16 +45,16 @@ class System:
         self.mechanism = mechanism
         self.coordinates = mechanism.coordinate_names
         self.size = size_of(mechanism)
+        per_length = {"angle": 1.0 / self.size, "length": 1.0}
         rows = [
-            Row(joint.name, label, scale)
+            Row(joint.name, label, scale * per_length[kind], kind)
             for joint in mechanism.joints
-            for label, scale in zip(joint.labels, joint.scales(), strict=True)
+            for label, scale, kind in zip(joint.labels, joint.scales(), joint.kinds(), strict=True)
         ]
-        per_length = {"angle": 1.0 / self.size}  # an angle off by a unit moves a point at distance `size` by `size`
-        rows += [
-            Row(driver.name, driver.noun, per_length.get(driver.quantity.kind, 1.0), is_driver=True)
-            for driver in mechanism.drivers
-        ]
+        for driver in mechanism.drivers:
+            measure = driver.measured()
+            scale = measure.scale(self.size) * per_length[measure.kind]
+            rows.append(Row(driver.name, driver.noun, scale, measure.kind, is_driver=True))
         self.rows = tuple(rows)
         self.joint_row_count = len(rows) - len(mechanism.drivers)
         self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)
@@ -78,9 +79,9 @@ class System:
         rows = [_lines(phi, n) for phi in self.evaluate(along, [0.0] * len(self.mechanism.drivers))]
         return np.array(rows).reshape(len(self.rows), n)
 
-    def nu(self, q: ArrayLike, ud: ArrayLike) -> FloatArray:
+    def nu(self, q: ArrayLike, u: ArrayLike, ud: ArrayLike) -> FloatArray:
         """Right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""
-        moving = [Taylor(0.0, rate) for rate in _floats(ud)]
+        moving = [Taylor(value, rate) for value, rate in zip(_floats(u), _floats(ud), strict=True)]
         return np.array([-_derivative(phi, 1) for phi in self.evaluate(_floats(q), moving)])
 
     def gamma(self, q: ArrayLike, qd: ArrayLike, u: ArrayLike, ud: ArrayLike, udd: ArrayLike) -> FloatArray:
@@ -94,7 +95,7 @@ class System:
         return self.jacobian(q) / self.scales[:, None] * self.column_scales / self.size
 
     def gaps(self, phi: ArrayLike) -> FloatArray:
-        """By how much each joint row is open, as a length, (joint rows,)."""
+        """By how much each joint row is open, as a length or in radians by its kind, (joint rows,)."""
         values = _floats(phi)
         gaps: list[float] = []
         for joint in self.mechanism.joints:
@@ -106,7 +107,16 @@ class System:
     def measure(self, q: ArrayLike) -> FloatArray:
         """The driven quantities in a pose, (d,)."""
         at = placement(self.mechanism, _floats(q))
-        return np.array([driver.measure(at) for driver in self.mechanism.drivers])
+        return np.array([driver.measured().value(at) for driver in self.mechanism.drivers])
+
+    def gap_unit(self, row: Row) -> str:
+        """Unit of a row's gap."""
+        return "rad" if row.kind == "angle" else self.mechanism.length_unit
+
+    def relative_gaps(self, phi: ArrayLike) -> FloatArray:
+        """Sizes of the gaps with lengths over the mechanism's size, (joint rows,)."""
+        sizes = [1.0 if row.kind == "angle" else self.size for row in self.rows[: self.joint_row_count]]
+        return np.abs(self.gaps(phi)) / np.array(sizes)
 
 
 def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:

@@ -5,11 +5,47 @@ Adding a joint is one file and one line here.
 
 from __future__ import annotations
 
+from kinfmu.joints.angle import Angle
 from kinfmu.joints.coordinate import Coordinate
 from kinfmu.joints.distance import Distance
-from kinfmu.joints.joint import GROUND, Joint, Placement, Pose
+from kinfmu.joints.fixed import Fixed
+from kinfmu.joints.gear import Gear
+from kinfmu.joints.joint import Held, Joint
+from kinfmu.joints.placement import GROUND, Placement, Pose
+from kinfmu.joints.point_on_line import PointOnLine
+from kinfmu.joints.rack_and_pinion import RackAndPinion
+from kinfmu.joints.relative_angle import RelativeAngle
 from kinfmu.joints.revolute import Revolute
+from kinfmu.joints.translational import Translational
 
-JOINTS: tuple[type[Joint], ...] = (Revolute, Distance, Coordinate)
+JOINTS: tuple[type[Joint], ...] = (
+    Revolute,
+    Translational,
+    Fixed,
+    Distance,
+    PointOnLine,
+    Coordinate,
+    Angle,
+    RelativeAngle,
+    Gear,
+    RackAndPinion,
+)
 
-__all__ = ["GROUND", "JOINTS", "Coordinate", "Distance", "Joint", "Placement", "Pose", "Revolute"]
+__all__ = [
+    "GROUND",
+    "JOINTS",
+    "Angle",
+    "Coordinate",
+    "Distance",
+    "Fixed",
+    "Gear",
+    "Held",
+    "Joint",
+    "Placement",
+    "PointOnLine",
+    "Pose",
+    "RackAndPinion",
+    "RelativeAngle",
+    "Revolute",
+    "Translational",
+]

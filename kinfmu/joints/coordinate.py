@@ -3,13 +3,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Axis, Joint, Placement, PointName, body_of
+from kinfmu.joints.joint import Held
+from kinfmu.joints.measures import CoordinateOf
+from kinfmu.joints.placement import Axis, PointName
 from kinfmu.units import Length
 
 
 @dataclass(frozen=True)
-class Coordinate(Joint):
+class Coordinate(Held):
     """A world coordinate of a point, held at a value: the point slides along a line parallel to an axis.
 
         Phi = (r_i + A_i s_a)_x - value     or the same with y        (1 row, scale 1)
@@ -26,12 +27,8 @@ class Coordinate(Joint):
     axis: Axis
     value: Length = 0.0
 
-    def bodies(self) -> tuple[str, ...]:
-        return (body_of(self.of),)
-
     def moved(self, dx: float, dy: float) -> Coordinate:
         return replace(self, value=self.value + (dx if self.axis == "x" else dy))
 
-    def residual(self, at: Placement) -> tuple[Value, ...]:
-        x, y = at.point(self.of)
-        return ((x if self.axis == "x" else y) - self.value,)
+    def measured(self) -> tuple[CoordinateOf, float]:
+        return CoordinateOf(self.of, self.axis), self.value

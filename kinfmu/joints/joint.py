@@ -3,61 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, NamedTuple
+from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value, cos, sin
-
-
-class Reference(NamedTuple):
-    """What a text field of a joint refers to, so that the reader can check it and say what would be valid."""
-
-    kind: str  # "point": 'body.point', "body": a body's name, or "choice"
-    choices: tuple[str, ...] = ()
-
-
-PointName = Annotated[str, Reference("point")]
-BodyName = Annotated[str, Reference("body")]
-PointPair = Annotated[tuple[str, str], Reference("point")]
-Axis = Annotated[str, Reference("choice", ("x", "y"))]
-
-
-class Pose(NamedTuple):
-    """Where a body is: frame origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
-
-    x: Value
-    y: Value
-    phi: Value
-    c: Value
-    s: Value
-
-    @classmethod
-    def of(cls, x: Value, y: Value, phi: Value) -> Pose:
-        return cls(x, y, phi, cos(phi), sin(phi))
-
-
-GROUND = Pose(0.0, 0.0, 0.0, 1.0, 0.0)
-
-
-class Placement:
-    """The bodies in one pose of the mechanism; answers what joints ask of it, in any arithmetic.
-
-    poses: Pose by body name; points: body-fixed coordinates (s_x, s_y) by 'body.point'.
-    """
-
-    def __init__(self, poses: Mapping[str, Pose], points: Mapping[str, tuple[float, float]]) -> None:
-        self.poses = poses
-        self.points = points
-
-    def point(self, name: str) -> tuple[Value, Value]:
-        """World coordinates r + A s of 'body.point'."""
-        body = self.poses[name.partition(".")[0]]
-        s_x, s_y = self.points[name]
-        return body.x + body.c * s_x - body.s * s_y, body.y + body.s * s_x + body.c * s_y
-
-    def angle(self, body: str) -> Value:
-        """Angle phi of a body [rad]."""
-        return self.poses[body].phi
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.measures.measure import Measure
+from kinfmu.joints.placement import Placement
 
 
 class Joint(ABC):
@@ -85,14 +35,42 @@ class Joint(ABC):
         return self
 
     def scales(self) -> tuple[float, ...]:
-        """Residual per unit of length, one a row: |residual| / scale is the gap as a length, to first order."""
+        """Residual per unit of the row's kind, one a row: |residual| / scale is the gap, to first order."""
         return (1.0,) * len(self.labels)
 
     def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
-        """By how much each row is open, as a length."""
+        """By how much each row is open, in the mechanism's unit of length or in radians."""
         return tuple(r / scale for r, scale in zip(residual, self.scales(), strict=True))
 
+    def kinds(self) -> tuple[str, ...]:
+        """'length' or 'angle', one a row: what its gap is."""
+        return ("length",) * len(self.labels)
 
-def body_of(point: str) -> str:
-    """'crank' of 'crank.tip'."""
-    return point.partition(".")[0]
+
+class Held(Joint):
+    """One measured quantity, held at a value.
+
+    Phi = measure - value, or what the measure has in its place        (1 row)
+    """
+
+    @abstractmethod
+    def measured(self) -> tuple[Measure, float]:
+        """The measure and the value at which it is held."""
+
+    def bodies(self) -> tuple[str, ...]:
+        return self.measured()[0].bodies()
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        measure, value = self.measured()
+        return (measure.row(at, value),)
+
+    def scales(self) -> tuple[float, ...]:
+        measure, value = self.measured()
+        return (measure.scale(value),)
+
+    def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
+        measure, value = self.measured()
+        return (measure.gap(residual[0], value),)
+
+    def kinds(self) -> tuple[str, ...]:
+        return (self.measured()[0].kind,)

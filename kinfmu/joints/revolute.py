@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Joint, Placement, PointPair, body_of
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.placement import Placement, PointPair, body_of
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
-from kinfmu.joints.joint import Reference
+from kinfmu.joints.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number

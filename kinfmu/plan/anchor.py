@@ -46,14 +46,18 @@ def _does_not_close(system: System) -> AssemblyError:
     """The joint that is open widest where all give way alike, with its gap once the others are closed."""
     u = start_targets(system)
     pose, _ = close(system, rough_start(system), u)
-    widest = system.rows[int(np.abs(system.gaps(system.residual(pose, u))).argmax())].owner
+    widest = system.rows[int(system.relative_gaps(system.residual(pose, u)).argmax())].owner
     others = [k for k, row in enumerate(system.rows) if row.owner != widest]
     pose, _ = close(system, pose, u, others)
-    gaps = zip(system.rows, system.gaps(system.residual(pose, u)), strict=False)
-    gap = math.hypot(*(value for row, value in gaps if row.owner == widest))
+    phi = system.residual(pose, u)
+    gaps, relative = system.gaps(phi), system.relative_gaps(phi)
+    of_widest = [k for k, row in enumerate(system.rows) if row.owner == widest]
+    worst = max(of_widest, key=lambda k: relative[k])
+    same = [k for k in of_widest if system.rows[k].kind == system.rows[worst].kind]
+    gap = math.hypot(*(gaps[k] for k in same))
     return AssemblyError(
         f"the mechanism does not close near its start pose ({_at(system, u)}): with the other joints closed, "
-        f"'{widest}' stays open by {gap:.4g} {system.mechanism.length_unit}; check lengths and start poses",
+        f"'{widest}' stays open by {gap:.4g} {system.gap_unit(system.rows[worst])}; check lengths and start poses",
         joint=widest,
         gap=gap,
     )

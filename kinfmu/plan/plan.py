@@ -212,12 +212,12 @@ def plan_from(
 def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
     """Raise the InconsistentError of the first row that contradicts the others."""
     for dependent in redundancy.inconsistent:
-        unit = system.mechanism.length_unit
+        unit = system.gap_unit(dependent.row)
         raise InconsistentError(
             f"[joints.{dependent.row.owner}] contradicts the other joints: "
             f"{listed(dependent.implied_by_joints) if dependent.implied_by_joints else 'all'} leave its row "
             f"'{dependent.row.label}' open by {abs(dependent.gap):.6g} {unit}, whatever the pose; "
-            f"change a length by that gap or remove the joint",
+            f"change a dimension by that gap or remove the joint",
             joint=dependent.row.owner,
             gap=dependent.gap,
         )

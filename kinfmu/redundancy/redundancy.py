@@ -20,7 +20,7 @@ class DependentRow:
     """A row of Phi_K whose gradient is a combination of the others' at every pose of the motion that they leave.
 
     implied_by: names of the rows in that combination; any of them could be set aside in its place. gap: by how much the
-    row is open there, as a length: 0 (within CONSISTENT) makes it redundant, anything else inconsistent.
+    row is open there, as a length or in radians: 0 (within CONSISTENT) makes it redundant, anything else inconsistent.
     """
 
     row: Row
@@ -77,9 +77,10 @@ def find_redundancy(system: System) -> Redundancy:
             continue
         kept = others
         u = np.zeros(len(system.mechanism.drivers))
-        gap = max((float(system.gaps(system.residual(pose, u))[index]) for pose in poses), key=abs)
+        residuals = [system.residual(pose, u) for pose in poses]
+        gap = max((float(system.gaps(phi)[index]) for phi in residuals), key=abs)
         implied_by = _implied_by(system, poses, index, others)
-        consistent = abs(gap) <= CONSISTENT * system.size
+        consistent = all(system.relative_gaps(phi)[index] <= CONSISTENT for phi in residuals)
         dependent.insert(0, DependentRow(system.rows[index], index, implied_by, gap, consistent))
     return Redundancy(free - len(kept), tuple(kept), tuple(dependent))
 

@@ -66,7 +66,7 @@ def test_velocity_and_acceleration_equations_hold_along_any_motion(
     target = [Series([u, ud, udd / 2])]
     first = np.array([float(phi.c[1]) for phi in system.evaluate(motion, target)])
     tolerance = 10 * ROUNDING * size(system, q, qd, qdd)
-    np.testing.assert_allclose(system.jacobian(q) @ qd - system.nu(q, [ud]), first, rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(system.jacobian(q) @ qd - system.nu(q, [u], [ud]), first, rtol=0.0, atol=tolerance)
     second = system.jacobian(q) @ qdd - system.gamma(q, qd, [u], [ud], [udd])
     np.testing.assert_allclose(second, second_derivative(system, motion, target), rtol=0.0, atol=tolerance)
 
@@ -77,9 +77,10 @@ def test_a_driver_holds_when_its_target_is_what_it_measures(cls: type[Driver], d
     system = data.draw(systems(cls))
     q = data.draw(poses(system))
     measured = system.measure(q)
-    assert system.residual(q, measured).tolist() == [0.0]
-    assert system.residual(q, measured + 0.5) == pytest.approx([-0.5], abs=1e-12)
-    assert system.nu(q, [1.0]).tolist() == [1.0]
+    scale = system.mechanism.drivers[0].measured().scale(float(measured[0]))
+    assert system.residual(q, measured) == pytest.approx([0.0], abs=1e-13)
+    assert system.residual(q, measured + 1e-6) == pytest.approx([-1e-6 * scale], rel=1e-3, abs=2e-12)
+    assert system.nu(q, measured, [1.0]) == pytest.approx([scale])
 
 
 @every_driver

@@ -65,7 +65,7 @@ def test_position_velocity_and_acceleration_of_the_oracle_satisfy_the_equations(
     q, qd, qdd = motion(u, ud, udd)
     jacobian = system.jacobian(q)
     np.testing.assert_allclose(system.residual(q, [u]), 0.0, atol=4e-15)
-    np.testing.assert_allclose(jacobian @ qd, system.nu(q, [ud]), atol=4e-15)
+    np.testing.assert_allclose(jacobian @ qd, system.nu(q, [u], [ud]), atol=4e-15)
     np.testing.assert_allclose(jacobian @ qdd, system.gamma(q, qd, [u], [ud], [udd]), atol=4e-15)
 
 

@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from kinfmu.drivers import LAWS, Driver, Law
 from kinfmu.equations.system import System
 from kinfmu.joints import Joint
-from kinfmu.joints.joint import Reference
+from kinfmu.joints.placement import Reference
 from kinfmu.mechanism import Body, Mechanism, Point, Start
 from kinfmu.units import Quantity
 from tests.power_series import Series
 
-POINTS = {"ground": "O", "left": "P", "right": "Q"}
+POINTS = {"ground": "O", "left": "P", "right": "Q", "third": "R"}
 coordinates = st.floats(-3.0, 3.0).map(lambda x: round(x, 6))  # no numbers so small that their products vanish
 lengths = st.floats(0.1, 4.0)
 angles = st.floats(-7.0, 7.0).map(lambda x: round(x, 6))
 
 
 def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
-    """Members of a joint or driver class between the bodies ground, left and right."""
+    """Members of a joint or driver class between ground, left and right; `third` is for what a joint needs besides."""
     hints = get_type_hints(cls, include_extras=True)
     drawn = {"name": st.just("member"), **given}
     for key in fields(cls):
@@ -44,17 +44,18 @@ def _values(cls: type[Any], key: str, hint: Any) -> st.SearchStrategy[Any]:
         if isinstance(said, Quantity):
             return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[said.kind]
         if isinstance(said, Reference):
-            return _references(said, is_pair=bool(get_args(hint.__origin__)))
+            beside = "between" in {field.name for field in fields(cls)}
+            return _references(said, is_pair=bool(get_args(hint.__origin__)), beside=beside)
     raise NotImplementedError(f"{cls.__name__}.{key}: tests/joints/drawn.py does not know how to draw {hint}")
 
 
-def _references(reference: Reference, *, is_pair: bool) -> st.SearchStrategy[Any]:
+def _references(reference: Reference, *, is_pair: bool, beside: bool) -> st.SearchStrategy[Any]:
     if reference.kind == "choice":
         return st.sampled_from(reference.choices)
     names = {"point": {body: f"{body}.{point}" for body, point in POINTS.items()}, "body": {b: b for b in POINTS}}
     of = names[reference.kind]
     if not is_pair:
-        return st.sampled_from([of["left"], of["right"]])
+        return st.sampled_from([of["third"]] if beside else [of["left"], of["right"]])
     bodies = [("left", "right"), ("right", "left"), ("ground", "left"), ("right", "ground")]
     return st.sampled_from([(of[a], of[b]) for a, b in bodies])
 
@@ -66,7 +67,7 @@ def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
 
 @st.composite
 def systems(draw: st.DrawFn, member: type[Joint] | type[Driver], **given: st.SearchStrategy[Any]) -> System:
-    """A ground and two bodies with a drawn point each, and one drawn joint or driver; `given`: its keys."""
+    """A ground and three bodies with a drawn point each, and one drawn joint or driver; `given`: its keys."""
     bodies = [
         Body(
             name,

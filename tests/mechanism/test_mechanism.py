@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kinfmu import gallery
-from kinfmu.drivers import Angle, ConstantSpeed
+from kinfmu.drivers import AngleDriver, ConstantSpeed
 from kinfmu.errors import KinfmuError, MechanismError
 from kinfmu.joints import Coordinate, Distance, Joint, Revolute
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
@@ -61,7 +61,7 @@ def test_members_of_one_name_are_told() -> None:
     pin = Revolute("O", ("ground.O", "bar.P"))
     assert told(pin, pin) == "[joints] 'O' is there twice"
     assert told(bodies=(BAR, BAR)) == "[bodies] 'bar' is there twice"
-    assert told(drivers=(Angle("m", "bar"), Angle("m", "bar"))) == "[drivers] 'm' is there twice"
+    assert told(drivers=(AngleDriver("m", "bar"), AngleDriver("m", "bar"))) == "[drivers] 'm' is there twice"
 
 
 def test_points_of_a_joint_must_be_a_pair_of_names() -> None:
@@ -95,7 +95,7 @@ def test_what_is_no_number_is_told_wherever_it_stands(value: Any, why: str) -> N
         return message.startswith(f"{where} = {quoted(value)} {why}")
 
     assert starts(told(Coordinate("g", "bar.P", "x", value)), "[joints.g] value")
-    assert starts(told(drivers=(Angle("m", "bar", ConstantSpeed(0.0, value)),)), "[drivers.m] speed")
+    assert starts(told(drivers=(AngleDriver("m", "bar", ConstantSpeed(0.0, value)),)), "[drivers.m] speed")
     if value is not None:  # None leaves a start coordinate to assembly
         assert starts(told(bodies=(Body("bar", {}, Start(value)),)), "[bodies.bar] start.x")
     with pytest.raises(MechanismError) as caught:

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinfmu import gallery
-from kinfmu.drivers import Angle, ConstantSpeed
+from kinfmu.drivers import AngleDriver, ConstantSpeed
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Revolute
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
@@ -54,7 +54,8 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
             joints.append(Coordinate(next(joint_names), of, draw(st.sampled_from("xy")), draw(numbers)))
     law = st.builds(ConstantSpeed, numbers, numbers)
     drivers = [
-        Angle(name, draw(st.sampled_from(bodies)), draw(law)) for name in draw(st.lists(names, max_size=2, unique=True))
+        AngleDriver(name, draw(st.sampled_from(bodies)), draw(law))
+        for name in draw(st.lists(names, max_size=2, unique=True))
     ]
     targets = [f"{body.name}.{point}" for body in made for point in body.points]
     of_interest = draw(st.dictionaries(names.filter(lambda n: n not in bodies), st.sampled_from(targets), max_size=3))
@@ -120,7 +121,7 @@ def test_numpys_numbers_are_written_as_numbers() -> None:
         Body("bar", {"P": Point(one, one)}, Start(one, None, np.float32(2))),
     )
     joints = (Distance("rod", ("ground.O", "bar.P"), one), Coordinate("guide", "bar.P", "x", np.int64(3)))
-    drivers = (Angle("motor", "bar", ConstantSpeed(one, one)),)
+    drivers = (AngleDriver("motor", "bar", ConstantSpeed(one, one)),)
     mechanism = Mechanism("numbers", bodies, joints, drivers, run=RunSettings(np.float64(0), one, one))
     assert parse(text(mechanism)) == mechanism
 

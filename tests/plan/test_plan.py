@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from kinfmu import Angle, Body, ConstantSpeed, Mechanism, Revolute, load, solve
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, load, solve
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MechanismError, MobilityError
 from kinfmu.plan import compile_plan, determinant_formula
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -104,7 +104,7 @@ def test_too_few_and_too_many_drivers_are_told_apart() -> None:
     bodies, joints = fourbar(4, 1, 3.5, 3).bodies, fourbar(4, 1, 3.5, 3).joints
     with pytest.raises(MobilityError, match=r"mobility is 1 but there is no driver: 1 more driver is needed"):
         compile_plan(Mechanism("m", bodies, joints))
-    two = [Angle("a", "crank"), Angle("b", "rocker")]
+    two = [AngleDriver("a", "crank"), AngleDriver("b", "rocker")]
     with pytest.raises(MobilityError, match=r"mobility is 1 but there are 2 drivers \(a, b\): remove 1"):
         compile_plan(Mechanism("m", bodies, joints, two))
     five = five_bar()
@@ -115,7 +115,7 @@ def test_too_few_and_too_many_drivers_are_told_apart() -> None:
 def test_two_drivers_on_one_freedom_are_refused() -> None:
     five = five_bar()
     with pytest.raises(MobilityError, match="a, b do not determine the motion"):
-        compile_plan(Mechanism("m", five.bodies, five.joints, [Angle("a", "left"), Angle("b", "left")]))
+        compile_plan(Mechanism("m", five.bodies, five.joints, [AngleDriver("a", "left"), AngleDriver("b", "left")]))
 
 
 def test_a_rough_start_pose_is_assembled() -> None:
@@ -146,7 +146,7 @@ def test_what_does_not_close_is_told_with_its_widest_gap() -> None:
             Body("rocker", {"C": (0, 0), "Q": (3, 0)}, (9, 0, 1.9)),
         ],
         fourbar(4, 1, 3.5, 3).joints,
-        [Angle("crank", "crank", ConstantSpeed(1.0, 1.0))],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
     with pytest.raises(AssemblyError, match=r"\(crank = 1 rad .*\): with the other joints closed, '.' stays open by"):
         compile_plan(mechanism)
@@ -175,7 +175,7 @@ def test_a_mechanism_of_assignments_alone_needs_no_solve() -> None:
         "pendulum",
         [Body("ground", {"O": (0, 0)}), Body("bob", {"O": (0, 0), "tip": (2, 0)})],
         [Revolute("O", ("ground.O", "bob.O"))],
-        [Angle("motor", "bob", ConstantSpeed(0.5, 1.0))],
+        [AngleDriver("motor", "bob", ConstantSpeed(0.5, 1.0))],
         points={"tip": "bob.tip"},
     )
     plan = compile_plan(mechanism)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Angle, Body, Distance, Mechanism, Revolute
+from kinfmu import AngleDriver, Body, Distance, Mechanism, Revolute
 from kinfmu.equations import System
 from kinfmu.errors import InconsistentError
 from kinfmu.redundancy import find_redundancy
@@ -67,7 +67,7 @@ def test_of_two_equal_bars_the_later_one_is_set_aside() -> None:
             Distance("first", ("crank.P", "rocker.Q"), 3.5),
             Distance("second", ("rocker.Q", "crank.P"), 3.5),
         ],
-        [Angle("crank", "crank")],
+        [AngleDriver("crank", "crank")],
     )
     (row,) = find_redundancy(System(mechanism)).redundant
     assert row.row.owner == "second"

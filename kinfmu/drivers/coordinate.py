@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from kinfmu.drivers.constant_speed import ConstantSpeed
+from kinfmu.drivers.driver import Driver
+from kinfmu.drivers.law import Law
+from kinfmu.joints.measures import CoordinateOf
+from kinfmu.joints.placement import Axis, PointName
+from kinfmu.units import Quantity
+
+
+@dataclass(frozen=True)
+class CoordinateDriver(Driver):
+    """A world coordinate of a point, driven.
+
+        Phi = (r_i + A_i s_a)_x - u(t)     or the same with y        (1 row)
+
+    of: the point; axis: "x" or "y"; law: u(t) [length]. Haug (1989), driving constraints.
+    """
+
+    type: ClassVar[str] = "coordinate"
+    noun: ClassVar[str] = "position"
+    quantity: ClassVar[Quantity] = Quantity("length")
+
+    name: str
+    of: PointName
+    axis: Axis
+    law: Law = field(default_factory=ConstantSpeed)
+
+    def measured(self) -> CoordinateOf:
+        return CoordinateOf(self.of, self.axis)

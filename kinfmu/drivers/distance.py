@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from kinfmu.drivers.constant_speed import ConstantSpeed
+from kinfmu.drivers.driver import Driver
+from kinfmu.drivers.law import Law
+from kinfmu.joints.measures import DistanceBetween
+from kinfmu.joints.placement import PointPair
+from kinfmu.units import Quantity
+
+
+@dataclass(frozen=True)
+class DistanceDriver(Driver):
+    """The distance of two points, driven: a cylinder between two bodies.
+
+        Phi = d.d - u(t)^2,   d = r_j + A_j s_b - r_i - A_i s_a        (1 row)
+
+    between: the two points; law: u(t) > 0 [length]. Haug (1989), driving constraints.
+    """
+
+    type: ClassVar[str] = "distance"
+    noun: ClassVar[str] = "length"
+    quantity: ClassVar[Quantity] = Quantity("length")
+
+    name: str
+    between: PointPair
+    law: Law = field(default_factory=ConstantSpeed)
+
+    def measured(self) -> DistanceBetween:
+        return DistanceBetween(*self.between)

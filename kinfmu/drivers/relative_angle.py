@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from kinfmu.drivers.constant_speed import ConstantSpeed
+from kinfmu.drivers.driver import Driver
+from kinfmu.drivers.law import Law
+from kinfmu.joints.measures import AngleBetween
+from kinfmu.joints.placement import BodyPair
+from kinfmu.units import Quantity
+
+
+@dataclass(frozen=True)
+class RelativeAngleDriver(Driver):
+    """The angle of one body against another, driven: a motor in a joint between moving bodies.
+
+        Phi = phi_j - phi_i - u(t)        (1 row)
+
+    between: bodies i and j; law: u(t) [rad]. Haug (1989), driving constraints.
+    """
+
+    type: ClassVar[str] = "relative_angle"
+    noun: ClassVar[str] = "angle"
+    quantity: ClassVar[Quantity] = Quantity("angle")
+
+    name: str
+    between: BodyPair
+    law: Law = field(default_factory=ConstantSpeed)
+
+    def measured(self) -> AngleBetween:
+        return AngleBetween(self.between[1], self.between[0])

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from kinfmu.drivers.constant_speed import ConstantSpeed
+from kinfmu.drivers.driver import Driver
+from kinfmu.drivers.law import Law
+from kinfmu.joints.measures import PositionAlong
+from kinfmu.joints.placement import PointPair
+from kinfmu.units import Quantity, Radians
+
+
+@dataclass(frozen=True)
+class SlideDriver(Driver):
+    """The position along a slide, driven: a linear actuator.
+
+        Phi = e.d - u(t),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row)
+
+    between: a point of the slide on body i, then the moved point of body j; axis: direction e in i's frame [rad];
+    law: u(t) [length]. Haug (1989), driving constraints.
+    """
+
+    type: ClassVar[str] = "slide"
+    noun: ClassVar[str] = "position"
+    quantity: ClassVar[Quantity] = Quantity("length")
+
+    name: str
+    between: PointPair
+    axis: Radians = 0.0
+    law: Law = field(default_factory=ConstantSpeed)
+
+    def measured(self) -> PositionAlong:
+        return PositionAlong(*self.between, self.axis)

@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.measures import AngleBetween
+from kinfmu.joints.placement import Placement, PointPair, body_of
+from kinfmu.units import Radians
+
+
+@dataclass(frozen=True)
+class Fixed(Joint):
+    """Two bodies welded together.
+
+        Phi = [r_j + A_j s_b - r_i - A_i s_a; phi_j - phi_i - angle]        (3 rows, scales 1)
+
+    between: the two points 'body.point' that coincide; angle: of body j against body i [rad]. Haug (1989).
+    """
+
+    type: ClassVar[str] = "fixed"
+    labels: ClassVar[tuple[str, ...]] = ("x", "y", "angle")
+
+    name: str
+    between: PointPair
+    angle: Radians = 0.0
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(body_of(point) for point in self.between)
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        i, j = self.bodies()
+        a_x, a_y = at.point(self.between[0])
+        b_x, b_y = at.point(self.between[1])
+        return b_x - a_x, b_y - a_y, AngleBetween(j, i).row(at, self.angle)
+
+    def kinds(self) -> tuple[str, ...]:
+        return "length", "length", "angle"

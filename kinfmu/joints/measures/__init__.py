@@ -1,0 +1,11 @@
+"""Measures: quantities of a pose that a joint holds, a driver drives, or a joint couples to one another."""
+
+from __future__ import annotations
+
+from kinfmu.joints.measures.angle import AngleBetween
+from kinfmu.joints.measures.coordinate import CoordinateOf
+from kinfmu.joints.measures.distance import DistanceBetween
+from kinfmu.joints.measures.measure import Measure
+from kinfmu.joints.measures.slide import OffsetFrom, PositionAlong
+
+__all__ = ["AngleBetween", "CoordinateOf", "DistanceBetween", "Measure", "OffsetFrom", "PositionAlong"]

@@ -1,0 +1,26 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.measures.measure import Measure
+from kinfmu.joints.placement import Placement, body_of
+
+
+@dataclass(frozen=True)
+class CoordinateOf(Measure):
+    """World coordinate of a point, along axis 'x' or 'y'."""
+
+    kind: ClassVar[str] = "length"
+    is_absolute: ClassVar[bool] = True
+
+    of: str
+    axis: str
+
+    def bodies(self) -> tuple[str, ...]:
+        return (body_of(self.of),)
+
+    def value(self, at: Placement) -> Value:
+        x, y = at.point(self.of)
+        return x if self.axis == "x" else y

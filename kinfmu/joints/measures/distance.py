@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value, sqrt
+from kinfmu.joints.measures.measure import Measure
+from kinfmu.joints.placement import Placement, body_of
+
+
+@dataclass(frozen=True)
+class DistanceBetween(Measure):
+    """Distance of two points, L = |d|; its row d.d - L^2 needs no root and is smooth for every d."""
+
+    kind: ClassVar[str] = "length"
+
+    a: str
+    b: str
+
+    def bodies(self) -> tuple[str, ...]:
+        return body_of(self.a), body_of(self.b)
+
+    def value(self, at: Placement) -> Value:
+        return sqrt(self._squared(at))
+
+    def row(self, at: Placement, target: Value) -> Value:
+        return self._squared(at) - target * target
+
+    def scale(self, target: float) -> float:
+        return 2.0 * target
+
+    def gap(self, residual: float, target: float) -> float:
+        return math.sqrt(max(residual + target * target, 0.0)) - target
+
+    def _squared(self, at: Placement) -> Value:
+        a_x, a_y = at.point(self.a)
+        b_x, b_y = at.point(self.b)
+        d_x, d_y = b_x - a_x, b_y - a_y
+        return d_x * d_x + d_y * d_y

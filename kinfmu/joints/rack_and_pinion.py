@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.errors import MechanismError
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.measures import AngleBetween, PositionAlong
+from kinfmu.joints.placement import BodyName, Placement, PointPair, body_of
+from kinfmu.units import Length, Radians
+
+
+@dataclass(frozen=True)
+class RackAndPinion(Joint):
+    """A rack that slides on the body that holds the pinion: its way is the arc that the pinion rolls.
+
+        Phi = e.d - radius (phi_k - phi_i) - offset,   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
+
+    between: a point of body i, which holds pinion and slide, then a point of the rack j; axis: direction e of the slide
+    in i's frame [rad]; pinion: body k; radius: of its pitch circle, negative if the rack runs back as the pinion turns
+    on; offset: way of the rack where the pinion stands at 0 against i [length]. After Haug (1989), rack and pinion.
+    """
+
+    type: ClassVar[str] = "rack_and_pinion"
+    labels: ClassVar[tuple[str, ...]] = ("way",)
+
+    name: str
+    between: PointPair
+    pinion: BodyName
+    radius: Length
+    axis: Radians = 0.0
+    offset: Length = 0.0
+
+    def __post_init__(self) -> None:
+        if self.radius == 0.0:
+            raise MechanismError(f"[joints.{self.name}] radius = 0.0 must be other than 0", joint=self.name)
+        if self.pinion in map(body_of, self.between):
+            raise MechanismError(
+                f"[joints.{self.name}] pinion = '{self.pinion}' must be another body than the rack and what holds it",
+                joint=self.name,
+            )
+
+    def bodies(self) -> tuple[str, ...]:
+        return (*map(body_of, self.between), self.pinion)
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        way = PositionAlong(*self.between, self.axis).value(at)
+        turn = AngleBetween(self.pinion, body_of(self.between[0])).value(at)
+        return (way - self.radius * turn - self.offset,)
