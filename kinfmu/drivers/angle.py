@@ -1,3 +1,5 @@
+"""The driver of a body's angle."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

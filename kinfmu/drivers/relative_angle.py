@@ -1,3 +1,5 @@
+"""The driver of an angle between bodies."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

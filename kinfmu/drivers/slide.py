@@ -1,3 +1,5 @@
+"""The driver of a position along a slide."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

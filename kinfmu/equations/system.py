@@ -116,7 +116,7 @@ class System:
     def relative_gaps(self, phi: ArrayLike) -> FloatArray:
         """Sizes of the gaps with lengths over the mechanism's size, (joint rows,)."""
         sizes = [1.0 if row.kind == "angle" else self.size for row in self.rows[: self.joint_row_count]]
-        return np.abs(self.gaps(phi)) / np.array(sizes)
+        return np.asarray(np.abs(self.gaps(phi)) / np.array(sizes), dtype=float)
 
 
 def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:

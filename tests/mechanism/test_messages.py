@@ -32,6 +32,9 @@ def changed(old: str, new: str) -> str:
     return FOURBAR.replace(old, new, 1)
 
 
+TYPES = (
+    "revolute, translational, fixed, distance, point_on_line, coordinate, angle, relative_angle, gear, rack_and_pinion"
+)
 LENGTHS = "m, mm, cm, um, km, in, ft"
 NAME_RULE = "must be letters, digits and underscores, no digit first, at most 100 in all"
 
@@ -87,17 +90,17 @@ CHANGES = {
     "a type that is missing": (
         'type = "revolute"',
         "",
-        "[joints.O] needs the key 'type', one of revolute, distance, coordinate",
+        f"[joints.O] needs the key 'type', one of {TYPES}",
     ),
     "a type that is not known": (
         'type = "revolute"',
         'type = "revolut"',
-        "[joints.O] type = 'revolut' is not known; did you mean 'revolute'?; known: revolute, distance, coordinate",
+        f"[joints.O] type = 'revolut' is not known; did you mean 'revolute'?; known: {TYPES}",
     ),
     "a type that is no text": (
         'type = "revolute"',
         "type = 1",
-        "[joints.O] type = 1 must be one of revolute, distance, coordinate",
+        f"[joints.O] type = 1 must be one of {TYPES}",
     ),
     "a law that is missing": (
         'law = "constant_speed"',

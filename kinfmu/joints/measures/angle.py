@@ -1,3 +1,5 @@
+"""The angle of a body."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

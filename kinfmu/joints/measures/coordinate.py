@@ -1,3 +1,5 @@
+"""A world coordinate of a point."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

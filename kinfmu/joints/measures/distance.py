@@ -1,3 +1,5 @@
+"""The distance of two points."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Where a point lies against an axis of another body."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
