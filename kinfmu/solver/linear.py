@@ -11,11 +11,6 @@ class Singular(ArithmeticError):  # noqa: N818  # a state of the matrix, not a f
     """A matrix has no usable pivot left."""
 
 
-def solve(matrix: Matrix, right: list[float]) -> list[float]:
-    """x with A x = b, A (k, k), by LU with row equilibration and partial pivoting."""
-    return lu_solve(factor(matrix), right)
-
-
 class LU:
     """Factors of an equilibrated matrix with its row order; `determinant` is that of the rows scaled to unit length."""
 

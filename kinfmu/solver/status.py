@@ -14,7 +14,3 @@ class Status(IntEnum):
     OUTSIDE = 3  # the drivers cannot take the mechanism there
     INCONSISTENT = 4  # a constraint set aside as redundant does not hold there
     NOT_CONVERGED = 5
-
-    @property
-    def has_numbers(self) -> bool:
-        return self <= Status.BRIDGED
