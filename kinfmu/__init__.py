@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from kinfmu import draw as draw
     from kinfmu import log as log
     from kinfmu.analysis import Report as Report
     from kinfmu.analysis import check as check
@@ -85,6 +86,8 @@ _HOME = {
     "solve": "kinfmu.sweep",
 }
 
+_ROOMS = ("draw", "log")
+
 __all__ = [
     "VERSION",
     "Angle",
@@ -114,6 +117,7 @@ __all__ = [
     "Translational",
     "build",
     "check",
+    "draw",
     "load",
     "log",
     "save",
@@ -124,8 +128,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name from its home when it is first used."""
-    if name == "log":
-        return import_module("kinfmu.log")
+    if name in _ROOMS:
+        return import_module(f"kinfmu.{name}")
     if name in _HOME:
         value = globals()[name] = getattr(import_module(_HOME[name]), name)
         return value
@@ -133,4 +137,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, "log"])
+    return sorted([*globals(), *_HOME, *_ROOMS])

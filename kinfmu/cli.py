@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 LONG_RUN = 2000  # samples from which a progress bar is worth a line
 TABLES = (".csv", ".parquet", ".npz")
+FIGURES = (".svg", ".png")
 
 
 class _MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
@@ -191,10 +192,18 @@ def new(mechanism: str, file: Path) -> None:
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("--json", "as_json", is_flag=True, help="Findings for programs.")
 @click.option("--matrices", is_flag=True, help="Jacobians at the start pose and singular points.")
-def check(mechanism: str, as_json: bool, matrices: bool) -> None:
+@click.option(
+    "--figure",
+    "picture",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Draw the mechanism with names: .svg or .png.",
+)
+def check(mechanism: str, as_json: bool, matrices: bool, picture: Path | None) -> None:
     """Mobility, redundant and contradicting constraints, plan, singular points and range."""
     from kinfmu.analysis import check as checked
 
+    if picture is not None and picture.suffix.lower() not in FIGURES:
+        raise click.UsageError(f"--figure {picture}: a figure ends in one of {listed(FIGURES)}")
     mech = gallery.load(mechanism)
     with _about(mechanism):
         report = checked(mech)
@@ -208,8 +217,14 @@ def check(mechanism: str, as_json: bool, matrices: bool) -> None:
         if matrices and report.problem is None:
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
-    if report.problem is not None:
-        with _about(mechanism):
+    with _about(mechanism):
+        if picture is not None:
+            from kinfmu.draw import figure
+
+            figure(mech, picture)
+            if not as_json:
+                click.echo(f"  figure      {picture}")
+        if report.problem is not None:
             raise report.problem
 
 

@@ -9,6 +9,7 @@
     |-- PoseError               a sample that cannot be reached, or where the solver gave up
     |-- FmuError                building or stepping an FMU
     |-- LogError                writing or reading a log
+    |-- FigureError             drawing a figure
     |-- MissingPackageError     an optional package is not installed
 
 Each message is one line that names the thing, the value and what would be valid; the data stay on the exception.
@@ -63,6 +64,10 @@ class FmuError(KinfmuError):
 
 class LogError(KinfmuError):
     """Writing or reading a log failed."""
+
+
+class FigureError(KinfmuError):
+    """Drawing or writing a figure failed."""
 
 
 class MissingPackageError(KinfmuError):

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.errors import LogError
-from kinfmu.log import palette
 from kinfmu.log.blueprint import compared
 from kinfmu.log.card import plain
 from kinfmu.log.clock import nanoseconds
@@ -19,6 +18,7 @@ from kinfmu.log.scene import drawable
 from kinfmu.log.series import Group, groups
 from kinfmu.log.verdict import sentence
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes import palette
 
 APPLICATION = "kinfmu_compare"  # its own, for its blueprint is another
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.log import palette
 from kinfmu.log.blocks import send
-from kinfmu.log.scene import DrawnGuide, Scene, world
+from kinfmu.log.scene import DrawnGuide, Scene
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes import palette
+from kinfmu.shapes.placing import world
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -23,7 +23,6 @@ from uuid import uuid4
 import numpy as np
 
 from kinfmu.errors import LogError
-from kinfmu.log import palette
 from kinfmu.log.blocks import APPLICATION, send
 from kinfmu.log.blueprint import single
 from kinfmu.log.card import card
@@ -34,6 +33,7 @@ from kinfmu.log.series import Group, accuracy, error_estimates, groups, iteratio
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.run import Run
+from kinfmu.shapes import palette
 from kinfmu.solver.status import Status
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from kinfmu.log import palette
 from kinfmu.log.scene import Scene
 from kinfmu.run import FloatArray
+from kinfmu.shapes import palette
 
 _LINE = "=" * 80
 _TIME = f"{_LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Coordinate, Distance, Revolute
-from kinfmu.joints.joint import Joint
+from kinfmu.joints import Coordinate, Distance
 from kinfmu.mechanism import toml_file
-from kinfmu.mechanism.body import GROUND_NAME, Body
-from kinfmu.mechanism.mechanism import COORDINATES, Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
-
-FLAT = 1e-6  # points nearer to one line than this part of their extent count as a line
+from kinfmu.shapes.outline import outline, points_of
+from kinfmu.shapes.pins import names_in, pins_of
+from kinfmu.shapes.placing import poses_of, world
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +89,9 @@ def drawable(run: Run) -> tuple[Scene | None, str]:
 
 def scene(run: Run, mechanism: Mechanism) -> Scene:
     """The drawable part of `run`."""
-    poses, left_out = _poses(run, mechanism)
+    poses, left_out = poses_of(run, mechanism)
     points = mechanism.body_points
-    used = {text for joint in mechanism.joints for text in _texts(joint)}
+    used = {text for joint in mechanism.joints for text in names_in(joint)}
 
     def track(point: str) -> FloatArray | None:
         body = point.partition(".")[0]
@@ -100,7 +100,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         return world(poses[body], points[point]) if body in poses else None
 
     bodies = tuple(
-        DrawnBody(body.name, index, outline(_coordinates(body)), poses[body.name])
+        DrawnBody(body.name, index, outline(points_of(body)), poses[body.name])
         for index, body in enumerate(mechanism.moving_bodies)
         if body.name in poses
     )
@@ -118,7 +118,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         for name, point in points.items()
         if name in used and name.startswith(f"{GROUND_NAME}.")
     }
-    pins = [pin for joint in mechanism.joints for point in _pins_of(joint, points) if (pin := track(point)) is not None]
+    pins = [pin for joint in mechanism.joints for point in pins_of(joint, points) if (pin := track(point)) is not None]
     return Scene(
         bodies,
         tuple(bars),
@@ -131,87 +131,6 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     )
 
 
-def world(pose: FloatArray, s: tuple[float, float]) -> FloatArray:
-    """World coordinates r + A s, (n, 2), of the body-fixed point s under poses (n, 3)."""
-    x, y, phi = pose.T
-    c, sin = np.cos(phi), np.sin(phi)
-    return np.column_stack([x + c * s[0] - sin * s[1], y + sin * s[0] + c * s[1]])
-
-
-def outline(points: FloatArray) -> FloatArray:
-    """A polyline (k, 2) that makes a link out of its points (p, 2): along them, or around them and to those inside."""
-    points = np.unique(points, axis=0)
-    if len(points) < 3:
-        return points
-    centred = points - points.mean(axis=0)
-    _, extents, directions = np.linalg.svd(centred, full_matrices=False)
-    if extents[1] <= FLAT * extents[0]:
-        return points[np.argsort(centred @ directions[0])]
-    hull = _hull(points)
-    rim, inside = points[hull], np.delete(points, hull, axis=0)
-    nearest = [int(np.argmin(np.hypot(*(rim - point).T))) for point in inside]
-    route = []
-    for k, corner in enumerate(rim):
-        route.append(corner)
-        for point, home in zip(inside, nearest, strict=True):
-            if home == k:
-                route += [point, corner]  # a spoke, there and back
-    return np.array([*route, rim[0]])
-
-
-def _hull(points: FloatArray) -> list[int]:
-    """Indices of the convex hull of points sorted by x then y, counter-clockwise (Andrew's monotone chain)."""
-
-    def chain(order: range) -> list[int]:
-        kept: list[int] = []
-        for index in order:
-            while len(kept) > 1:
-                (a_x, a_y), (b_x, b_y) = points[kept[-1]] - points[kept[-2]], points[index] - points[kept[-2]]
-                if a_x * b_y - a_y * b_x > 0.0:
-                    break
-                kept.pop()
-            kept.append(index)
-        return kept[:-1]
-
-    return chain(range(len(points))) + chain(range(len(points) - 1, -1, -1))
-
-
-def _poses(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
-    """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing."""
-    columns = {name: run.values[:, k] for k, name in enumerate(run.outputs)}
-    columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
-    poses, left_out = {}, {}
-    for body in mechanism.moving_bodies:
-        names = [f"{body.name}.{coordinate}" for coordinate in COORDINATES]
-        missing = tuple(name for name in names if name not in columns)
-        if missing:
-            left_out[body.name] = missing
-        else:
-            pose = np.column_stack([columns[name] for name in names])
-            known = run.good & np.isfinite(pose).all(axis=1)
-            poses[body.name] = np.where(known[:, None], pose, np.nan)
-    return poses, left_out
-
-
-def _pins_of(joint: Joint, points: Mapping[str, object]) -> list[str]:
-    """Points 'body.point' where a joint is drawn; those of a revolute joint coincide."""
-    named = [text for text in _texts(joint) if text in points]
-    return named[:1] if isinstance(joint, Revolute) else named
-
-
-def _texts(joint: Joint) -> list[str]:
-    found: list[str] = []
-    for key in fields(joint):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
-        value = getattr(joint, key.name)
-        found += [one for one in (value if isinstance(value, tuple) else (value,)) if isinstance(one, str)]
-    return found
-
-
-def _coordinates(body: Body) -> FloatArray:
-    """Body-fixed points (p, 2), the frame's origin for a body that names none."""
-    return np.array([tuple(point) for point in body.points.values()] or [(0.0, 0.0)])
-
-
 def _bounds(
     mechanism: Mechanism, poses: Mapping[str, FloatArray], supports: Mapping[str, tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray]:
@@ -221,7 +140,7 @@ def _bounds(
         if body.name in poses:
             pose = poses[body.name]
             pose = pose[np.isfinite(pose).all(axis=1)]
-            corners += [world(pose, (x, y)) for x, y in _coordinates(body)]
+            corners += [world(pose, (x, y)) for x, y in points_of(body)]
     everything = np.vstack(corners)
     if not len(everything):
         everything = np.zeros((1, 2))

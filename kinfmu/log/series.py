@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.log import palette
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes import palette
 from kinfmu.units import Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")

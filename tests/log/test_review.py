@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from kinfmu.errors import LogError
-from kinfmu.log import headless, palette, review, reviewing, write_mcap
+from kinfmu.log import headless, review, reviewing, write_mcap
 from kinfmu.run import Run
+from kinfmu.shapes import palette
 from tests.log.runs import fourbar
 
 

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from kinfmu.log.scene import Scene, drawable, outline, world
+from kinfmu.log.scene import Scene, drawable
 from kinfmu.run import Run
+from kinfmu.shapes.placing import world
 from tests.log.runs import DEGREE
 
 
@@ -75,21 +76,3 @@ def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
     found, note = drawable(dataclasses.replace(run, mechanism_text="name = ["))
     assert found is None
     assert note.startswith("Not drawn: the run's mechanism: not valid TOML")
-
-
-@pytest.mark.parametrize(
-    ("points", "expected"),
-    [
-        ([(0, 0)], [(0, 0)]),
-        ([(1, 0), (0, 0)], [(0, 0), (1, 0)]),
-        ([(0, 0), (2, 2), (1, 1)], [(0, 0), (1, 1), (2, 2)]),
-        ([(0, 0), (4, 0), (0, 4)], [(0, 0), (4, 0), (0, 4), (0, 0)]),
-        ([(0, 0), (4, 0), (0, 4), (1, 1)], [(0, 0), (1, 1), (0, 0), (4, 0), (0, 4), (0, 0)]),
-    ],
-    ids=["point", "bar", "three-in-a-line", "triangle", "triangle-with-a-point-inside"],
-)
-def test_a_link_is_drawn_through_all_its_points(points: list[tuple[int, int]], expected: list[tuple[int, int]]) -> None:
-    drawn = outline(np.array(points, dtype=float))
-    if len(expected) == 3:  # a line has two directions
-        drawn = drawn[np.lexsort(drawn.T)]
-    np.testing.assert_array_equal(drawn, expected)

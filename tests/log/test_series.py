@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from kinfmu.log import palette
 from kinfmu.log.series import SMALLEST, accuracy, error_estimates, groups
 from kinfmu.run import Run
+from kinfmu.shapes import palette
 from tests.log.runs import fourbar, with_gap
 
 

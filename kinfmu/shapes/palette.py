@@ -37,3 +37,9 @@ def lighter(colour: Colour) -> Colour:
     """The same colour half way to white: y beside x."""
     red, green, blue = ((value + 255) // 2 for value in colour)
     return red, green, blue
+
+
+def darker(colour: Colour) -> Colour:
+    """The same colour for edges and names on white paper."""
+    red, green, blue = ((11 * value) // 20 for value in colour)
+    return red, green, blue

@@ -1,0 +1,101 @@
+"""figure(): a mechanism at its start pose, with names, as a textbook would print it."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.draw.ground import supports
+from kinfmu.draw.instant import Instant, instant
+from kinfmu.draw.links import links, shortest
+from kinfmu.draw.mark import Mark
+from kinfmu.draw.motion import motion
+from kinfmu.draw.names import place
+from kinfmu.draw.pins import paths, pins
+from kinfmu.draw.sheet import Sheet
+from kinfmu.draw.slides import rails, reaches, slides, slots_and_blocks
+from kinfmu.draw.wheels import wheels
+from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.mechanism import Mechanism
+
+SUFFIXES = (".svg", ".png")
+DOTS_PER_INCH = 150  # of a PNG
+MOST_NAMES = 150  # more would cover the drawing
+
+
+def figure(mechanism: Mechanism, path: str | Path) -> None:
+    """Draw a mechanism at its start pose into a .svg or .png file.
+
+    Bodies, joints, drivers and points of interest with their names and the paths of these points over the file's run;
+    axes in the mechanism's unit of length, both of one scale. The same mechanism gives the same bytes. A mechanism that
+    cannot be solved but closes is drawn too.
+
+    Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib,
+    AssemblyError or MechanismError if the mechanism does not close.
+    """
+    path = Path(path)
+    check_suffix(path)
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
+
+    shown = instant(mechanism)
+    with mpl.rc_context():
+        mpl.rcdefaults()  # a picture of ours, whatever the user's own settings are
+        mpl.rcParams["svg.fonttype"] = "none"  # text as text
+        mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
+        mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
+        image = _image(sheet_of(shown), path.suffix.lower())
+    try:
+        path.write_bytes(image)
+    except OSError as error:
+        raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def check_suffix(path: Path) -> None:
+    """Raise a FigureError unless the name of a file says what to draw."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise FigureError(f"{path}: '{path.suffix}' is no figure that can be drawn; known: {listed(SUFFIXES)}")
+
+
+def sheet_of(shown: Instant) -> Sheet:
+    """The sheet with everything on it; needs matplotlib."""
+    marks = _marks(shown)
+    mechanism = shown.mechanism
+    extent = np.vstack([mark.extent() for mark in marks])
+    size = float(np.ptp(extent, axis=0).max())
+    sheet = Sheet(extent, shortest(marks, size), mechanism.length_unit, mechanism.title or mechanism.name)
+    names = [name for mark in marks for name in mark.draw(sheet)]
+    if len(names) <= MOST_NAMES:
+        place(names, sheet)
+    else:
+        sheet.note(f"{len(names)} names left out")
+    return sheet
+
+
+def _marks(shown: Instant) -> list[Mark]:
+    """Everything to draw, what is drawn later on top."""
+    sliding = slides(shown)
+    return [
+        *paths(shown),
+        *wheels(shown),
+        *supports(shown),
+        *rails(shown, sliding),
+        *links(shown, reaches(sliding)),
+        *slots_and_blocks(shown, sliding),
+        *motion(shown),
+        *pins(shown, sliding),
+    ]
+
+
+def _image(sheet: Sheet, suffix: str) -> bytes:
+    """The sheet as the bytes of a file."""
+    file = io.BytesIO()
+    if suffix == ".svg":
+        sheet.figure.savefig(file, format="svg", metadata={"Date": None})
+    else:
+        sheet.figure.savefig(file, format="png", dpi=DOTS_PER_INCH)
+    return file.getvalue()

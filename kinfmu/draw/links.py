@@ -1,0 +1,98 @@
+"""Bodies as links: bars and plates through their points; massless bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from kinfmu.draw.instant import Instant
+from kinfmu.draw.mark import Mark
+from kinfmu.draw.names import Name
+from kinfmu.draw.sheet import BAR, Sheet
+from kinfmu.joints import Distance
+from kinfmu.run import FloatArray
+from kinfmu.shapes import palette
+from kinfmu.shapes.outline import points_of, rim
+
+_EDGE = 0.9  # [pt]
+_NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # parts of an edge beside which its name may stand
+
+
+@dataclass(frozen=True, eq=False)
+class Link(Mark):
+    """A moving body: corners (k, 2) along it or, if closed, around it."""
+
+    name: str
+    corners: FloatArray
+    is_closed: bool
+    colour: palette.Colour
+
+    def extent(self) -> FloatArray:
+        return self.corners
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        width = BAR * sheet.fine
+        clearance = width / 2.0 + 1.5
+        edge, fill = palette.darker(self.colour), palette.lighter(self.colour)
+        if len(self.corners) < 2:
+            return [Name(self.name, self.corners, 2.0 * clearance, edge, italic=True, rank=3)]
+        sheet.line(self.corners, width + _EDGE, edge, closed=self.is_closed, matters=0.8)
+        sheet.line(self.corners, width - _EDGE, fill, closed=self.is_closed, fill=fill, matters=0.0)
+        route = np.vstack([self.corners, self.corners[:1]]) if self.is_closed else self.corners
+        edges = sorted(pairwise(route), key=lambda ends: -np.hypot(*(ends[1] - ends[0])))
+        anchors = [a + part * (b - a) for a, b in edges for part in _NAMED_AT]
+        if self.is_closed:  # inside if there is room
+            anchors, clearance = [self.corners.mean(axis=0), *anchors], 0.0
+        return [Name(self.name, np.array(anchors), clearance, edge, italic=True, rank=2)]
+
+
+@dataclass(frozen=True, eq=False)
+class ThinBar(Mark):
+    """A massless bar between two points (joint Distance): ends (2, 2)."""
+
+    name: str
+    ends: FloatArray
+
+    def extent(self) -> FloatArray:
+        return self.ends
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        width = 0.45 * BAR * sheet.fine
+        sheet.line(self.ends, width + _EDGE, palette.darker(palette.GROUND), matters=0.8)
+        sheet.line(self.ends, width - _EDGE / 2.0, palette.lighter(palette.BAR), matters=0.0)
+        anchors = np.array([self.ends[0] + part * (self.ends[1] - self.ends[0]) for part in _NAMED_AT])
+        colour = palette.darker(palette.GROUND)
+        return [Name(self.name, anchors, 0.3 * BAR * sheet.fine + 1.5, colour, italic=True, rank=2)]
+
+
+def links(shown: Instant, reaches: Mapping[str, FloatArray]) -> list[Mark]:
+    """All moving bodies, plates first, and massless bars.
+
+    reaches: by body, more points (k, 2) of its frame that its outline takes in, such as the ends of a slot.
+    """
+    plates: list[Mark] = []
+    bars: list[Mark] = []
+    for index, body in enumerate(shown.mechanism.moving_bodies):
+        points = np.vstack([points_of(body), reaches.get(body.name, np.empty((0, 2)))])
+        corners, is_closed = rim(points)
+        link = Link(body.name, shown.placed(body.name, corners), is_closed, palette.body(index))
+        (plates if is_closed else bars).append(link)
+    thin: list[Mark] = [
+        ThinBar(joint.name, np.array([shown.point(end) for end in joint.between]))
+        for joint in shown.mechanism.joints
+        if isinstance(joint, Distance)
+    ]
+    return plates + thin + bars
+
+
+def shortest(marks: list[Mark], size: float) -> float:
+    """Shortest link of a figure [length], `size` if none has a length."""
+    lengths = []
+    for mark in marks:
+        if isinstance(mark, Link | ThinBar):
+            steps = np.diff(mark.extent(), axis=0)
+            lengths += [length for length in np.hypot(*steps.T) if length > 1e-3 * size]
+    return float(min(lengths, default=size))

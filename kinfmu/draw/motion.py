@@ -1,0 +1,172 @@
+"""Drivers: cylinders, and arrows with the name and the value at which the figure stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinfmu.draw.instant import Instant
+from kinfmu.draw.mark import Mark
+from kinfmu.draw.names import Name
+from kinfmu.draw.sheet import PAPER, Sheet, arc, box
+from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
+from kinfmu.joints import Revolute
+from kinfmu.joints.placement import body_of, unit_vector
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import FloatArray
+from kinfmu.shapes import palette
+
+COLOUR: palette.Colour = (185, 28, 28)
+_RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow
+_PUSH, _BESIDE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from the line it is about
+_HEAD, _HALF_HEAD = 7.0, 2.8  # [pt]
+_STROKE = 1.4  # [pt]
+_BARREL, _ROD = 5.5, 1.9  # [pt]; half widths of a cylinder
+_TRIES = 12  # places tried for an arrow
+
+
+@dataclass(frozen=True, eq=False)
+class Turn(Mark):
+    """A curved arrow about a pin; way: 1.0 counter-clockwise, -1.0 clockwise; beside: angle of the driven body."""
+
+    text: str
+    centre: FloatArray
+    way: float
+    beside: float
+
+    def extent(self) -> FloatArray:
+        return self.centre[None]
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        route = self._route(sheet)
+        _arrow(sheet, route)
+        return [Name(self.text, route[[len(route) // 2, -1, 0]], 4.0, COLOUR, rank=1)]
+
+    def _route(self, sheet: Sheet) -> FloatArray:
+        """The arc where it covers least, the first one just ahead of the body."""
+        radius = _RADIUS * sheet.ornament
+        starts = [self.beside + self.way * (math.radians(25.0) + k * 2.0 * math.pi / _TRIES) for k in range(_TRIES)]
+        return _freest(sheet, [arc(self.centre, radius, start, start + self.way * _TURN) for start in starts])
+
+
+@dataclass(frozen=True, eq=False)
+class Push(Mark):
+    """A straight arrow beside a point that is driven along a unit vector."""
+
+    text: str
+    at: FloatArray
+    along: FloatArray
+
+    def extent(self) -> FloatArray:
+        return self.at[None]
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        route = self._route(sheet)
+        _arrow(sheet, route)
+        return [Name(self.text, np.array([route.mean(axis=0), *route[::-1]]), 4.0, COLOUR, rank=1)]
+
+    def _route(self, sheet: Sheet) -> FloatArray:
+        size = sheet.ornament
+        across = np.array([-self.along[1], self.along[0]])
+        half = 0.5 * _PUSH * size * self.along
+        shaft = np.array([part * half for part in (-1.0, -0.5, 0.0, 0.5, 1.0)]) + self.at
+        offsets = [way * side * across for way in (1.0, 1.6) for side in (1.0, -1.0)]
+        return _freest(sheet, [shaft + _BESIDE * size * offset for offset in offsets])
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Mark):
+    """A driven distance: ends (2, 2), the barrel at the first; barrel: its length [length]."""
+
+    text: str
+    ends: FloatArray
+    barrel: float
+
+    def extent(self) -> FloatArray:
+        return self.ends
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        size = sheet.ornament
+        a, b = self.ends
+        length = float(np.hypot(*(b - a)))
+        along = (b - a) / length
+        edge, fill = palette.darker(palette.GROUND), palette.lighter(palette.BAR)
+        rod = box((a + b) / 2.0, along, length / 2.0, _ROD * size)
+        sheet.line(rod, 0.9, edge, closed=True, fill=PAPER)
+        start = min(0.12 * length, 9.0 * size)
+        middle = a + along * (start + self.barrel) / 2.0
+        barrel = box(middle, along, (self.barrel - start) / 2.0, _BARREL * size)
+        sheet.line(barrel, 1.0, edge, closed=True, fill=fill, matters=1.0)
+        piston = box(a + along * (start + 0.8 * (self.barrel - start)), along, 1.6 * size, _BARREL * size)
+        sheet.line(piston, 0.5, edge, closed=True, fill=edge, matters=0.0)
+        anchors = np.array([a + part * (b - a) for part in (0.4, 0.55, 0.25, 0.75)])
+        return [Name(self.text, anchors, _BARREL + 2.5, COLOUR, rank=1)]
+
+
+def motion(shown: Instant) -> list[Mark]:
+    """One mark a driver."""
+    return [_mark(shown, driver) for driver in shown.mechanism.drivers]
+
+
+def _mark(shown: Instant, driver: Driver) -> Mark:
+    value, way = shown.value(driver.name), shown.ways[driver.name]
+    unit = shown.mechanism.length_unit
+    told = f"{math.degrees(value):.4g}\N{DEGREE SIGN}" if driver.quantity.kind == "angle" else f"{value:.4g} {unit}"
+    text = f"{driver.name} = {told}"
+    if isinstance(driver, DistanceDriver):
+        tracks = [shown.track(end) for end in driver.between]
+        lengths = np.hypot(*(tracks[1] - tracks[0]).T)
+        barrel = max(min(0.9 * float(np.nanmin(lengths)), 0.62 * float(lengths[0])), 0.3 * float(lengths[0]))
+        return Cylinder(text, np.array([track[0] for track in tracks]), barrel)
+    if isinstance(driver, SlideDriver):
+        a, b = driver.between
+        e = np.array(unit_vector(driver.axis))
+        ends = shown.placed(body_of(a), np.array([[0.0, 0.0], e]))
+        return Push(text, shown.point(b), way * (ends[1] - ends[0]))
+    if isinstance(driver, CoordinateDriver):
+        along = np.array([1.0, 0.0] if driver.axis == "x" else [0.0, 1.0])
+        return Push(text, shown.point(driver.of), way * along)
+    *held, body = driver.bodies()
+    centre = _pivot(shown, body, held[0] if held else GROUND_NAME)
+    return Turn(text, centre, way, _heading(shown, body, centre))
+
+
+def _pivot(shown: Instant, body: str, against: str) -> FloatArray:
+    """The pin between two bodies, else the first pin of the body, else its frame."""
+    pins = [joint for joint in shown.mechanism.joints if isinstance(joint, Revolute) and body in joint.bodies()]
+    for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
+        return shown.point(joint.between[0])
+    return np.asarray(shown.poses[body][0, :2])
+
+
+def _heading(shown: Instant, body: str, centre: FloatArray) -> float:
+    """Angle [rad] from a pin to the point of the body that is furthest from it."""
+    found = next(one for one in shown.mechanism.bodies if one.name == body)
+    ways = [shown.point(f"{body}.{name}") - centre for name in found.points]
+    furthest = max(ways, key=lambda way: float(np.hypot(*way)), default=np.zeros(2))
+    return math.atan2(furthest[1], furthest[0]) if furthest.any() else shown.angle(body)
+
+
+def _freest(sheet: Sheet, routes: list[FloatArray]) -> FloatArray:
+    """The route that runs over least; an early one where several are alike."""
+    covered = sheet.covered
+    costs = []
+    for k, route in enumerate(routes):
+        dots = sheet.to_paper(route)
+        near = np.hypot(*(covered[None, :, :2] - dots[:, None, :]).transpose(2, 0, 1)) < 5.0  # [pt]
+        costs.append(round(float((near * covered[:, 2]).sum()), 6) + 0.6 * k)
+    return routes[int(np.argmin(costs))]
+
+
+def _arrow(sheet: Sheet, route: FloatArray) -> None:
+    """A stroke with a head at its end."""
+    size = sheet.ornament
+    tip, before = route[-1], route[-2]
+    along = (tip - before) / np.hypot(*(tip - before))
+    across = np.array([-along[1], along[0]])
+    base = tip - _HEAD * size * along
+    sheet.line([*route[:-1], base], _STROKE, COLOUR, matters=1.5)
+    head = [tip, base + _HALF_HEAD * size * across, base - _HALF_HEAD * size * across]
+    sheet.line(head, 0.4, COLOUR, closed=True, fill=COLOUR, matters=1.5)

@@ -1,0 +1,141 @@
+"""Pins, welds, loose points and points of interest, with their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinfmu.draw.instant import Instant
+from kinfmu.draw.mark import Mark
+from kinfmu.draw.names import Name
+from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet, box
+from kinfmu.draw.slides import Slide
+from kinfmu.drivers import DistanceDriver
+from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import FloatArray
+from kinfmu.shapes import palette
+
+_SAME = 1e-6  # of the size; points nearer than that are one place
+_ORDER = ("loose", "slide", "weld", "pin")  # what is drawn where several are in one place: the last of these
+
+
+@dataclass(eq=False)
+class _Place:
+    """What is in one place: kinds of _ORDER, names of joints, of points, of points of interest."""
+
+    at: FloatArray
+    kinds: set[str] = field(default_factory=set)
+    joints: list[str] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
+    interest: dict[str, palette.Colour] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Pin(Mark):
+    """One place with a name: a pin, a weld, a loose point of a body, or nothing but a point of interest.
+
+    colour: of the point of interest that is here, None if there is none.
+    """
+
+    at: FloatArray
+    kind: str
+    text: str
+    colour: palette.Colour | None
+
+    def extent(self) -> FloatArray:
+        return self.at[None]
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        size = BAR * sheet.fine * sheet.point
+        if self.kind == "pin":
+            sheet.circle(self.at, 0.34 * size, 1.1, INK, fill=PAPER, matters=2.0)
+        elif self.kind == "weld":
+            square = box(self.at, np.array([1.0, 0.0]), 0.32 * size, 0.32 * size)
+            sheet.line(square, 0.5, INK, closed=True, fill=INK, matters=2.0)
+        elif self.kind == "loose":
+            sheet.circle(self.at, 0.14 * size, 0.5, INK, fill=INK, matters=1.0)
+        if self.colour is not None:
+            colour = palette.darker(self.colour)
+            sheet.circle(self.at, (0.17 if self.kind == "pin" else 0.24) * size, 0.5, colour, fill=colour, matters=2.0)
+        colour = INK if self.colour is None else palette.darker(self.colour)
+        clearance = 0.5 * BAR * sheet.fine + 1.0
+        return [Name(self.text, self.at[None], clearance, colour, rank=0)] if self.text else []
+
+
+@dataclass(frozen=True, eq=False)
+class Path(Mark):
+    """Where a point of interest goes over the run: points (n, 2), NaN in gaps."""
+
+    points: FloatArray
+    colour: palette.Colour
+
+    def extent(self) -> FloatArray:
+        return self.points[np.isfinite(self.points).all(axis=1)]
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        sheet.track(self.points, 0.9, self.colour)
+        return []
+
+
+def paths(shown: Instant) -> list[Mark]:
+    """Coupler curves of the points of interest."""
+    first = len(shown.mechanism.moving_bodies)
+    return [
+        Path(shown.track(point)[1:], palette.body(first + index))
+        for index, point in enumerate(shown.mechanism.points.values())
+        if len(shown.track(point)) > 1
+    ]
+
+
+def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
+    """All places that have a name."""
+    mechanism = shown.mechanism
+    names = list(mechanism.body_points)
+    where = np.array([shown.point(name) for name in names]).reshape(-1, 2)
+    near = _SAME * (float(np.ptp(where, axis=0).max(initial=0.0)) or 1.0)
+    places: list[_Place] = []
+    home: dict[str, _Place] = {}
+    for name, at in zip(names, where, strict=True):
+        known = np.array([place.at for place in places]).reshape(-1, 2)
+        same = np.flatnonzero(np.hypot(*(known - at).T) <= near)
+        if not len(same):
+            places.append(_Place(at))
+        home[name] = places[int(same[0])] if len(same) else places[-1]
+    _note_joints(shown, sliding, home)
+    used = {name for place in places for name in place.points}
+    held = {joint.between[0] for joint in mechanism.joints if isinstance(joint, Translational | PointOnLine)}
+    for name in names:
+        body, _, point = name.partition(".")
+        if name not in used and name not in held and body != GROUND_NAME:
+            home[name].kinds.add("loose")
+            home[name].points.append(name)
+    for index, (name, point) in enumerate(mechanism.points.items()):
+        home[point].interest[name] = palette.body(len(mechanism.moving_bodies) + index)
+    return [_pin(place) for place in places if place.kinds or place.interest]
+
+
+def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Place]) -> None:
+    """What joints and cylinders are in which place."""
+    for member in (*shown.mechanism.joints, *shown.mechanism.drivers):
+        if not isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
+            continue
+        for point in member.between:
+            place = home[point]
+            place.kinds.add("weld" if isinstance(member, Fixed) else "pin")
+            place.points.append(point)
+            if isinstance(member, Revolute | Fixed) and member.name not in place.joints:
+                place.joints.append(member.name)
+    for slide in sliding:
+        home[slide.point].kinds.add("pin" if slide.turns else "slide")
+        home[slide.point].points.append(slide.point)
+
+
+def _pin(place: _Place) -> Pin:
+    """A place with its names: those of its joints, else of its points, then those of interest."""
+    kind = max(place.kinds, key=_ORDER.index, default="")
+    points = [name.partition(".")[2] for name in place.points] if kind != "slide" else []
+    texts = dict.fromkeys([*(place.joints or points), *place.interest])
+    return Pin(place.at, kind, ", ".join(texts), next(iter(place.interest.values()), None))

@@ -1,0 +1,220 @@
+"""The sheet of a figure: paper of the mechanism's proportions, strokes in world coordinates, and what they cover."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.run import FloatArray
+from kinfmu.shapes.palette import Colour
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK: Colour = (40, 40, 40)
+GREY: Colour = (110, 110, 110)
+PAPER: Colour = (255, 255, 255)
+INCH = 72.0  # [pt]
+BAR = 9.0  # [pt]; width of a link, where there is room
+FONT = 9.0  # [pt]
+_WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of what is drawn
+_SMALLEST = 120.0  # [pt]
+_LONG, _LONGEST_STRIP = 6.0, 2.5  # what is longer than it is high, such as a chain, may be wider, up to so many times
+_MARGIN = 34.0  # [pt]; room for supports and names
+_LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
+_FINEST = 0.45  # part of the usual size to which ornaments shrink where links are short
+_SPACING = 3.0  # [pt] between the dots that remember what is covered
+
+
+class Sheet:
+    """An empty sheet for a mechanism that reaches over `extent` (k, 2) and whose shortest link is `shortest` [length].
+
+    point: how long a point of the printer (1/72 inch) is in the world; fine: size of ornaments against the usual one.
+    """
+
+    def __init__(self, extent: FloatArray, shortest: float, unit: str, title: str) -> None:
+        low, high = extent.min(axis=0), extent.max(axis=0)
+        width, height = high - low
+        side = float(max(width, height)) or 1.0
+        strip = min(max(1.0, width / max(_LONG * height, 1e-9 * side)), _LONGEST_STRIP)
+        scale = min(strip * _WIDEST / max(width, 1e-9 * side), _HIGHEST / max(height, 1e-9 * side))  # [pt/length]
+        self.point = float(1.0 / scale)
+        self.fine: float = float(np.clip(shortest * scale / 40.0, _FINEST, 1.0))
+        paper = np.maximum((high - low) * scale, _SMALLEST) + 2.0 * _MARGIN
+        self.low: FloatArray = (low + high) / 2.0 - paper / 2.0 / scale
+        self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
+        self._layer = 1.0
+        self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], how much it matters
+        self.figure, self.axes = _paper(paper, self.low, self.high, unit, title)
+
+    def to_paper(self, points: ArrayLike) -> FloatArray:
+        """World coordinates (..., 2) as points of the printer from the lower left corner."""
+        return np.asarray((np.asarray(points, dtype=float) - self.low) / self.point)
+
+    @property
+    def ornament(self) -> float:
+        """A point of the printer for supports and blocks [length], which shrink less than links do."""
+        return float(self.point * (0.35 + 0.65 * self.fine))
+
+    @property
+    def covered(self) -> FloatArray:
+        """Dots (k, 3) on what is drawn so far: x, y [pt] from the lower left corner, and how much it matters."""
+        return np.vstack([np.empty((0, 3)), *self._dots])
+
+    def line(
+        self,
+        points: ArrayLike,
+        width: float,
+        colour: Colour,
+        *,
+        matters: float = 1.0,
+        closed: bool = False,
+        fill: Colour | None = None,
+        butt: bool = False,
+        style: Any = "solid",
+    ) -> None:
+        """A stroke `width` [pt] through points (k, 2), round at its ends; closed and filled if asked for."""
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path as Outline
+
+        points = np.asarray(points, dtype=float)
+        route = np.vstack([points, points[:1]]) if closed else points
+        codes = [Outline.MOVETO, *[Outline.LINETO] * (len(route) - 1)]
+        if closed:
+            codes[-1] = Outline.CLOSEPOLY
+        self.axes.add_patch(
+            PathPatch(
+                Outline(route, codes),
+                linewidth=width,
+                edgecolor=ink(colour),
+                facecolor=ink(fill) if fill else "none",
+                capstyle="butt" if butt else "round",
+                joinstyle="round",
+                linestyle=style,
+                zorder=self._next(),
+            )
+        )
+        if matters:
+            self.cover(route, matters, width)
+
+    def circle(
+        self,
+        centre: ArrayLike,
+        radius: float,
+        width: float,
+        colour: Colour,
+        *,
+        matters: float = 1.0,
+        fill: Colour | None = None,
+        style: Any = "solid",
+    ) -> None:
+        """A circle of `radius` [length] with a stroke of `width` [pt]."""
+        from matplotlib.patches import Circle
+
+        x, y = np.asarray(centre, dtype=float)
+        self.axes.add_patch(
+            Circle(
+                (x, y),
+                radius,
+                linewidth=width,
+                edgecolor=ink(colour),
+                facecolor=ink(fill) if fill else "none",
+                linestyle=style,
+                zorder=self._next(),
+            )
+        )
+        if matters:
+            self.cover(arc((x, y), radius, 0.0, 2.0 * np.pi), matters, width)
+
+    def track(self, points: FloatArray, width: float, colour: Colour) -> None:
+        """A thin line through points (n, 2) with gaps where they are NaN."""
+        self.axes.plot(*points.T, linewidth=width, color=ink(colour), zorder=self._next(), solid_capstyle="round")
+        known = points[np.isfinite(points).all(axis=1)]
+        if len(known) > 1:
+            self.cover(known, 0.35, width)
+
+    def cover(self, route: FloatArray, matters: float, width: float = 0.0) -> None:
+        """Remember that a stroke of `width` [pt] lies along a route (k, 2), for names to keep away from."""
+        paper = self.to_paper(route)
+        dots = [paper[:1]]
+        for a, b in pairwise(paper):
+            length = float(np.hypot(*(b - a)))
+            if length == 0.0:
+                continue
+            count = max(int(np.ceil(length / _SPACING)), 1)
+            along = a + (b - a) * (np.arange(1, count + 1) / count)[:, None]
+            dots.append(along)
+            if width > 2.0 * _SPACING:
+                across = np.array([a[1] - b[1], b[0] - a[0]]) * (width / 2.0 / length)
+                dots += [along + across, along - across]
+        self._dots.append(np.column_stack([found := np.vstack(dots), np.full(len(found), matters)]))
+
+    def text(self, at: ArrayLike, text: str, colour: Colour, *, italic: bool = False) -> None:
+        """A name with its middle at `at` [pt from the lower left corner]."""
+        x, y = self.low + np.asarray(at, dtype=float) * self.point
+        self.axes.text(
+            x,
+            y,
+            text,
+            color=ink(colour),
+            fontsize=FONT,
+            fontstyle="italic" if italic else "normal",
+            ha="center",
+            va="center_baseline",
+            parse_math=False,
+            zorder=1000.0,
+        )
+
+    def note(self, text: str) -> None:
+        """A sentence at the right end of the title's line."""
+        self.axes.set_title(text, fontsize=8.0, loc="right", color=ink(GREY))
+
+    def _next(self) -> float:
+        """What is drawn later covers what is drawn earlier."""
+        self._layer += 0.001
+        return self._layer
+
+
+def ink(colour: Colour) -> tuple[float, float, float]:
+    """A colour as matplotlib takes it."""
+    red, green, blue = (value / 255.0 for value in colour)
+    return red, green, blue
+
+
+def arc(centre: ArrayLike, radius: float, first: float, last: float) -> FloatArray:
+    """Points (k, 2) on a circle from one angle [rad] to another."""
+    angles = np.linspace(first, last, max(int(abs(last - first) / 0.1), 2) + 1)
+    return np.asarray(centre, dtype=float) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str, title: str) -> tuple[Figure, Axes]:
+    """A figure around a drawing of size `paper` [pt], with axes in the mechanism's unit of length."""
+    from matplotlib.figure import Figure
+
+    width, height = paper[0] + _LEFT + _RIGHT, paper[1] + _BOTTOM + _TOP
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    axes = made.add_axes((_LEFT / width, _BOTTOM / height, paper[0] / width, paper[1] / height))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    grey = ink(GREY)
+    axes.tick_params(labelsize=8.0, length=3.0, width=0.6, color=grey, labelcolor=grey)
+    axes.set_xlabel(f"x [{unit}]", fontsize=8.0, color=grey, labelpad=2.0)
+    axes.set_ylabel(f"y [{unit}]", fontsize=8.0, color=grey, labelpad=2.0)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_linewidth(0.6)
+        spine.set_color(grey)
+    axes.set_title(title, fontsize=11.0, loc="left", color=ink(INK), parse_math=False)
+    return made, axes
+
+
+def box(centre: FloatArray, along: FloatArray, half_length: float, half_width: float) -> FloatArray:
+    """Corners (4, 2) of a rectangle whose long side lies along a unit vector."""
+    length, width = half_length * along, half_width * np.array([-along[1], along[0]])
+    return np.array(
+        [centre - length - width, centre + length - width, centre + length + width, centre - length + width]
+    )

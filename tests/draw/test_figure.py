@@ -1,0 +1,193 @@
+"""Figures as files: names, bytes, sizes, and what is told when one cannot be drawn."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
+from kinfmu.draw import figure
+from kinfmu.errors import AssemblyError, FigureError, MissingPackageError
+from tests.mechanisms import fourbar, reference_fourbar
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def texts_in(path: Path) -> str:
+    """All text of an SVG, with a line for each element."""
+    return "\n".join(element.text or "" for element in ET.parse(path).iter(f"{SVG}text"))  # noqa: S314  ours
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(name: str, tmp_path: Path) -> None:
+    mechanism = gallery.load(name)
+    path = tmp_path / "figure.svg"
+    figure(mechanism, path)
+    said = texts_in(path)
+    assert mechanism.title in said
+    assert f"x [{mechanism.length_unit}]" in said
+    words = said.replace(",", " ").split()
+    for body in mechanism.moving_bodies:
+        assert body.name in words
+    for pin in (joint for joint in mechanism.joints if isinstance(joint, Revolute)):
+        assert pin.name in words
+    for driver in mechanism.drivers:
+        assert f"{driver.name} = " in said
+    for point in mechanism.points:
+        assert point in words
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_the_same_mechanism_gives_the_same_bytes(suffix: str, tmp_path: Path) -> None:
+    mechanism = kinfmu.load("fourbar")
+    first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
+    figure(mechanism, first)
+    figure(mechanism, str(second))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_png_has_the_proportions_of_the_mechanism_at_150_dots_an_inch(tmp_path: Path) -> None:
+    wide, high = tmp_path / "wide.png", tmp_path / "high.PNG"
+    figure(kinfmu.load("fourbar"), wide)
+    pendulum = Mechanism(
+        "pendulum",
+        [Body("ground", {"O": (0, 0)}), Body("rod", {"O": (0, 0), "A": (5, 0)}, (0, 0, -1.5))],
+        [Revolute("O", ("ground.O", "rod.O"))],
+        [AngleDriver("rod", "rod", ConstantSpeed(-1.5, 0.1))],
+    )
+    figure(pendulum, high)
+    width, height = struct.unpack(">II", wide.read_bytes()[16:24])
+    assert width > 1.5 * height
+    assert 900 < width < 1500  # 6 to 10 inches
+    width, height = struct.unpack(">II", high.read_bytes()[16:24])
+    assert height > 1.5 * width
+
+
+def test_the_users_own_settings_do_not_show_and_are_kept(tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    mechanism = kinfmu.load("fourbar")
+    plain, other = tmp_path / "plain.svg", tmp_path / "other.svg"
+    figure(mechanism, plain)
+    with mpl.rc_context({"axes.facecolor": "black", "svg.fonttype": "path"}):
+        figure(mechanism, other)
+        assert mpl.rcParams["axes.facecolor"] == "black"
+    assert other.read_bytes() == plain.read_bytes()
+
+
+def test_a_title_is_not_read_as_mathematics(tmp_path: Path) -> None:
+    path = tmp_path / "figure.svg"
+    figure(replace(kinfmu.load("fourbar"), title="a $ for a $\\frac$ & <more>"), path)
+    assert "a $ for a $\\frac$ & <more>" in texts_in(path)
+
+
+@pytest.mark.parametrize(
+    "drivers",
+    [
+        (),
+        (AngleDriver("crank", "crank"), AngleDriver("rocker", "rocker")),
+        (AngleDriver("crank", "crank"), AngleDriver("again", "crank", ConstantSpeed(5.0, 1.0))),
+    ],
+    ids=["without a driver", "with one too many", "with two that contradict"],
+)
+def test_a_mechanism_that_only_closes_is_drawn(drivers: tuple[AngleDriver, ...], tmp_path: Path) -> None:
+    mechanism = replace(fourbar(4.0, 1.0, 3.5, 3.0), drivers=drivers)
+    assert kinfmu.check(mechanism).problem is not None
+    path = tmp_path / "figure.svg"
+    figure(mechanism, path)
+    assert {"crank", "coupler", "rocker", "O", "P", "Q", "C"} <= set(texts_in(path).split())
+
+
+def test_a_mechanism_that_does_not_close_is_told_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "figure.svg"
+    with pytest.raises(AssemblyError) as caught:
+        figure(fourbar(9.0, 1.0, 3.5, 3.0), path)
+    assert str(caught.value).startswith("the mechanism does not close near its start pose")
+    assert "\n" not in str(caught.value)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("name", ["figure.pdf", "figure", "svg"])
+def test_another_kind_of_file_is_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    with pytest.raises(FigureError) as caught:
+        figure(kinfmu.load("fourbar"), path)
+    assert str(caught.value) == f"{path}: '{path.suffix}' is no figure that can be drawn; known: .svg, .png"
+
+
+def test_a_place_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "none" / "figure.svg"
+    with pytest.raises(FigureError) as caught:
+        figure(reference_fourbar(), path)
+    assert str(caught.value) == f"{path}: cannot be written (No such file or directory)"
+
+
+def test_without_matplotlib_the_line_that_installs_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingPackageError) as caught:
+        figure(kinfmu.load("fourbar"), tmp_path / "figure.svg")
+    assert str(caught.value).endswith("figure.svg: drawing needs matplotlib: pip install 'kinfmu[figures]'")
+
+
+def test_many_names_are_left_out_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kinfmu.draw.drawing.MOST_NAMES", 3)
+    path = tmp_path / "figure.svg"
+    figure(kinfmu.load("fourbar"), path)
+    assert "11 names left out" in texts_in(path)
+    assert "coupler" not in texts_in(path)
+
+
+def test_check_draws_the_figure_asked_for(run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    path = tmp_path / "figure.svg"
+    status, out, err = run_cli("check", "fourbar", "--figure", path)
+    assert (status, err) == (0, "")
+    assert out.endswith(f"  figure      {path}\n")
+    assert "coupler" in texts_in(path)
+
+
+def test_check_as_json_stays_json_with_a_figure(run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    import json
+
+    path = tmp_path / "figure.png"
+    status, out, _ = run_cli("check", "fourbar", "--json", "--figure", path)
+    assert status == 0
+    assert json.loads(out)["name"] == "fourbar"
+    assert path.stat().st_size > 1000
+
+
+def test_check_tells_its_findings_before_a_figure_that_cannot_be_drawn(
+    run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    kinfmu.save(fourbar(9.0, 1.0, 3.5, 3.0), path)
+    status, out, err = run_cli("check", path, "--figure", tmp_path / "figure.svg")
+    assert status == 1
+    assert "mobility" in out
+    (line,) = err.splitlines()
+    assert line.startswith(f"kinfmu: {path}: the mechanism does not close near its start pose")
+    assert not (tmp_path / "figure.svg").exists()
+
+
+def test_check_draws_a_mechanism_without_a_driver_and_still_fails(
+    run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path, picture = tmp_path / "mine.toml", tmp_path / "figure.svg"
+    kinfmu.save(replace(fourbar(4.0, 1.0, 3.5, 3.0), drivers=()), path)
+    status, out, err = run_cli("check", path, "--figure", picture)
+    assert status == 1
+    assert f"  figure      {picture}\n" in out
+    assert len(err.splitlines()) == 1
+    assert "coupler" in texts_in(picture)
+
+
+def test_check_refuses_another_kind_of_figure_before_it_works(run_cli: Callable[..., tuple[int, str, str]]) -> None:
+    status, out, err = run_cli("check", "fourbar", "--figure", "F.pdf")
+    assert (status, out) == (2, "")
+    assert err.endswith("Error: --figure F.pdf: a figure ends in one of .svg, .png\n")

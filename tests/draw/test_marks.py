@@ -1,0 +1,233 @@
+"""What is drawn where, against closed forms; names that keep apart."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from kinfmu import (
+    AngleDriver,
+    Body,
+    ConstantSpeed,
+    DistanceDriver,
+    Gear,
+    Mechanism,
+    PointOnLine,
+    RackAndPinion,
+    Revolute,
+    RunSettings,
+    SlideDriver,
+    Translational,
+    gallery,
+    load,
+)
+from kinfmu.draw.drawing import sheet_of
+from kinfmu.draw.ground import Rail, Support, supports
+from kinfmu.draw.instant import instant
+from kinfmu.draw.motion import Cylinder, Push, Turn, motion
+from kinfmu.draw.pins import Pin, pins
+from kinfmu.draw.slides import Block, Slot, rails, reaches, slides, slots_and_blocks
+from kinfmu.draw.wheels import Belt, Rack, Wheel, wheels
+from tests.joints.test_mechanisms import crank_and_slider
+from tests.mechanisms import fourbar
+
+TURN = RunSettings(0.0, 2.0 * math.pi, math.pi / 60.0)
+
+
+def geared(ratio: float, *, sun: str = "ground", carrier: str = "arm") -> Mechanism:
+    """Two wheels whose axles are 3 apart, on an arm or on the ground."""
+    bodies = [
+        Body("ground", {"O": (0, 0), "A": (3, 0)}),
+        Body("arm", {"O": (0, 0), "A": (3, 0)}),
+        Body("sun", {"O": (0, 0)}),
+        Body("planet", {"A": (0, 0)}, (3, 0, 0)),
+    ]
+    joints = [
+        Revolute("O", ("ground.O", "arm.O")),
+        Revolute("S", (f"{carrier}.O", "sun.O")),
+        Revolute("A", (f"{carrier}.A", "planet.A")),
+        Gear("mesh", (sun, "planet"), ratio=ratio, carrier=carrier),
+    ]
+    return Mechanism("geared", bodies, joints, [AngleDriver("arm", "arm"), AngleDriver("sun", "sun")])
+
+
+def test_a_figure_shows_the_start_pose_of_the_file() -> None:
+    shown = instant(load("fourbar"))  # its law begins at 0, its bodies stand at 60 degrees
+    np.testing.assert_allclose(shown.point("crank.P"), [0.5, math.sqrt(0.75)], atol=1e-12)
+    np.testing.assert_allclose(shown.point("coupler.A"), [2.5, math.sqrt(0.75)], atol=1e-12)
+    assert shown.value("crank") == pytest.approx(math.pi / 3, abs=1e-12)
+    path = shown.track("coupler.A")[1:]
+    np.testing.assert_allclose(np.hypot(path[:, 0] - 2.0, path[:, 1]), 1.0, atol=1e-12)
+
+
+def test_a_mechanism_far_from_the_origin_is_drawn_where_it_is() -> None:
+    near, far = instant(fourbar(4.0, 1.0, 3.5, 3.0)), instant(fourbar(4.0, 1.0, 3.5, 3.0, at=(1000.0, -500.0)))
+    np.testing.assert_allclose(far.track("coupler.Q") - near.track("coupler.Q"), [[1000.0, -500.0]] * 102, atol=1e-9)
+
+
+def test_a_support_stands_below_its_pin_or_where_there_is_room() -> None:
+    standing = supports(instant(load("fourbar")))
+    assert [(tuple(mark.at), tuple(mark.towards)) for mark in standing if isinstance(mark, Support)] == [
+        ((0.0, 0.0), (0.0, -1.0)),
+        ((1.0, 0.0), (0.0, -1.0)),
+        ((2.0, 0.0), (0.0, -1.0)),
+    ]
+    (hanging,) = supports(instant(load("double_pendulum")))
+    assert isinstance(hanging, Support)
+    assert tuple(hanging.towards) == (0.0, 1.0)
+
+
+def test_a_rail_is_as_long_as_the_way_of_its_block() -> None:
+    mechanism = crank_and_slider()
+    shown = instant(Mechanism("slider", mechanism.bodies, mechanism.joints, mechanism.drivers, run=TURN))
+    sliding = slides(shown)
+    (rail,), (block,) = rails(shown, sliding), slots_and_blocks(shown, sliding)
+    assert isinstance(rail, Rail)
+    assert isinstance(block, Block)
+    dead_centres = [[math.sqrt(2.0**2 - 0.25**2), 0.25], [math.sqrt(4.0**2 - 0.25**2), 0.25]]
+    np.testing.assert_allclose(rail.ends, dead_centres, atol=2e-3)  # the run's samples lie beside them
+    assert tuple(rail.towards) == (0.0, -1.0)
+    np.testing.assert_allclose(block.at, shown.point("block.S"), atol=0)
+
+
+def test_a_pin_runs_in_a_slot_of_its_link() -> None:
+    lever = Mechanism(
+        "quick_return",
+        [
+            Body("ground", {"O": (0, 1), "C": (0, -1)}),
+            Body("crank", {"O": (0, 0), "P": (0.5, 0)}, (0, 1, 0.4)),
+            Body("lever", {"C": (0, 0)}, (0, -1, 1.4)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("C", ("ground.C", "lever.C")),
+            PointOnLine("slot", ("lever.C", "crank.P")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(0.5 * math.pi, 1.0))],
+        run=TURN,
+    )
+    shown = instant(lever)
+    sliding = slides(shown)
+    (slot,) = slots_and_blocks(shown, sliding)
+    assert isinstance(slot, Slot)
+    lengths = [np.hypot(*(end - shown.point("lever.C"))) for end in slot.ends]
+    np.testing.assert_allclose(sorted(lengths), [1.5, 2.5], atol=1e-9)
+    assert set(reaches(sliding)) == {"lever"}
+    assert rails(shown, sliding) == []
+
+
+def test_a_block_on_a_rod_is_the_body_that_is_no_longer_than_a_point() -> None:
+    def inverted(between: tuple[str, str]) -> Mechanism:
+        return Mechanism(
+            "inverted",
+            [
+                Body("ground", {"O": (0, 0), "C": (3, 0)}),
+                Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 0.9)),
+                Body("block", {"P": (0, 0)}, (0.6, 0.8, 2.8)),
+                Body("rod", {"C": (0, 0), "E": (3.5, 0)}, (3, 0, 2.8)),
+            ],
+            [
+                Revolute("O", ("ground.O", "crank.O")),
+                Revolute("P", ("crank.P", "block.P")),
+                Revolute("C", ("ground.C", "rod.C")),
+                Translational("slide", between),
+            ],
+            [AngleDriver("crank", "crank")],
+            run=TURN,
+        )
+
+    for between in (("rod.C", "block.P"), ("block.P", "rod.C")):
+        (slide,) = slides(instant(inverted(between)))
+        assert (slide.holder, slide.slider) == ("rod", "block")
+        np.testing.assert_allclose(slide.ends, [[2.0, 0.0], [4.0, 0.0]], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "radii"),
+    [(-2.0, (2.0, 1.0)), (3.0, (4.5, 1.5)), (0.25, (1.0, 4.0))],
+    ids=["outer", "planet inside", "sun inside"],
+)
+def test_pitch_circles_touch_and_keep_the_ratio(ratio: float, radii: tuple[float, float]) -> None:
+    found = {mark.radius: mark for mark in wheels(instant(geared(ratio))) if isinstance(mark, Wheel)}
+    assert sorted(found) == pytest.approx(sorted(radii))
+    assert tuple(found[radii[0]].centre) == (0.0, 0.0)
+    assert found[radii[1]].centre == pytest.approx([3.0, 0.0])
+
+
+def test_wheels_that_turn_alike_on_the_ground_have_a_belt() -> None:
+    marks = wheels(instant(geared(2.0, sun="sun", carrier="arm")))
+    (belt,) = (mark for mark in marks if isinstance(mark, Belt))
+    assert belt.radii[0] == pytest.approx(2.0 * belt.radii[1])
+    assert sum(belt.radii) < 3.0
+
+
+def test_a_rack_touches_its_pinion_on_the_side_that_rolls() -> None:
+    for radius, height in ((2.0, -2.0), (-2.0, 2.0)):
+        rack = Mechanism(
+            "rack",
+            [
+                Body("ground", {"O": (0, 0), "R": (0, height)}),
+                Body("pinion", {"O": (0, 0)}),
+                Body("rack", {"R": (0, 0)}, (0, height, 0)),
+            ],
+            [
+                Revolute("O", ("ground.O", "pinion.O")),
+                Translational("slide", ("ground.R", "rack.R")),
+                RackAndPinion("mesh", ("ground.R", "rack.R"), "pinion", radius=radius),
+            ],
+            [AngleDriver("pinion", "pinion")],
+        )
+        shown = instant(rack)
+        (drawn,) = (mark for mark in wheels(shown) if isinstance(mark, Rack))
+        np.testing.assert_allclose(drawn.ends[:, 1], height, atol=1e-12)
+        assert tuple(drawn.towards) == pytest.approx((0.0, math.copysign(1.0, height)))
+        assert slots_and_blocks(shown, slides(shown)) == []  # the rack is its own block
+
+
+def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
+    arm = Mechanism(
+        "arm",
+        [Body("ground", {"O": (0, 0), "C": (1, 0)}), Body("arm", {"O": (0, 0), "Q": (2, 0)}, (0, 0, 1.0))],
+        [Revolute("O", ("ground.O", "arm.O"))],
+        [DistanceDriver("cylinder", ("ground.C", "arm.Q"), ConstantSpeed(1.7, -0.1))],
+        length_unit="mm",
+    )
+    (cylinder,) = motion(instant(arm))
+    assert isinstance(cylinder, Cylinder)
+    length = math.sqrt(5.0 - 4.0 * math.cos(1.0))
+    assert cylinder.text == f"cylinder = {length:.4g} mm"
+    assert 0.3 * length <= cylinder.barrel <= 0.62 * length
+
+    (turn,) = motion(instant(fourbar(4.0, 1.0, 3.5, 3.0)))
+    assert isinstance(turn, Turn)
+    assert (turn.text, turn.way, tuple(turn.centre)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
+    assert turn.beside == pytest.approx(1.0)
+
+    ram = SlideDriver("ram", ("ground.slot", "block.S"), law=ConstantSpeed(3.5, -0.1))
+    (push,) = motion(instant(crank_and_slider(drivers=(ram,))))
+    assert isinstance(push, Push)
+    assert tuple(push.along) == (-1.0, 0.0)
+
+
+def test_a_place_is_named_once_by_its_joint_and_what_is_of_interest_there() -> None:
+    shown = instant(load("fourbar"))
+    found = {tuple(np.round(mark.at, 3)): mark for mark in pins(shown, slides(shown)) if isinstance(mark, Pin)}
+    assert [mark.text for mark in found.values()] == ["O", "C", "B", "P", "Q", "A"]
+    assert {mark.kind for mark in found.values()} == {"pin"}
+    shown = instant(load("double_pendulum"))  # the joint is called hinge, the points tip and hinge
+    assert [mark.text for mark in pins(shown, slides(shown)) if isinstance(mark, Pin)] == ["O", "hinge", "tip"]
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_names_keep_apart_and_stay_on_the_sheet(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    sheet = sheet_of(instant(load(name)))
+    boxes = [text.get_window_extent() for text in sheet.axes.texts]
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
+    page = sheet.axes.get_window_extent().expanded(1.02, 1.02)
+    assert all(page.containsx(box.x0) and page.containsx(box.x1) for box in boxes)
+    assert all(page.containsy(box.y0) and page.containsy(box.y1) for box in boxes)
