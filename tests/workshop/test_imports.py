@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).parents[2]
-HEAVY = {"numpy", "scipy", "pythonfmu", "fmpy", "mcap", "rerun", "pyarrow", "PIL", "importlib.metadata"}
+HEAVY = {"numpy", "scipy", "pythonfmu", "fmpy", "mcap", "rerun", "pyarrow", "PIL", "matplotlib", "importlib.metadata"}
 
 
 def loaded_by(statement: str) -> set[str]:
@@ -32,6 +32,7 @@ def loaded_by(statement: str) -> set[str]:
         ("import kinfmu.solver", HEAVY | {"click"}),
         ("import kinfmu.cli", HEAVY),
         ("import kinfmu.log", HEAVY - {"numpy", "importlib.metadata"}),
+        ("import kinfmu.draw", HEAVY - {"numpy", "scipy", "importlib.metadata"}),
         ("import kinfmu.fmu", HEAVY - {"numpy", "importlib.metadata"}),
     ],
 )
