@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from kinfmu.joints import Translational as Translational
     from kinfmu.mechanism import Body as Body
     from kinfmu.mechanism import Mechanism as Mechanism
+    from kinfmu.mechanism import Parameter as Parameter
     from kinfmu.mechanism import Point as Point
     from kinfmu.mechanism import RunSettings as RunSettings
     from kinfmu.mechanism import Start as Start
@@ -65,6 +66,7 @@ _HOME = {
     "Gear": "kinfmu.joints",
     "KinfmuError": "kinfmu.errors",
     "Mechanism": "kinfmu.mechanism",
+    "Parameter": "kinfmu.mechanism",
     "Point": "kinfmu.mechanism",
     "PointOnLine": "kinfmu.joints",
     "RackAndPinion": "kinfmu.joints",
@@ -102,6 +104,7 @@ __all__ = [
     "Gear",
     "KinfmuError",
     "Mechanism",
+    "Parameter",
     "Point",
     "PointOnLine",
     "RackAndPinion",

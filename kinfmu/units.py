@@ -6,6 +6,7 @@ Lengths stay in the mechanism's own unit all the way through; angles are radians
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Annotated, NamedTuple
 
 
@@ -59,3 +60,14 @@ def display_units(unit: str) -> dict[str, float]:
     if base == "m":
         return {f"mm{slash}{per}": 1e3}
     return {}
+
+
+@cache
+def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
+    """Every unit that may be written for any quantity, with that quantity and its factor into the unit used inside."""
+    quantities = [Quantity(kind, order) for kind in ("length", "angle") for order in (0, 1, 2)]
+    return {
+        unit: (quantity, factor)
+        for quantity in (*quantities, Quantity("time"))
+        for unit, factor in factors(quantity, length_unit).items()
+    }

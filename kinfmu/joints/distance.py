@@ -29,7 +29,7 @@ class Distance(Held):
     between: PointPair
     length: Length
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         if not self.length >= SHORTEST:  # NaN too
             raise MechanismError(
                 f"[joints.{self.name}] length = {self.length!r} must be a positive number, {SHORTEST:g} or more",

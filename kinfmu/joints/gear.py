@@ -31,10 +31,9 @@ class Gear(Joint):
     carrier: BodyName = "ground"
     offset: Radians = 0.0
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         if self.ratio == 0.0:
             raise MechanismError(f"[joints.{self.name}] ratio = 0.0 must be other than 0", joint=self.name)
-
         if self.carrier in self.between:
             raise MechanismError(
                 f"[joints.{self.name}] carrier = '{self.carrier}' must be another body than the gears", joint=self.name

@@ -30,6 +30,9 @@ class Joint(ABC):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         """Phi, one value a row; zero where the joint holds."""
 
+    def check(self) -> None:  # noqa: B027  most joints take any values
+        """Raise a MechanismError for values that cannot be meant; numbers are finite and references valid by then."""
+
     def moved(self, dx: float, dy: float) -> Joint:  # noqa: ARG002  absolute joints depend on it
         """The joint when the whole mechanism stands elsewhere; the same unless it is absolute."""
         return self

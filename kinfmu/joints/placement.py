@@ -60,15 +60,17 @@ class Placement:
         """Angle phi of a body [rad]."""
         return self.poses[body].phi
 
-    def direction(self, body: str, angle: float) -> tuple[Value, Value]:
+    def direction(self, body: str, angle: Value) -> tuple[Value, Value]:
         """Unit vector at an angle [rad] to the x axis of a body's frame, in the world."""
         pose = self.poses[body]
         e_x, e_y = unit_vector(angle)
         return pose.c * e_x - pose.s * e_y, pose.s * e_x + pose.c * e_y
 
 
-def unit_vector(angle: float) -> tuple[float, float]:
-    """(cos, sin) of an angle [rad], exact along the axes."""
+def unit_vector(angle: Value) -> tuple[Value, Value]:
+    """(cos, sin) of an angle [rad]; of a number exact along the axes."""
+    if not isinstance(angle, float | int):
+        return cos(angle), sin(angle)
     quarter = angle / (0.5 * math.pi)
     if quarter == round(quarter):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter) % 4]

@@ -32,7 +32,7 @@ class RackAndPinion(Joint):
     axis: Radians = 0.0
     offset: Length = 0.0
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         if self.radius == 0.0:
             raise MechanismError(f"[joints.{self.name}] radius = 0.0 must be other than 0", joint=self.name)
         if self.pinion in map(body_of, self.between):

@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.parameters import Parameter
 
-__all__ = ["Body", "Mechanism", "Point", "RunSettings", "Start"]
+__all__ = ["Body", "Mechanism", "Parameter", "Point", "RunSettings", "Start"]

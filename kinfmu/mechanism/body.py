@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism.quoted import quoted
 
 GROUND_NAME = "ground"
 
@@ -31,8 +32,9 @@ class Start(NamedTuple):
 class Body:
     """A rigid body with named points in its own frame.
 
-    points: name -> (s_x, s_y) [length]; start: rough pose (x, y, phi) of the frame, each may be None. The body named
-    `ground` does not move: its frame is the world's.
+    points: name -> (s_x, s_y) [length]; start: rough pose (x, y, phi) of the frame, each may be None. Numbers may be
+    text with a unit or an expression of the mechanism's parameters, which the mechanism resolves ("a/2", "60 deg"). The
+    body named `ground` does not move: its frame is the world's.
     """
 
     name: str
@@ -46,10 +48,12 @@ class Body:
 
     def _point(self, name: str, point: Iterable[float]) -> Point:
         try:
-            x, y = point
-            return Point(float(x), float(y))
-        except (TypeError, ValueError, OverflowError):
-            raise MechanismError(f"[bodies.{self.name}] points.{name} = {point!r} must be two numbers [x, y]") from None
+            x, y = () if isinstance(point, str) else point
+            return Point(x, y)
+        except (TypeError, ValueError):
+            raise MechanismError(
+                f"[bodies.{self.name}] points.{name} = {quoted(point)} must be two numbers [x, y]"
+            ) from None
 
     @property
     def is_ground(self) -> bool:

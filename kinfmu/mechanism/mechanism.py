@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
+from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.dimension import Dimension
+from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.number import written
+from kinfmu.mechanism.parameters import Parameter, dimensions_of, evaluated, read, resolved
+from kinfmu.mechanism.places import Members, Place, told
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number
 from kinfmu.units import METRES, Quantity
@@ -28,8 +34,11 @@ class RunSettings:
     step: float = 0.01
 
     def __post_init__(self) -> None:
-        for key in ("start", "stop", "step"):
-            check_number(f"[run] {key}", getattr(self, key))
+        values = [getattr(self, key) for key in ("start", "stop", "step")]
+        if any(isinstance(value, str | Expression) for value in values):
+            return  # checked when the mechanism has resolved them
+        for key, value in zip(("start", "stop", "step"), values, strict=True):
+            check_number(f"[run] {key}", value)
         if self.step <= 0.0:
             raise MechanismError(f"[run] step = {self.step!r} must be positive")
         if self.stop < self.start:
@@ -42,6 +51,9 @@ class Mechanism:
 
     points: points of interest, name -> 'body.point'; coordinates: which generalized coordinates q holds: 'moving'
     (without those that a joint fixes to a constant), 'all', or names such as 'coupler.x' in the wanted order.
+    parameters: numbers by name, which may be given as numbers or as text ("40 mm", "2*a") too. Wherever a number
+    stands, text with a unit or an expression of parameters may stand instead ("60 deg", "a/2 + 5 mm"); once made, the
+    mechanism holds the numbers there, and `expressions` says which of them are computed, by place.
     """
 
     name: str
@@ -53,6 +65,8 @@ class Mechanism:
     run: RunSettings = RunSettings()
     length_unit: str = "m"
     title: str = ""
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    expressions: Mapping[Place, Expression] = field(init=False)
 
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers"):
@@ -62,6 +76,8 @@ class Mechanism:
         if not any(body.is_ground for body in self.bodies):
             object.__setattr__(self, "bodies", (Body(GROUND_NAME), *self.bodies))
         object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
+        _check_names_and_unit(self)
+        _resolve(self)
         _check(self)
 
     def __hash__(self) -> int:
@@ -82,9 +98,88 @@ class Mechanism:
         """All generalized coordinates x, y, phi of the moving bodies, in file order."""
         return tuple(f"{body.name}.{c}" for body in self.moving_bodies for c in COORDINATES)
 
+    @property
+    def members(self) -> Members:
+        """Bodies, joints, drivers and run, with their numbers."""
+        return Members(self.bodies, self.joints, self.drivers, self.run)
 
-def _check(mechanism: Mechanism) -> None:
-    """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
+    def written(self) -> Members:
+        """The members with expressions in the places where they were written, instead of their numbers."""
+        return self.members.changed(lambda _, value, __: value.expression if isinstance(value, Computed) else value)
+
+    def at(self, values: Mapping[str, Value]) -> Members:
+        """The members where parameters have these values, in any arithmetic: floats, symbols, Taylor numbers.
+
+        Parameters that are not given are computed from those that are, or keep their numbers. Nothing is checked:
+        `with_parameters` does that.
+        """
+        known = evaluated(self.parameters, values)
+
+        def computed(place: Place, value: Any, _: Quantity) -> Any:
+            is_open = isinstance(value, Computed) and place[0] != "run"  # the run does not move with the geometry
+            return value.expression.value(known) if is_open else value
+
+        return self.members.changed(computed)
+
+    def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
+        """The mechanism with other values of some parameters: numbers, text with a unit, or expressions.
+
+        Raises a MechanismError for a name that is no parameter and for values with which the mechanism cannot be meant.
+        """
+        parameters = dict(self.parameters)
+        for name, value in values.items():
+            if name not in parameters:
+                near = suggestion(name, parameters)
+                raise MechanismError(f"there is no parameter {quoted(name)}{near}; parameters: {listed(parameters)}")
+            old = parameters[name]
+            quantity = None if old.kind == "number" else old.quantity  # a pure number, or nobody could know
+            parameters[name] = Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved
+        return replace(self, parameters=parameters)
+
+
+def _resolve(mechanism: Mechanism) -> None:
+    """Put numbers in the place of texts with units and of expressions, and remember the expressions."""
+    unit = mechanism.length_unit
+    said = {name: read(name, parameter, unit) for name, parameter in mechanism.parameters.items()}
+    expressions: dict[Place, Expression] = {}
+    alone: dict[str, set[Quantity]] = {}
+
+    def as_written(place: Place, value: Any, quantity: Quantity) -> Any:
+        number = written(told(place), value, quantity, unit)
+        if isinstance(number, Expression):
+            expressions[place] = number
+            if number.alone:
+                alone.setdefault(number.alone, set()).add(quantity)
+        return number
+
+    members = mechanism.members.changed(as_written)
+    parameters = resolved(said, alone)
+    values = {name: float(parameter.value) for name, parameter in parameters.items()}
+    dimensions = dimensions_of(parameters)
+
+    def computed(place: Place, value: Any, quantity: Quantity) -> Any:
+        if not isinstance(value, Expression):
+            return value
+        try:
+            found = value.dimension(dimensions)
+            number = float(value.value(values))
+        except MechanismError as error:
+            raise MechanismError(f"{told(place)} = {error}") from None
+        needed = Dimension.of(quantity)
+        if not found.fits(needed):
+            raise MechanismError(f"{told(place)} = {quoted(value.text)} is {found} and must be {needed}")
+        check_number(f"{told(place)} = {quoted(value.text)}", number)
+        return Computed(number, value)
+
+    members = members.changed(computed)
+    for key in ("bodies", "joints", "drivers", "run"):
+        object.__setattr__(mechanism, key, getattr(members, key))
+    object.__setattr__(mechanism, "parameters", MappingProxyType(parameters))
+    object.__setattr__(mechanism, "expressions", MappingProxyType(expressions))
+
+
+def _check_names_and_unit(mechanism: Mechanism) -> None:
+    """Raise a MechanismError for a unit or a name that cannot be meant: places are found by names."""
     if mechanism.length_unit not in METRES:
         raise MechanismError(
             f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length; known: {listed(METRES)}"
@@ -99,13 +194,23 @@ def _check(mechanism: Mechanism) -> None:
     for table, members in tables.items():
         _check_names(table, [member.name for member in members])
     _check_names("points", mechanism.points)
+
+
+def _check(mechanism: Mechanism) -> None:
+    """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
     if not mechanism.moving_bodies:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in mechanism.bodies:
-        _check_numbers(body)
+        _check_body_itself(body)
     constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
     for member in constraining:
         _check_references(mechanism, member)
+    for joint in mechanism.joints:
+        _check_values(mechanism, joint)
+    for driver in mechanism.drivers:
+        for name in driver.inputs():
+            if name in mechanism.parameters:
+                raise MechanismError(f"[parameters] {name}: driver '{driver.name}' has an input of this name already")
     for name, target in mechanism.points.items():
         _check_point(mechanism, f"[points] {name}", target)
         if any(name == body.name for body in mechanism.bodies):
@@ -136,14 +241,9 @@ def _check_names(table: str, names: Iterable[str]) -> None:
         seen.add(name)
 
 
-def _check_numbers(body: Body) -> None:
-    for name, point in body.points.items():
+def _check_body_itself(body: Body) -> None:
+    for name in body.points:
         check_name(f"[bodies.{body.name}] points", name)
-        for value in point:
-            check_number(f"[bodies.{body.name}] points.{name}", value)
-    for key, value in body.start._asdict().items():
-        if value is not None:
-            check_number(f"[bodies.{body.name}] start.{key}", value)
     if body.is_ground and any(value is not None for value in body.start):
         raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
 
@@ -154,18 +254,27 @@ def _check_references(mechanism: Mechanism, member: Joint | Driver) -> None:
     for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
         where, value = f"[{table}.{member.name}] {key.name}", getattr(member, key.name)
         for said in getattr(hints[key.name], "__metadata__", ()):
-            if isinstance(said, Quantity):
-                check_number(where, value)
-            elif isinstance(said, Reference):
+            if isinstance(said, Reference):
                 _check_reference(mechanism, where, value, said, is_pair=hints[key.name].__origin__ is not str)
-    if isinstance(member, Driver):
-        for constant in member.law.orders:
-            check_number(f"[{table}.{member.name}] {constant}", getattr(member.law, constant))
     bodies = member.bodies()
     if len(bodies) > 1 and len(set(bodies)) == 1:
         raise MechanismError(f"[{table}.{member.name}] joins body '{bodies[0]}' to itself")
     if set(bodies) == {GROUND_NAME}:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
+
+
+def _check_values(mechanism: Mechanism, joint: Joint) -> None:
+    """What the joint says of its values; expressions in them are told with the parameters that they hold."""
+    try:
+        joint.check()
+    except MechanismError as error:
+        at_fault = {k[-1]: e for k, e in mechanism.expressions.items() if k[:2] == ("joints", joint.name)}
+        if not at_fault:
+            raise
+        values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
+        said = [f"{key} = {quoted(expression.text)}" for key, expression in at_fault.items()]
+        said += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
+        raise type(error)(f"{error} ({listed(said)})", **error.data) from None
 
 
 def _check_reference(mechanism: Mechanism, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:

@@ -12,13 +12,16 @@ from kinfmu.drivers import DRIVERS, LAWS, Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.number import written
+from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_name, check_number
-from kinfmu.units import METRES, Quantity, factors
+from kinfmu.mechanism.valid import check_name
+from kinfmu.units import METRES, Quantity, unit_of
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
-_TABLES = ("name", "title", "units", "run", "bodies", "joints", "drivers", "points", "outputs")
+_TABLES = ("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "points", "outputs")
 _ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
 
 
@@ -83,6 +86,7 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
             for name, target in _named(document, "points")
         },
         coordinates=coordinates,
+        parameters={name: _parameter(name, value) for name, value in _named(document, "parameters")},
         run=reader.run(_table(document, "run")),
     )
 
@@ -100,30 +104,9 @@ class _Reader:
     def __init__(self, length_unit: str) -> None:
         self.length_unit = length_unit
 
-    def number(self, where: str, value: object, quantity: Quantity) -> float:
-        """A number, or text such as '60 deg' with a unit of that quantity."""
-        known = factors(quantity, self.length_unit)
-        valid = f"a number or text such as '{_example(quantity)}'" if known else "a number"
-        factor = 1.0
-        if isinstance(value, str):
-            digits, _, unit = value.strip().partition(" ")
-            unit = unit.strip()
-            try:
-                written: float = float(digits)
-            except ValueError:
-                raise MechanismError(f"{where} = {quoted(value)} must be {valid}") from None
-            if unit not in known:
-                said = f"unit {quoted(unit)} must be one of" if unit else "text needs a unit, one of"
-                raise MechanismError(f"{where} = {quoted(value)}: {said} {listed(known)}")
-            factor = known[unit]
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            written = value
-        else:
-            raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
-        check_number(where, written, value)
-        number = float(written) * factor
-        check_number(where, number, value)
-        return number
+    def number(self, where: str, value: object, quantity: Quantity) -> Any:
+        """A number, from text such as '60 deg' too, or the expression of parameters that the mechanism resolves."""
+        return written(where, value, quantity, self.length_unit)
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
         where = f"[bodies.{name}]"
@@ -190,6 +173,17 @@ class _Reader:
         return values
 
 
+def _parameter(name: str, value: Any) -> Parameter:
+    """A parameter as a number, as text, or as a table { value = ..., description = "..." }."""
+    if not isinstance(value, dict):
+        return Parameter(value)
+    where = f"[parameters.{name}]"
+    _known_keys(where, value, ("value", "description"))
+    if "value" not in value:
+        raise MechanismError(f"{where} needs the key 'value'; keys: value, description")
+    return Parameter(value["value"], description=_text(f"{where} description", value.get("description", "")))
+
+
 def _keys(cls: type) -> list[str]:
     return [key.name for key in fields(cls) if key.name != "name"]
 
@@ -250,17 +244,15 @@ def _text(where: str, value: object, valid: str = "text") -> str:
     return value
 
 
-def _example(quantity: Quantity) -> str:
-    examples = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
-    return examples[quantity.kind] + ("", "/s", "/s2")[quantity.order]
-
-
 def text(mechanism: Mechanism) -> str:
     """The mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
     lines = [f"name = {_toml(mechanism.name)}"]
     if mechanism.title:
         lines.append(f"title = {_toml(mechanism.title)}")
-    lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}", "", "[run]"]
+    lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}"]
+    if mechanism.parameters:
+        lines += ["", "[parameters]", *(_written(name, p, mechanism) for name, p in mechanism.parameters.items())]
+    lines += ["", "[run]"]
     lines += [f"{key.name} = {_toml(getattr(mechanism.run, key.name))}" for key in fields(RunSettings)]
     for body in mechanism.bodies:
         lines += ["", f"[bodies.{body.name}]"]
@@ -285,7 +277,19 @@ def text(mechanism: Mechanism) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _written(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
+    """The line of a parameter: its expression, or its number with the unit that tells what it measures."""
+    value: object = parameter.value
+    if parameter.expression is None and parameter.quantity and parameter.kind != "number":
+        value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
+    if not parameter.description:
+        return f"{name} = {_toml(value)}"
+    return f"{name} = {{ value = {_toml(value)}, description = {_toml(parameter.description)} }}"
+
+
 def _toml(value: object) -> str:
+    if isinstance(value, Computed):
+        value = value.expression.text
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'

@@ -25,13 +25,17 @@ def check_name(where: str, name: str) -> None:
 def check_number(where: str, value: Any, written: object = None) -> None:
     """Raise a MechanismError unless `value` is a finite number of a size that can be meant; `written`: as given."""
     told = quoted(value if written is None else written)
-    is_number = isinstance(value, Real) and not isinstance(value, bool)
-    if not is_number:
+    if not is_number(value):
         raise MechanismError(f"{where} = {told} must be a number")
     if value != value or value in (math.inf, -math.inf):
         raise MechanismError(f"{where} = {told} must be a finite number")
     if abs(value) > LARGEST_NUMBER:
         raise MechanismError(f"{where} = {told} is too large; numbers go up to {LARGEST_NUMBER:g}")
+
+
+def is_number(value: object) -> bool:
+    """True for real numbers; truth values are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def check_line(where: str, text: str) -> None:

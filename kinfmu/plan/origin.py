@@ -26,9 +26,9 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
 
 
 def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
-    """The same mechanism elsewhere: ground points, start poses and absolute joints."""
-    bodies = []
-    for body in mechanism.bodies:
+    """The same mechanism elsewhere: ground points, start poses and absolute joints, their expressions too."""
+    bodies, written = [], mechanism.written()
+    for body in written.bodies:
         if body.is_ground:
             points = {name: Point(point.x + dx, point.y + dy) for name, point in body.points.items()}
             bodies.append(replace(body, points=points))
@@ -36,5 +36,5 @@ def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
             x, y, phi = body.start
             start = Start(None if x is None else x + dx, None if y is None else y + dy, phi)
             bodies.append(replace(body, start=start))
-    joints = tuple(joint.moved(dx, dy) for joint in mechanism.joints)
+    joints = tuple(joint.moved(dx, dy) for joint in written.joints)
     return replace(mechanism, bodies=tuple(bodies), joints=joints)

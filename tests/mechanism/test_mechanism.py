@@ -11,7 +11,7 @@ import pytest
 
 from kinfmu import gallery
 from kinfmu.drivers import AngleDriver, ConstantSpeed
-from kinfmu.errors import KinfmuError, MechanismError
+from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Joint, Revolute
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 from kinfmu.mechanism.quoted import LONGEST, quoted
@@ -85,7 +85,6 @@ def test_an_axis_must_be_x_or_y() -> None:
         (math.inf, "must be a finite number"),
         (2e30, "is too large"),
         (10**400, "is too large"),
-        ("1", "must be a number"),
         (True, "must be a number"),
         (None, "must be a number"),
     ],
@@ -103,17 +102,23 @@ def test_what_is_no_number_is_told_wherever_it_stands(value: Any, why: str) -> N
     assert starts(str(caught.value), "[run] stop")
 
 
-@pytest.mark.parametrize("point", [(1.0,), (1.0, 2.0, 3.0), 1.0, ("a", "b"), None])
+@pytest.mark.parametrize("point", [(1.0,), (1.0, 2.0, 3.0), 1.0, "ab", None])
 def test_a_point_that_is_no_pair_of_numbers_is_told(point: Any) -> None:
     with pytest.raises(MechanismError) as caught:
         Body("bar", {"P": point})
     assert str(caught.value) == f"[bodies.bar] points.P = {quoted(point)} must be two numbers [x, y]"
 
 
-@pytest.mark.parametrize("length", [0.0, -1.0, math.nan, 1e-200])
+@pytest.mark.parametrize("length", [0.0, -1.0, 1e-200])
 def test_a_distance_without_a_positive_length_is_told_by_its_name(length: float) -> None:
-    with pytest.raises(KinfmuError, match=r"^\[joints\.AB\] length = .* must be a positive number, 1e-30 or more$"):
-        Distance("AB", ("ground.O", "bar.P"), length)
+    message = told(Distance("AB", ("ground.O", "bar.P"), length))
+    assert message == f"[joints.AB] length = {length!r} must be a positive number, 1e-30 or more"
+
+
+def test_text_without_a_unit_is_told_where_units_are_known() -> None:
+    needed = "'1': text needs a unit, one of"
+    assert told(Coordinate("g", "bar.P", "x", "1")).startswith(f"[joints.g] value = {needed} m, mm")  # type: ignore[arg-type]
+    assert told(run=RunSettings(stop="1")).startswith(f"[run] stop = {needed} s, ms")  # type: ignore[arg-type]
 
 
 def test_a_pair_of_bodies_must_be_two_bodies() -> None:

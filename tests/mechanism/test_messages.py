@@ -44,13 +44,13 @@ CHANGES = {
         "[joints.O]",
         "[joint.O]",
         "[joint]: unknown key; did you mean 'joints'?; "
-        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
     ),
     "a key of the file that is not known": (
         "title =",
         "tittle =",
         "tittle: unknown key; did you mean 'title'?; "
-        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
     ),
     "a key of a joint that is not known": (
         "length = 1\n",
@@ -230,7 +230,7 @@ CHANGES = {
     "a length that is text without a number": (
         "length = 1\n",
         'length = "one m" ',
-        "[joints.AB] length = 'one m' must be a number or text such as '25 mm'",
+        "[joints.AB] length = 'one m', character 5: 'm' where one of + - * / ** must stand",
     ),
     "a speed with the unit of an angle": (
         '"1 deg/s"',
@@ -307,7 +307,7 @@ CHANGES = {
         "title =",
         r'"tit\nle" =',
         r"'tit\nle': unknown key; did you mean 'title'?; "
-        "keys: name, title, units, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
     ),
     "a title with a line break": (
         'title = "Four-bar',

@@ -1,0 +1,129 @@
+"""What an expression measures: a length, an angle, a time, products of their powers, or a pure number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from kinfmu.units import Quantity
+
+_ANGLES = {0: "an angle", -1: "an angular speed", -2: "an angular acceleration"}  # by the power of time
+_LENGTHS = {0: "a length", -1: "a speed", -2: "an acceleration"}
+
+
+class DimensionError(Exception):
+    """Two quantities do not go together; the message says which."""
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Powers of length and time; angles are pure numbers that are known to be angles.
+
+    length, time: the powers; is_angle: radians are in it; is_bare: a number without a unit is in it as a factor, which
+    may be meant in the unit of its place ("3" as a length, and "3*a/b" too); is_known: False for a parameter without a
+    unit, of which nobody can say what it measures, and for what is computed of it.
+    """
+
+    length: Fraction = Fraction(0)
+    time: Fraction = Fraction(0)
+    is_angle: bool = False
+    is_bare: bool = False
+    is_known: bool = True
+
+    @classmethod
+    def of(cls, quantity: Quantity) -> Dimension:
+        """The dimension of a quantity."""
+        length, time = {"length": (1, 0), "time": (0, 1)}.get(quantity.kind, (0, 0))
+        return cls(Fraction(length), Fraction(time - quantity.order), is_angle=quantity.kind == "angle")
+
+    @property
+    def quantity(self) -> Quantity | None:
+        """The quantity that has this dimension; None if files know no unit for it, or if it is not known."""
+        if not self.is_known or self.is_open:
+            return None
+        for kind in ("angle" if self.is_angle else "number", "length", "time"):
+            for order in (0,) if kind in ("number", "time") else (0, 1, 2):
+                same = Dimension.of(Quantity(kind, order))
+                if (same.length, same.time) == (self.length, self.time):
+                    return Quantity(kind, order)
+        return None
+
+    @property
+    def is_open(self) -> bool:
+        """True for a bare number, which takes the unit of its place."""
+        return self.is_known and self.is_bare and not self.is_angle and self.length == 0 and self.time == 0
+
+    def fits(self, other: Dimension) -> bool:
+        """True unless the two are known to measure different things."""
+        if not (self.is_known and other.is_known) or self.is_open or other.is_open:
+            return True
+        return (self.length, self.time) == (other.length, other.time)
+
+    def __str__(self) -> str:
+        if self.length == 0 and self.time == 0 and not self.is_angle:
+            return "a number"
+        if self.length == 0 and self.is_angle and self.time in _ANGLES:
+            return _ANGLES[int(self.time)]
+        if self.length == 1 and self.time in _LENGTHS:
+            return _LENGTHS[int(self.time)]
+        if self.length == 0 and self.time == 1:
+            return "a time"
+        powers = ((self.length, "length"), (self.time, "time"))
+        return " ".join(name if power == 1 else f"{name}^{power}" for power, name in powers if power != 0)
+
+
+BARE = Dimension(is_bare=True)
+NUMBER = Dimension()
+ANGLE = Dimension(is_angle=True)
+UNKNOWN = Dimension(is_known=False)
+
+
+def sum_of(a: Dimension, b: Dimension) -> Dimension:
+    """Dimension of a + b and of a - b."""
+    if not a.fits(b):
+        raise DimensionError(f"{a} and {b} do not add up")
+    telling = max(a, b, key=lambda d: 0 if d.is_open else 2 if d.is_known else 1)
+    return replace(telling, is_angle=a.is_angle or b.is_angle, is_bare=a.is_bare and b.is_bare)
+
+
+def product_of(a: Dimension, b: Dimension) -> Dimension:
+    """Dimension of a * b."""
+    return Dimension(
+        a.length + b.length,
+        a.time + b.time,
+        is_angle=a.is_angle or b.is_angle,
+        is_bare=a.is_bare or b.is_bare,
+        is_known=a.is_known and b.is_known,
+    )
+
+
+def quotient_of(a: Dimension, b: Dimension) -> Dimension:
+    """Dimension of a / b."""
+    turned = replace(b, length=-b.length, time=-b.time, is_angle=False)
+    return replace(product_of(a, turned), is_angle=a.is_angle and not b.is_angle)
+
+
+def power_of(a: Dimension, exponent: Fraction) -> Dimension:
+    """Dimension of a ** exponent."""
+    return replace(a, length=a.length * exponent, time=a.time * exponent, is_angle=a.is_angle and exponent == 1)
+
+
+def ratio_of_angle(a: Dimension) -> Dimension:
+    """Dimension of sin a, cos a and tan a."""
+    if not a.fits(ANGLE):
+        raise DimensionError(f"an angle is needed, not {a}")
+    return NUMBER
+
+
+def angle_of_ratio(a: Dimension) -> Dimension:
+    """Dimension of asin a and acos a."""
+    if not a.fits(NUMBER):
+        raise DimensionError(f"a number is needed, not {a}")
+    return ANGLE
+
+
+def angle_of_pair(a: Dimension, b: Dimension) -> Dimension:
+    """Dimension of atan2(a, b)."""
+    if not a.fits(b):
+        raise DimensionError(f"two of a kind are needed, not {a} and {b}")
+    return ANGLE

@@ -1,0 +1,160 @@
+"""Parameters of a mechanism: the numbers that geometry refers to by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from typing import NamedTuple
+
+from kinfmu.errors import MechanismError, listed
+from kinfmu.joints.arithmetic import Value
+from kinfmu.mechanism.dimension import UNKNOWN, Dimension
+from kinfmu.mechanism.expression import WORDS, Computed, Expression
+from kinfmu.mechanism.number import written
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_line, check_name, check_number
+from kinfmu.units import Quantity
+
+NUMBER = Quantity("number")
+_MOST_TOLD = 8  # names of a circle that a message lists
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number with a name.
+
+    value: the number in the units used inside; before a mechanism resolves it also text with a unit or an expression
+    of other parameters ("40 mm", "2*a"). quantity: what it measures; if nothing is said, what its unit says, else the
+    place where its name stands alone, else a pure number. description: one line for people.
+    """
+
+    value: float
+    quantity: Quantity | None = None
+    description: str = ""
+
+    @property
+    def kind(self) -> str:
+        """'length', 'angle', 'time' or 'number'."""
+        return (self.quantity or NUMBER).kind
+
+    @property
+    def expression(self) -> Expression | None:
+        """How it follows from other parameters; None if it is a number of its own."""
+        return self.value.expression if isinstance(self.value, Computed) else None
+
+
+class Said(NamedTuple):
+    """A parameter as it is said: not yet computed."""
+
+    value: float | Expression
+    quantity: Quantity | None
+    description: str
+
+
+def read(name: str, parameter: Parameter | float | str, length_unit: str) -> Said:
+    """What is said of a parameter; a MechanismError tells what cannot be meant."""
+    check_name("[parameters]", name)
+    if name in WORDS:
+        raise MechanismError(f"[parameters] {name}: expressions mean something else by this name: {listed(WORDS)}")
+    if not isinstance(parameter, Parameter):
+        parameter = Parameter(parameter)  # type: ignore[arg-type]  # text until it is resolved
+    check_line(f"[parameters] {name} description", parameter.description)
+    value = written(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
+    quantity = parameter.quantity
+    if quantity is None and isinstance(parameter.value, str) and not isinstance(value, Expression):
+        quantity = Expression(parameter.value, length_unit).dimension({}).quantity
+    return Said(value, quantity, parameter.description)
+
+
+def resolved(parameters: Mapping[str, Said], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
+    """Parameters with their values and quantities; MechanismErrors name what is unknown, circles and wrong units.
+
+    parameters: as `read` gives them; alone: for a parameter the quantities of the places where its name stands alone.
+    """
+    expressions = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
+    order = _in_order(parameters, expressions)
+    quantities = {name: parameter.quantity for name, parameter in parameters.items()}
+    wanted = {name: set(alone.get(name, ())) for name in parameters}
+    for name in reversed(order):
+        if quantities[name] is None and name not in expressions and len(wanted[name]) == 1:
+            (quantities[name],) = wanted[name]
+        other = expressions[name].alone if name in expressions else None
+        if other is not None:
+            wanted[other] |= wanted[name]
+    done: dict[str, Parameter] = {}
+    values: dict[str, float] = {}
+    dimensions: dict[str, Dimension] = {}
+    for name in order:
+        said, quantity = parameters[name], quantities[name]
+        dimensions[name] = Dimension.of(quantity) if quantity and quantity != NUMBER else UNKNOWN
+        if isinstance(said.value, Expression):
+            number, found = _computed(name, said.value, values, dimensions)
+            if found.is_known and not found.is_open:
+                dimensions[name], quantity = found, quantity or found.quantity
+            elif quantity is None and len(wanted[name]) == 1:
+                (quantity,) = wanted[name]
+                dimensions[name] = Dimension.of(quantity)
+            done[name] = Parameter(number, quantity or NUMBER, said.description)
+        else:
+            done[name] = Parameter(said.value, quantity or NUMBER, said.description)
+        values[name] = float(done[name].value)
+    return {name: done[name] for name in parameters}
+
+
+def _computed(
+    name: str, expression: Expression, values: Mapping[str, float], dimensions: Mapping[str, Dimension]
+) -> tuple[Computed, Dimension]:
+    """Number and dimension of a parameter's expression, which must fit what is said of the parameter."""
+    where = f"[parameters] {name} ="
+    try:
+        found = expression.dimension(dimensions)
+        number = float(expression.value(values))
+    except MechanismError as error:
+        raise MechanismError(f"{where} {error}") from None
+    check_number(f"{where} {quoted(expression.text)}", number)
+    if not found.fits(dimensions[name]):
+        raise MechanismError(f"{where} {quoted(expression.text)} is {found} and must be {dimensions[name]}")
+    return Computed(number, expression), found
+
+
+def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
+    """What resolved parameters measure; a pure number may be anything that has no unit in the file."""
+    found: dict[str, Dimension] = {}
+    expressions = {name: p.expression for name, p in parameters.items() if p.expression is not None}
+    for name in _in_order(parameters, expressions):
+        quantity = parameters[name].quantity
+        if quantity is not None and quantity != NUMBER:
+            found[name] = Dimension.of(quantity)
+        else:
+            found[name] = expressions[name].dimension(found) if name in expressions else UNKNOWN
+    return found
+
+
+def evaluated(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
+    """Values of all parameters, in any arithmetic: those in `values` as given, what follows from them computed."""
+    expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in values}
+    found: dict[str, Value] = {}
+    for name in _in_order(parameters, expressions):
+        if name in values:
+            found[name] = values[name]
+        else:
+            found[name] = expressions[name].value(found) if name in expressions else float(parameters[name].value)
+    return found
+
+
+def _in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
+    """The names, each after those that its expression needs."""
+    names = list(names)
+    for name, expression in expressions.items():
+        try:
+            expression.refuse_unknown(names)
+        except MechanismError as error:
+            raise MechanismError(f"[parameters] {name} = {error}") from None
+    needs = {name: expressions[name].names if name in expressions else () for name in names}
+    try:
+        return list(TopologicalSorter(needs).static_order())
+    except CycleError as error:
+        circle = error.args[1][::-1]
+        shown = circle if len(circle) <= _MOST_TOLD else [*circle[: _MOST_TOLD - 1], "...", circle[-1]]
+        raise MechanismError(f"[parameters] {circle[0]} needs itself: {' -> '.join(shown)}") from None

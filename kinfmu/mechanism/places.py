@@ -1,0 +1,103 @@
+"""The places of a mechanism where numbers stand, by name: where messages point, and where expressions may be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from operator import is_
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+from kinfmu.drivers import Driver, Law
+from kinfmu.joints import Joint
+from kinfmu.joints.arithmetic import Value
+from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.units import Quantity
+
+if TYPE_CHECKING:
+    from kinfmu.mechanism.mechanism import RunSettings
+
+Place = tuple[str | int, ...]
+"""Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
+("joints", joint, key), ("drivers", driver, key), ("joints" | "drivers", name, "law", constant), ("run", key)."""
+
+Change = Callable[[Place, Any, Quantity], Any]  # place, value and quantity -> new value
+LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
+_START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
+
+
+@dataclass(frozen=True)
+class Members:
+    """What has numbers in a mechanism, with the numbers in any arithmetic."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    drivers: tuple[Driver, ...]
+    run: RunSettings
+
+    @property
+    def body_points(self) -> dict[str, tuple[Value, Value]]:
+        """Body-fixed coordinates of every point, by 'body.point'."""
+        return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
+
+    def changed(self, change: Change) -> Members:
+        """The members with change(place, value, quantity) in every place; what does not change stays the same."""
+        run = {key.name: change(("run", key.name), getattr(self.run, key.name), TIME) for key in fields(self.run)}
+        return Members(
+            tuple(_body(body, change) for body in self.bodies),
+            tuple(_member(joint, ("joints", joint.name), change) for joint in self.joints),
+            tuple(_member(driver, ("drivers", driver.name), change) for driver in self.drivers),
+            _replaced(self.run, run),
+        )
+
+
+def told(place: Place) -> str:
+    """A place as messages name it: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
+    if place[0] == "run":
+        return f"[run] {place[1]}"
+    table, name, *path = place
+    keys = [str(key) for key in path if key != "law" and not isinstance(key, int)]
+    return f"[{table}.{name}] {'.'.join(keys)}"
+
+
+@cache
+def quantities_of(cls: Any) -> Mapping[str, Quantity]:
+    """The fields of a joint or driver class that are numbers, with what they measure."""
+    hints = get_type_hints(cls, include_extras=True)
+    said = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}
+    return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, Quantity)}
+
+
+def _body(body: Body, change: Change) -> Body:
+    points = {}
+    for name, point in body.points.items():
+        new = tuple(change(("bodies", body.name, "points", name, k), point[k], LENGTH) for k in (0, 1))
+        points[name] = point if all(map(is_, new, point)) else Point(*new)
+    start = Start(
+        *(
+            None if value is None else change(("bodies", body.name, "start", key), value, _START[key])
+            for key, value in body.start._asdict().items()
+        )
+    )
+    is_same = all(points[name] is point for name, point in body.points.items()) and all(map(is_, start, body.start))
+    return body if is_same else Body(body.name, points, start)
+
+
+def _member(member: Any, place: Place, change: Change) -> Any:
+    cls: object = type(member)  # object: mypy holds that type[Any] has no hash
+    numbers = quantities_of(cls).items()
+    values = {key: change((*place, key), getattr(member, key), quantity) for key, quantity in numbers}
+    law = getattr(member, "law", None)
+    if isinstance(law, Law):
+        constants = {
+            key: change((*place, "law", key), getattr(law, key), Quantity(member.quantity.kind, order))
+            for key, order in law.orders.items()
+        }
+        values["law"] = _replaced(law, constants)
+    return _replaced(member, values)
+
+
+def _replaced(member: Any, values: Mapping[str, Any]) -> Any:
+    """The member with these values in its fields; itself if they are there already."""
+    new = {key: value for key, value in values.items() if value is not getattr(member, key)}
+    return replace(member, **new) if new else member
