@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, get_type_hints
+from typing import Any
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
@@ -17,7 +17,7 @@ from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.number import written
 from kinfmu.mechanism.parameters import Parameter, dimensions_of, evaluated, read, resolved
-from kinfmu.mechanism.places import Members, Place, told
+from kinfmu.mechanism.places import Members, Place, hints_of, told
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number
 from kinfmu.units import METRES, Quantity
@@ -196,15 +196,19 @@ def _check_names_and_unit(mechanism: Mechanism) -> None:
     _check_names("points", mechanism.points)
 
 
+Bodies = Mapping[str, Body]  # by name
+
+
 def _check(mechanism: Mechanism) -> None:
     """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
     if not mechanism.moving_bodies:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in mechanism.bodies:
         _check_body_itself(body)
+    bodies = {body.name: body for body in mechanism.bodies}
     constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
     for member in constraining:
-        _check_references(mechanism, member)
+        _check_references(bodies, member)
     for joint in mechanism.joints:
         _check_values(mechanism, joint)
     for driver in mechanism.drivers:
@@ -212,8 +216,8 @@ def _check(mechanism: Mechanism) -> None:
             if name in mechanism.parameters:
                 raise MechanismError(f"[parameters] {name}: driver '{driver.name}' has an input of this name already")
     for name, target in mechanism.points.items():
-        _check_point(mechanism, f"[points] {name}", target)
-        if any(name == body.name for body in mechanism.bodies):
+        _check_point(bodies, f"[points] {name}", target)
+        if name in bodies:
             raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would mean two things")
     if isinstance(mechanism.coordinates, str):
         if mechanism.coordinates not in ("moving", "all"):
@@ -221,7 +225,7 @@ def _check(mechanism: Mechanism) -> None:
                 f"[outputs] coordinates = {quoted(mechanism.coordinates)} must be 'moving', 'all' or a list of names"
             )
     else:
-        known = mechanism.coordinate_names
+        known = dict.fromkeys(mechanism.coordinate_names)
         for name in mechanism.coordinates:
             if name not in known:
                 raise MechanismError(
@@ -248,18 +252,19 @@ def _check_body_itself(body: Body) -> None:
         raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
 
 
-def _check_references(mechanism: Mechanism, member: Joint | Driver) -> None:
+def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
     table = "joints" if isinstance(member, Joint) else "drivers"
-    hints = get_type_hints(type(member), include_extras=True)
+    cls: object = type(member)
+    hints = hints_of(cls)
     for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
         where, value = f"[{table}.{member.name}] {key.name}", getattr(member, key.name)
         for said in getattr(hints[key.name], "__metadata__", ()):
             if isinstance(said, Reference):
-                _check_reference(mechanism, where, value, said, is_pair=hints[key.name].__origin__ is not str)
-    bodies = member.bodies()
-    if len(bodies) > 1 and len(set(bodies)) == 1:
-        raise MechanismError(f"[{table}.{member.name}] joins body '{bodies[0]}' to itself")
-    if set(bodies) == {GROUND_NAME}:
+                _check_reference(bodies, where, value, said, is_pair=hints[key.name].__origin__ is not str)
+    touched = member.bodies()
+    if len(touched) > 1 and len(set(touched)) == 1:
+        raise MechanismError(f"[{table}.{member.name}] joins body '{touched[0]}' to itself")
+    if set(touched) == {GROUND_NAME}:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
@@ -277,34 +282,33 @@ def _check_values(mechanism: Mechanism, joint: Joint) -> None:
         raise type(error)(f"{error} ({listed(said)})", **error.data) from None
 
 
-def _check_reference(mechanism: Mechanism, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:
+def _check_reference(bodies: Bodies, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:
     if is_pair and not (isinstance(value, tuple) and len(value) == 2):
         raise MechanismError(f"{where} = {quoted(value)} must be two points, ('body.point', 'body.point')")
     for one in value if is_pair else (value,):
         if not isinstance(one, str):
             raise MechanismError(f"{where} = {quoted(one)} must be text")
         if reference.kind == "point":
-            _check_point(mechanism, where, one)
+            _check_point(bodies, where, one)
         elif reference.kind == "body":
-            _check_body(mechanism, where, one)
+            _check_body(bodies, where, one)
         elif one not in reference.choices:
             raise MechanismError(f"{where} = {quoted(one)} must be one of {listed(reference.choices)}")
 
 
-def _check_body(mechanism: Mechanism, where: str, name: str) -> None:
-    names = [body.name for body in mechanism.bodies]
-    if name not in names:
+def _check_body(bodies: Bodies, where: str, name: str) -> None:
+    if name not in bodies:
         raise MechanismError(
-            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, names)}; bodies: {listed(names)}"
+            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, bodies)}; bodies: {listed(bodies)}"
         )
 
 
-def _check_point(mechanism: Mechanism, where: str, name: str) -> None:
+def _check_point(bodies: Bodies, where: str, name: str) -> None:
     body_name, dot, point = name.partition(".")
     if not dot:
         raise MechanismError(f"{where} = {quoted(name)} must be 'body.point'")
-    _check_body(mechanism, where, body_name)
-    known = next(body for body in mechanism.bodies if body.name == body_name).points
+    _check_body(bodies, where, body_name)
+    known = bodies[body_name].points
     if point not in known:
         raise MechanismError(
             f"{where}: body '{body_name}' has no point {quoted(point)}{suggestion(point, known)}; "

@@ -61,10 +61,15 @@ def told(place: Place) -> str:
 
 
 @cache
+def hints_of(cls: Any) -> Mapping[str, Any]:
+    """What the fields of a joint or driver class are declared to be."""
+    return get_type_hints(cls, include_extras=True)
+
+
+@cache
 def quantities_of(cls: Any) -> Mapping[str, Quantity]:
     """The fields of a joint or driver class that are numbers, with what they measure."""
-    hints = get_type_hints(cls, include_extras=True)
-    said = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}
+    said = {key.name: getattr(hints_of(cls)[key.name], "__metadata__", ()) for key in fields(cls)}
     return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, Quantity)}
 
 

@@ -24,13 +24,14 @@ def check_name(where: str, name: str) -> None:
 
 def check_number(where: str, value: Any, written: object = None) -> None:
     """Raise a MechanismError unless `value` is a finite number of a size that can be meant; `written`: as given."""
+    if is_number(value) and abs(value) <= LARGEST_NUMBER:
+        return
     told = quoted(value if written is None else written)
     if not is_number(value):
         raise MechanismError(f"{where} = {told} must be a number")
     if value != value or value in (math.inf, -math.inf):
         raise MechanismError(f"{where} = {told} must be a finite number")
-    if abs(value) > LARGEST_NUMBER:
-        raise MechanismError(f"{where} = {told} is too large; numbers go up to {LARGEST_NUMBER:g}")
+    raise MechanismError(f"{where} = {told} is too large; numbers go up to {LARGEST_NUMBER:g}")
 
 
 def is_number(value: object) -> bool:
