@@ -15,14 +15,14 @@ from kinfmu.draw.motion import motion
 from kinfmu.draw.names import place
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
-from kinfmu.draw.slides import rails, reaches, slides, slots_and_blocks
+from kinfmu.draw.slides import rails, rods, slides, slots_and_blocks
 from kinfmu.draw.wheels import wheels
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.mechanism import Mechanism
 
 SUFFIXES = (".svg", ".png")
 DOTS_PER_INCH = 150  # of a PNG
-MOST_NAMES = 150  # more would cover the drawing
+MOST_NAMES = 90  # more would cover the drawing
 
 
 def figure(mechanism: Mechanism, path: str | Path) -> None:
@@ -84,7 +84,7 @@ def _marks(shown: Instant) -> list[Mark]:
         *wheels(shown),
         *supports(shown),
         *rails(shown, sliding),
-        *links(shown, reaches(sliding)),
+        *links(shown, rods(shown, sliding)),
         *slots_and_blocks(shown, sliding),
         *motion(shown),
         *pins(shown, sliding),

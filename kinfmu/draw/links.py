@@ -23,26 +23,31 @@ _NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # parts of an edge beside which its nam
 
 @dataclass(frozen=True, eq=False)
 class Link(Mark):
-    """A moving body: corners (k, 2) along it or, if closed, around it."""
+    """A moving body: corners (k, 2) along it or, if closed, around it; rods: (r, 2, 2) ends of its slots and rods."""
 
     name: str
     corners: FloatArray
     is_closed: bool
+    rods: FloatArray
     colour: palette.Colour
 
     def extent(self) -> FloatArray:
-        return self.corners
+        return np.vstack([self.corners, *self.rods])
 
     def draw(self, sheet: Sheet) -> list[Name]:
         width = BAR * sheet.fine
         clearance = width / 2.0 + 1.5
         edge, fill = palette.darker(self.colour), palette.lighter(self.colour)
-        if len(self.corners) < 2:
+        routes = [(self.corners, self.is_closed)] if len(self.corners) > 1 else []
+        routes += [(rod, False) for rod in self.rods]
+        if not routes:
             return [Name(self.name, self.corners, 2.0 * clearance, edge, italic=True, rank=3)]
-        sheet.line(self.corners, width + _EDGE, edge, closed=self.is_closed, matters=0.8)
-        sheet.line(self.corners, width - _EDGE, fill, closed=self.is_closed, fill=fill, matters=0.0)
-        route = np.vstack([self.corners, self.corners[:1]]) if self.is_closed else self.corners
-        edges = sorted(pairwise(route), key=lambda ends: -np.hypot(*(ends[1] - ends[0])))
+        for route, is_closed in routes:  # first all edges, so that the parts look like one
+            sheet.line(route, width + _EDGE, edge, closed=is_closed, matters=0.8)
+        for route, is_closed in routes:
+            sheet.line(route, width - _EDGE, fill, closed=is_closed, fill=fill if is_closed else None, matters=0.0)
+        edges = [ends for route, is_closed in routes for ends in pairwise([*route, *route[: int(is_closed)]])]
+        edges.sort(key=lambda ends: -float(np.hypot(*(ends[1] - ends[0]))))
         anchors = [a + part * (b - a) for a, b in edges for part in _NAMED_AT]
         if self.is_closed:  # inside if there is room
             anchors, clearance = [self.corners.mean(axis=0), *anchors], 0.0
@@ -68,17 +73,18 @@ class ThinBar(Mark):
         return [Name(self.name, anchors, 0.3 * BAR * sheet.fine + 1.5, colour, italic=True, rank=2)]
 
 
-def links(shown: Instant, reaches: Mapping[str, FloatArray]) -> list[Mark]:
+def links(shown: Instant, rods: Mapping[str, FloatArray]) -> list[Mark]:
     """All moving bodies, plates first, and massless bars.
 
-    reaches: by body, more points (k, 2) of its frame that its outline takes in, such as the ends of a slot.
+    rods: by body, ends (r, 2, 2) of its slots and rods in its own frame.
     """
     plates: list[Mark] = []
     bars: list[Mark] = []
     for index, body in enumerate(shown.mechanism.moving_bodies):
-        points = np.vstack([points_of(body), reaches.get(body.name, np.empty((0, 2)))])
-        corners, is_closed = rim(points)
-        link = Link(body.name, shown.placed(body.name, corners), is_closed, palette.body(index))
+        corners, is_closed = rim(points_of(body))
+        ends = rods.get(body.name, np.empty((0, 2, 2)))
+        own = shown.placed(body.name, ends.reshape(-1, 2)).reshape(-1, 2, 2)
+        link = Link(body.name, shown.placed(body.name, corners), is_closed, own, palette.body(index))
         (plates if is_closed else bars).append(link)
     thin: list[Mark] = [
         ThinBar(joint.name, np.array([shown.point(end) for end in joint.between]))
@@ -93,6 +99,6 @@ def shortest(marks: list[Mark], size: float) -> float:
     lengths = []
     for mark in marks:
         if isinstance(mark, Link | ThinBar):
-            steps = np.diff(mark.extent(), axis=0)
+            steps = np.diff(mark.ends if isinstance(mark, ThinBar) else mark.corners, axis=0)
             lengths += [length for length in np.hypot(*steps.T) if length > 1e-3 * size]
     return float(min(lengths, default=size))

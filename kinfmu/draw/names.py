@@ -85,6 +85,8 @@ def _covering(
     spots: FloatArray, half: FloatArray, covered: FloatArray, taken: Sequence[FloatArray], corner: FloatArray
 ) -> FloatArray:
     """What it costs to cover dots and names, or to leave the sheet, at each spot (s,)."""
+    within = (covered[:, :2] > spots.min(axis=0) - half) & (covered[:, :2] < spots.max(axis=0) + half)
+    covered = covered[within.all(axis=1)]
     near = np.abs(covered[None, :, :2] - spots[:, None, :])  # (s, k, 2)
     costs = ((near < half).all(axis=2) * covered[:, 2]).sum(axis=1)
     for box in taken:

@@ -30,15 +30,21 @@ _SLOT, _OPENING = 1.55, 0.75  # widths of a slotted link and of its slot beside 
 class Slide:
     """A line fixed in one body, the holder, and the point of another that stays on it.
 
+    origin: a point of the line, 'body.point', 'ground' if it has no name; point: the one that slides;
     ends: of the way over the run in the holder's frame, (2, 2); turns: True for a pin, which is free to turn, False for
     a block, which is not.
     """
 
     name: str
-    holder: str
+    origin: str
     point: str
     ends: FloatArray
     turns: bool
+
+    @property
+    def holder(self) -> str:
+        """The body of the line."""
+        return body_of(self.origin)
 
     @property
     def slider(self) -> str:
@@ -100,22 +106,26 @@ def slides(shown: Instant) -> list[Slide]:
             found.append(Slide(joint.name, GROUND_NAME, joint.of, ends, turns=True))
         elif isinstance(joint, PointOnLine):
             a, b = joint.between
-            found.append(Slide(joint.name, body_of(a), b, _ends(shown, a, b, joint.axis), turns=True))
+            found.append(Slide(joint.name, a, b, _ends(shown, a, b, joint.axis), turns=True))
         elif isinstance(joint, Translational):
             a, b, axis = *joint.between, joint.axis
             if _is_block(shown, body_of(a)) and not _is_block(shown, body_of(b)):  # the line is that of the rod
                 a, b, axis = b, a, axis - joint.angle
-            found.append(Slide(joint.name, body_of(a), b, _ends(shown, a, b, axis), turns=False))
+            found.append(Slide(joint.name, a, b, _ends(shown, a, b, axis), turns=False))
     return found
 
 
-def reaches(sliding: Sequence[Slide]) -> dict[str, FloatArray]:
-    """By moving body, the ends (k, 2) of its slots and rods in its own frame: its outline takes them in."""
+def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
+    """By moving body, ends (r, 2, 2) of its slots and rods in its own frame; each reaches to the origin of its line."""
     found: dict[str, list[FloatArray]] = {}
     for slide in sliding:
         if slide.holder != GROUND_NAME:
-            found.setdefault(slide.holder, []).append(slide.ends)
-    return {body: np.vstack(ends) for body, ends in found.items()}
+            origin = np.array(shown.mechanism.body_points[slide.origin])
+            line = [origin, *slide.ends]
+            along = slide.ends[1] - slide.ends[0]
+            order = np.argsort([float(point @ along) for point in line])
+            found.setdefault(slide.holder, []).append(np.array([line[order[0]], line[order[-1]]]))
+    return {body: np.array(ends) for body, ends in found.items()}
 
 
 def rails(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:

@@ -29,7 +29,7 @@ from kinfmu.draw.ground import Rail, Support, supports
 from kinfmu.draw.instant import instant
 from kinfmu.draw.motion import Cylinder, Push, Turn, motion
 from kinfmu.draw.pins import Pin, pins
-from kinfmu.draw.slides import Block, Slot, rails, reaches, slides, slots_and_blocks
+from kinfmu.draw.slides import Block, Slot, rails, rods, slides, slots_and_blocks
 from kinfmu.draw.wheels import Belt, Rack, Wheel, wheels
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
@@ -115,7 +115,8 @@ def test_a_pin_runs_in_a_slot_of_its_link() -> None:
     assert isinstance(slot, Slot)
     lengths = [np.hypot(*(end - shown.point("lever.C"))) for end in slot.ends]
     np.testing.assert_allclose(sorted(lengths), [1.5, 2.5], atol=1e-9)
-    assert set(reaches(sliding)) == {"lever"}
+    (bar,) = rods(shown, sliding)["lever"]  # from its pivot to the end of the slot
+    np.testing.assert_allclose(bar, [[0.0, 0.0], [2.5, 0.0]], atol=1e-9)
     assert rails(shown, sliding) == []
 
 
