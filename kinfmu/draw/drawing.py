@@ -16,7 +16,7 @@ from kinfmu.draw.names import place
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.slides import rails, rods, slides, slots_and_blocks
-from kinfmu.draw.wheels import wheels
+from kinfmu.draw.wheels import racks, wheels
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.mechanism import Mechanism
 
@@ -86,6 +86,7 @@ def _marks(shown: Instant) -> list[Mark]:
         *rails(shown, sliding),
         *links(shown, rods(shown, sliding)),
         *slots_and_blocks(shown, sliding),
+        *racks(shown),
         *motion(shown),
         *pins(shown, sliding),
     ]

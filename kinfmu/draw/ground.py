@@ -105,6 +105,7 @@ def supports(shown: Instant) -> list[Mark]:
                 at = shown.point(point)
                 body = body_of(other)
                 ends = [shown.point(f"{body}.{name}") for name in _points(shown, body)]
+                ends.append(np.mean(ends, axis=0))  # a plate covers what lies between its points
                 held.setdefault((float(at[0]), float(at[1])), []).extend(end - at for end in ends)
     return [Support(np.array(at), _free_side(leaving)) for at, leaving in held.items()]
 

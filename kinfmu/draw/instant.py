@@ -1,4 +1,4 @@
-"""The instant that a figure shows: where everything is at the start pose, and where the run takes it from there."""
+"""The instant that a figure shows: where everything is then, and where the run takes it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinfmu.draw.view import clearest
 from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, start_targets
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
@@ -20,13 +21,14 @@ from kinfmu.shapes.placing import poses_of, world
 from kinfmu.sweep import run_times, solve
 
 MOST_SAMPLES = 1000  # of the run; a figure shows no more
+_BESIDE = 0.1  # part of a driver's way; a start pose further from the run is a rough guess
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The start pose, closed, and the poses of the run.
+    """The pose to draw, and the poses of the run.
 
-    poses: (1 + n, 3) by body, the ground too: x, y [length], phi [rad] at the start pose, then at n samples of the run,
+    poses: (1 + n, 3) by body, the ground too: x, y [length], phi [rad] of the drawn pose, then at n samples of the run,
     NaN where one holds no numbers. ways: +1.0 or -1.0 by driver, which way it moves first.
     """
 
@@ -35,33 +37,33 @@ class Instant:
     ways: Mapping[str, float]
 
     def track(self, point: str) -> FloatArray:
-        """World coordinates (1 + n, 2) of 'body.point', the first at the start pose."""
+        """World coordinates (1 + n, 2) of 'body.point', the first as drawn."""
         return world(self.poses[body_of(point)], self.mechanism.body_points[point])
 
     def point(self, point: str) -> FloatArray:
-        """World coordinates (2,) of 'body.point' at the start pose."""
+        """World coordinates (2,) of 'body.point' as drawn."""
         return np.asarray(self.track(point)[0])
 
     def placed(self, body: str, points: FloatArray) -> FloatArray:
-        """World coordinates (k, 2) at the start pose of points (k, 2) in a body's frame."""
+        """World coordinates (k, 2) of points (k, 2) in a body's frame, as drawn."""
         return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
 
     def angle(self, body: str) -> float:
-        """Angle of a body at the start pose [rad]."""
+        """Angle of a body as drawn [rad]."""
         return float(self.poses[body][0, 2])
 
     def value(self, driver: str) -> float:
-        """What a driver measures at the start pose [rad or length]."""
+        """What a driver measures as drawn [rad or length]."""
         poses = {name: Pose.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
         return float(found.measured().value(Placement(poses, self.mechanism.body_points)))
 
 
 def instant(mechanism: Mechanism) -> Instant:
-    """The start pose and the run of a mechanism.
+    """What to draw of a mechanism: its start pose, if the run comes by it and links do not lie on one another there.
 
-    One that cannot be solved, for want of a driver say, is shown at the start pose without its run. One that does not
-    close raises the error that says so.
+    Else a sample of the run in which they do not. A mechanism that cannot be solved, for want of a driver say, is shown
+    at the start pose without its run. One that does not close raises the error that says so.
     """
     try:
         plan = compile_plan(replace(mechanism, coordinates="all"))
@@ -74,14 +76,27 @@ def _moving(mechanism: Mechanism, plan: SolvePlan) -> Instant:
     times = run_times(mechanism.run)
     run = solve(plan, times[:: -(-len(times) // MOST_SAMPLES)])
     poses, _ = poses_of(run, mechanism)
+    poses[GROUND_NAME] = np.zeros((len(run), 3))
     start = _by_body(mechanism, plan.anchor.q, plan.origin)
+    values = run.inputs[:, ::3]  # (n, d)
+    is_met = not run.good.any() or _is_near(plan.anchor.u, values[run.good])
+    choice = {name: np.vstack([start[name], pose]) if is_met else pose for name, pose in poses.items()}
+    row = clearest(mechanism, choice)
     ways = {}
     for k, driver in enumerate(mechanism.drivers):
         speeds = run.inputs[:, 3 * k + 1]
         moving = speeds[speeds != 0.0]
         ways[driver.name] = float(np.sign(moving[0])) if len(moving) else 1.0
-    motion = {name: np.vstack([pose, poses[name]]) for name, pose in start.items()}
-    return Instant(mechanism, motion | {GROUND_NAME: np.zeros((1 + len(run), 3))}, ways)
+    drawn = {name: np.vstack([choice[name][row], pose]) for name, pose in poses.items()}
+    return Instant(mechanism, drawn, ways)
+
+
+def _is_near(u: FloatArray, values: FloatArray) -> bool:
+    """True if driver values u (d,) are near some of a run's (n, d) against how far these go, or if one stands still."""
+    reach = np.ptp(values, axis=0)
+    if not reach.all():
+        return True
+    return bool((np.abs(values - u) / reach).max(axis=1).min() <= _BESIDE)
 
 
 def _standing(mechanism: Mechanism, problem: KinfmuError) -> Instant:
@@ -95,13 +110,11 @@ def _standing(mechanism: Mechanism, problem: KinfmuError) -> Instant:
         q, gap = close(system, rough_start(system), start_targets(system), range(system.joint_row_count))
         if gap > CLOSED:
             raise problem
-    poses = _by_body(mechanism, q, origin)
-    return Instant(
-        mechanism, poses | {GROUND_NAME: np.zeros((1, 3))}, {driver.name: 1.0 for driver in mechanism.drivers}
-    )
+    return Instant(mechanism, _by_body(mechanism, q, origin), {driver.name: 1.0 for driver in mechanism.drivers})
 
 
 def _by_body(mechanism: Mechanism, q: FloatArray, origin: Point) -> dict[str, FloatArray]:
-    """Pose (1, 3) by moving body from all coordinates q, which count from `origin`."""
+    """Pose (1, 3) by body, the ground too, from all coordinates q, which count from `origin`."""
     poses = q.reshape(-1, 3) + np.array([origin.x, origin.y, 0.0])
-    return {body.name: pose[None] for body, pose in zip(mechanism.moving_bodies, poses, strict=True)}
+    found = {body.name: pose[None] for body, pose in zip(mechanism.moving_bodies, poses, strict=True)}
+    return found | {GROUND_NAME: np.zeros((1, 3))}

@@ -12,6 +12,7 @@ from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet, arc, box
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
+from kinfmu.equations.system import size_of
 from kinfmu.joints import Revolute
 from kinfmu.joints.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
@@ -112,9 +113,7 @@ def motion(shown: Instant) -> list[Mark]:
 
 def _mark(shown: Instant, driver: Driver) -> Mark:
     value, way = shown.value(driver.name), shown.ways[driver.name]
-    unit = shown.mechanism.length_unit
-    told = f"{math.degrees(value):.4g}\N{DEGREE SIGN}" if driver.quantity.kind == "angle" else f"{value:.4g} {unit}"
-    text = f"{driver.name} = {told}"
+    text = f"{driver.name} = {_told(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
         tracks = [shown.track(end) for end in driver.between]
         lengths = np.hypot(*(tracks[1] - tracks[0]).T)
@@ -131,6 +130,14 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
     *held, body = driver.bodies()
     centre = _pivot(shown, body, held[0] if held else GROUND_NAME)
     return Turn(text, centre, way, _heading(shown, body, centre))
+
+
+def _told(shown: Instant, driver: Driver, value: float) -> str:
+    """A driver's value with its unit, to a tenth of a degree or to four digits of the mechanism's size."""
+    if driver.quantity.kind == "angle":
+        return f"{round(math.degrees(value), 1) + 0.0:.6g}\N{DEGREE SIGN}"
+    finest = 4 - math.ceil(math.log10(size_of(shown.mechanism)))
+    return f"{round(value, finest) + 0.0:.6g} {shown.mechanism.length_unit}"
 
 
 def _pivot(shown: Instant, body: str, against: str) -> FloatArray:

@@ -14,7 +14,7 @@ from kinfmu.shapes.palette import Colour
 _DIRECTIONS = 16  # in which a name may stand beside its anchor
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0)  # [pt] from where it would touch
 _LEADER_FROM = 9.0  # [pt]; a name further off is tied to its anchor by a thin line
-_AIR = 1.5  # [pt] around a name
+_AIR, _GAP = 1.5, 3.0  # [pt] above and below a name, and beside it
 _OVERLAP, _OFF_SHEET, _DISTANCE, _TILT = 60.0, 200.0, 0.12, 0.05  # costs beside 1 for a dot of what is drawn
 
 
@@ -57,7 +57,7 @@ def _half_size(text: str, *, italic: bool) -> FloatArray:
 
     font = FontProperties(size=FONT, style="italic" if italic else "normal")
     width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
-    return np.array([width / 2.0 + _AIR, FONT / 2.0 + _AIR])
+    return np.array([width / 2.0 + _GAP, FONT / 2.0 + _AIR])
 
 
 def _spots(

@@ -136,6 +136,8 @@ def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Plac
 def _pin(place: _Place) -> Pin:
     """A place with its names: those of its joints, else of its points, then those of interest."""
     kind = max(place.kinds, key=_ORDER.index, default="")
-    points = [name.partition(".")[2] for name in place.points] if kind != "slide" else []
+    points = [name.partition(".")[2] for name in place.points]
+    if kind == "slide" or (kind == "loose" and place.interest):
+        points = []
     texts = dict.fromkeys([*(place.joints or points), *place.interest])
     return Pin(place.at, kind, ", ".join(texts), next(iter(place.interest.values()), None))

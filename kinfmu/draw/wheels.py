@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
-from kinfmu.draw.sheet import Sheet
+from kinfmu.draw.sheet import PAPER, Sheet, box
 from kinfmu.joints import Gear, RackAndPinion, Revolute
 from kinfmu.joints.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
@@ -31,13 +31,14 @@ class Wheel(Mark):
     radius: float
     angle: float
     colour: palette.Colour
+    filled: bool = True
 
     def extent(self) -> FloatArray:
         return np.array([self.centre - self.radius, self.centre + self.radius])
 
     def draw(self, sheet: Sheet) -> list[Name]:
         edge = palette.darker(self.colour)
-        light = palette.lighter(palette.lighter(palette.lighter(self.colour)))
+        light = palette.lighter(palette.lighter(palette.lighter(self.colour))) if self.filled else None
         sheet.circle(self.centre, self.radius, 1.0, edge, fill=light, style=_DASHES, matters=0.6)
         spoke = self.centre + self.radius * np.array([np.cos(self.angle), np.sin(self.angle)])
         sheet.line([self.centre, spoke], 1.0, edge, matters=0.4)
@@ -93,6 +94,8 @@ class Rack(Mark):
         back = (_TOOTH + _BACK) * size * self.towards
         corners = [*teeth, self.ends[1] + _TOOTH * size * self.towards, self.ends[1] + back, self.ends[0] + back]
         edge, fill = palette.darker(self.colour), palette.lighter(self.colour)
+        room = box(self.ends.mean(axis=0), along, length / 2.0, (_TOOTH + 2.0) * size)  # where the body's own bar lies
+        sheet.line(room, 0.0, PAPER, closed=True, fill=PAPER, matters=0.0)
         sheet.line(corners, 0.9, edge, closed=True, fill=fill)
         sheet.line(self.ends, 0.7, edge, style=_DASHES, matters=0.0)
         return []
@@ -113,14 +116,15 @@ class MeshName(Mark):
 
 
 def wheels(shown: Instant) -> list[Mark]:
-    """Gear pairs, belts and racks; larger wheels below smaller ones."""
-    marks: list[Mark] = []
-    for joint in shown.mechanism.joints:
-        if isinstance(joint, Gear):
-            marks += _pair(shown, joint)
-        elif isinstance(joint, RackAndPinion):
-            marks += _rack(shown, joint)
+    """Gear pairs and belts; larger wheels below smaller ones."""
+    marks = [mark for joint in shown.mechanism.joints if isinstance(joint, Gear) for mark in _pair(shown, joint)]
     return sorted(marks, key=lambda mark: -mark.radius if isinstance(mark, Wheel) else 0.0)
+
+
+def racks(shown: Instant) -> list[Mark]:
+    """Racks and their pinions; over the links, for a rack is often a link too."""
+    joints = shown.mechanism.joints
+    return [mark for joint in joints if isinstance(joint, RackAndPinion) for mark in _rack(shown, joint)]
 
 
 def _pair(shown: Instant, joint: Gear) -> list[Mark]:
@@ -169,7 +173,7 @@ def _rack(shown: Instant, joint: RackAndPinion) -> list[Mark]:
     ends = np.array([contact + first * along, contact + last * along])
     return [
         Rack(ends, across, _colour(shown, rack)),
-        Wheel(centre, radius, shown.angle(joint.pinion), _colour(shown, joint.pinion)),
+        Wheel(centre, radius, shown.angle(joint.pinion), _colour(shown, joint.pinion), filled=False),
         MeshName(joint.name, contact),
     ]
 

@@ -1,0 +1,78 @@
+"""Which pose of a motion shows a mechanism best: one in which links do not lie on one another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinfmu.joints import Distance, Translational
+from kinfmu.joints.placement import body_of, unit_vector
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import FloatArray
+from kinfmu.shapes.outline import points_of, rim
+from kinfmu.shapes.placing import world
+
+ENOUGH = 0.04  # part of all links that may be covered without another pose being looked for
+_CANDIDATES = 24  # poses of a run that are looked at
+_DOTS = np.linspace(0.12, 0.88, 9)  # along each link, away from its pins
+_NEAR = 0.025  # part of the size; a dot nearer than that to another link is covered
+_MOST_LINKS = 60  # beyond, the start pose is as good as any
+
+
+def clearest(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
+    """Row of poses (n, 3) by body that shows the mechanism best: the first one if it is clear enough."""
+    rows = np.unique(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int))
+    rows = np.array([row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())])
+    owners, links = _links(mechanism, {body: pose[rows] for body, pose in poses.items()})  # (r, links, 2, 2)
+    if not 1 < len(owners) <= _MOST_LINKS:
+        return int(rows[0])
+    covered = []
+    for ends in links:
+        covered.append(round(_covered(owners, ends), 6))
+        if covered[-1] <= ENOUGH:
+            return int(rows[len(covered) - 1])
+    return int(rows[int(np.argmin(covered))])
+
+
+def _links(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> tuple[list[str], FloatArray]:
+    """Owners of all straight edges, and their ends (r, links, 2, 2) in the world."""
+    owners: list[str] = []
+    ends: list[FloatArray] = []
+
+    def add(owner: str, a: FloatArray, b: FloatArray) -> None:
+        owners.append(owner)
+        ends.append(np.stack([a, b], axis=1))  # (r, 2, 2)
+
+    for body in mechanism.moving_bodies:
+        corners, is_closed = rim(points_of(body))
+        tracks = [world(poses[body.name], (x, y)) for x, y in corners]
+        for k in range(len(tracks) - (not is_closed)):
+            add(body.name, tracks[k], tracks[(k + 1) % len(tracks)])
+    points = mechanism.body_points
+    for joint in mechanism.joints:
+        if isinstance(joint, Distance):
+            a, b = (world(poses[body_of(end)], points[end]) for end in joint.between)
+            add(joint.name, a, b)
+        elif isinstance(joint, Translational) and body_of(joint.between[0]) == GROUND_NAME:
+            origin = np.array(points[joint.between[0]])
+            along = np.array(unit_vector(joint.axis))
+            track = world(poses[body_of(joint.between[1])], points[joint.between[1]])
+            way = (track - origin) @ along
+            first, last = (np.tile(origin + end * along, (len(track), 1)) for end in (way.min(), way.max()))
+            add(GROUND_NAME, first, last)
+    return owners, np.stack(ends, axis=1) if ends else np.empty((0, 0, 2, 2))
+
+
+def _covered(owners: list[str], ends: FloatArray) -> float:
+    """Part of the dots on all links that lie on a link of another body; ends: (links, 2, 2)."""
+    size = float(np.ptp(ends.reshape(-1, 2), axis=0).max())
+    a, d = ends[:, 0], ends[:, 1] - ends[:, 0]
+    dots = (a[:, None] + d[:, None] * _DOTS[None, :, None]).reshape(-1, 2)  # (links * dots, 2)
+    owner = np.repeat(np.array(owners), len(_DOTS))
+    part = ((dots[:, None] - a[None]) * d[None]).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30)
+    nearest = a[None] + np.clip(part, 0.0, 1.0)[:, :, None] * d[None]
+    distance = np.hypot(*(dots[:, None] - nearest).transpose(2, 0, 1))  # (links * dots, links)
+    distance[owner[:, None] == np.array(owners)[None, :]] = np.inf
+    return float((distance.min(axis=1) < _NEAR * size).mean())
