@@ -111,3 +111,24 @@ def atan2(y: Series, x: Series) -> Series:
     xs, ys = x.cut(short), y.cut(short)
     rate = (xs * y.derivative() - ys * x.derivative()) / (xs * xs + ys * ys)
     return rate.integral(mp.atan2(y.c[0], x.c[0]))
+
+
+def angle(y: Any, x: Any) -> Series:
+    """atan2 where one of the two may be a number."""
+    return atan2(y if isinstance(y, Series) else x._like(y), x if isinstance(x, Series) else y._like(x))
+
+
+def floor(x: Series) -> Series:
+    """The largest whole number below, which stands still."""
+    return x * 0 + mp.floor(x.c[0])
+
+
+def curve(x: Series, data: tuple[Any, Any]) -> Series:
+    """A piecewise function by its definition: a polynomial of s and a sin(w s + p), on the piece that holds x."""
+    breaks, pieces = data
+    origin, coefficients, a, w, p = pieces[sum(limit <= x.c[0] for limit in breaks)]
+    s = x - origin
+    value = x * 0
+    for coefficient in coefficients:
+        value = value * s + coefficient
+    return value + sin(s * w + p) * a

@@ -12,7 +12,11 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from kinfmu.joints.arithmetic import cos, sin, sqrt
+from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
+from kinfmu.solver.curve import CurveData
+from kinfmu.solver.curve import curve as curve_value
+
+Content = float | str | tuple[CurveData, int] | None
 
 
 class Node:
@@ -20,11 +24,11 @@ class Node:
 
     __slots__ = ("args", "graph", "id", "op", "value")
 
-    def __init__(self, graph: Graph, op: str, args: tuple[Node, ...], value: float | str | None, number: int) -> None:
+    def __init__(self, graph: Graph, op: str, args: tuple[Node, ...], value: Content, number: int) -> None:
         self.graph = graph
-        self.op = op  # "constant", "symbol", "+", "-", "*", "/", "neg", "sin", "cos", "sqrt"
+        self.op = op  # "constant", "symbol", "+", "-", "*", "/", "neg", or a key of FUNCTIONS
         self.args = args
-        self.value = value  # of a constant its float, of a symbol its name
+        self.value = value  # of a constant its float, of a symbol its name, of a curve its data and order
         self.id = number
 
     @property
@@ -35,6 +39,16 @@ class Node:
     def name(self) -> str:
         """Name of a symbol."""
         return str(self.value)
+
+    @property
+    def curve(self) -> tuple[CurveData, int]:
+        """Data and order of derivative of a curve."""
+        return self.value  # type: ignore[return-value]  # curves hold these
+
+    def next_derivative(self) -> Node:
+        """The curve's derivative of the next order, at the same argument."""
+        data, order = self.curve
+        return self.graph.function("curve", *self.args, value=(data, order + 1))
 
     def __repr__(self) -> str:
         return str(self.value) if not self.args else f"{self.op}({', '.join(map(repr, self.args))})"
@@ -138,17 +152,18 @@ class Graph:
         """A node of this graph for a node or a number."""
         return x if isinstance(x, Node) else self.constant(x)
 
-    def _intern(self, op: str, args: tuple[Node, ...], value: float | str | None) -> Node:
+    def _intern(self, op: str, args: tuple[Node, ...], value: Content) -> Node:
         key = (op, value, *(arg.id for arg in args))
         if key not in self._nodes:
             self._nodes[key] = Node(self, op, args, value, len(self._nodes))
         return self._nodes[key]
 
-    def function(self, name: str, x: Node) -> Node:
-        """sin, cos or sqrt of a node."""
-        if x.constant is not None:
-            return self.constant(getattr(math, name)(x.constant))
-        return self.node(name, x)
+    def function(self, name: str, *args: Node, value: Content = None) -> Node:
+        """One of FUNCTIONS of nodes; `value` is what a curve needs besides."""
+        numbers = [arg.constant for arg in args if arg.constant is not None]
+        if len(numbers) == len(args):
+            return self.constant(_applied(name, value, numbers))
+        return self._intern(name, args, value)
 
     def derivative(self, targets: Sequence[Node], rates: Mapping[Node, Node]) -> list[Node]:
         """Derivatives of the targets when symbols move at the given rates; symbols without a rate stand still."""
@@ -173,6 +188,13 @@ class Graph:
                 d[node] = self.function("cos", a) * d[a]
             elif node.op == "cos":
                 d[node] = -(self.function("sin", a) * d[a])
+            elif node.op == "atan2":  # of y and x: (x y' - y x') / (x^2 + y^2)
+                turned = b * d[a] - a * d[b]
+                d[node] = turned / (b * b + a * a)
+            elif node.op == "floor":
+                d[node] = zero
+            elif node.op == "curve":
+                d[node] = node.next_derivative() * d[a]
             else:  # sqrt
                 d[node] = d[a] / (node * (one + one))
         return [d[target] for target in targets]
@@ -200,10 +222,19 @@ def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float
         elif node.op == "symbol":
             at[node] = values[node.name]
         else:
-            at[node] = _OPERATIONS[node.op](*args)
+            at[node] = _applied(node.op, node.value, args)
     return [at[target] for target in targets]
 
 
+def _applied(op: str, value: Content, args: Sequence[float]) -> float:
+    """An operation on numbers."""
+    if isinstance(value, tuple):
+        data, order = value
+        return curve_value(data, order, args[0])
+    return _OPERATIONS[op](*args)
+
+
+FUNCTIONS = ("sin", "cos", "sqrt", "floor", "atan2", "curve")
 _OPERATIONS: dict[str, Callable[..., float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -213,6 +244,8 @@ _OPERATIONS: dict[str, Callable[..., float]] = {
     "sin": math.sin,
     "cos": math.cos,
     "sqrt": math.sqrt,
+    "floor": floor,
+    "atan2": math.atan2,
 }
 
 
@@ -234,3 +267,18 @@ def _(x: Node) -> Node:
 @sqrt.register
 def _(x: Node) -> Node:
     return x.graph.function("sqrt", x)
+
+
+@floor.register
+def _(x: Node) -> Node:
+    return x.graph.function("floor", x)
+
+
+@curve.register
+def _(x: Node, data: CurveData, order: int = 0) -> Node:
+    return x.graph.function("curve", x, value=(data, order))
+
+
+@atan2_like.register
+def _(like: Node, y: Node | float, x: Node | float) -> Node:
+    return like.graph.function("atan2", like.graph.lift(y), like.graph.lift(x))

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.joints.arithmetic import cos, sin, sqrt
+from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
+from kinfmu.solver.curve import CurveData
+from kinfmu.solver.curve import curve as curve_value
 
 Derivative = Any  # float, or (n,) for n lines at once
 
@@ -82,3 +84,23 @@ def _(x: Taylor) -> Taylor:
 def _(x: Taylor) -> Taylor:
     root = float(np.sqrt(x.f))
     return _chain(x, root, 0.5 / root, -0.25 / (root * x.f))
+
+
+@floor.register
+def _(x: Taylor) -> Taylor:
+    return Taylor(float(np.floor(x.f)))
+
+
+@curve.register
+def _(x: Taylor, data: CurveData, order: int = 0) -> Taylor:
+    return _chain(x, *(curve_value(data, order + k, x.f) for k in range(3)))
+
+
+@atan2_like.register
+def _(like: Taylor, y: Taylor | float, x: Taylor | float) -> Taylor:  # noqa: ARG001
+    """w = (x y' - y x') / r^2 and w' = (x y'' - y x'' - 2 w (x x' + y y')) / r^2."""
+    y, x = _lifted(y), _lifted(x)
+    squared = x.f * x.f + y.f * y.f
+    d1 = (x.f * y.d1 - y.f * x.d1) / squared
+    d2 = (x.f * y.d2 - y.f * x.d2 - 2.0 * d1 * (x.f * x.d1 + y.f * y.d1)) / squared
+    return Taylor(float(np.arctan2(y.f, x.f)), d1, d2)

@@ -1,4 +1,4 @@
-"""The arithmetic in which joints and laws are written: `+ - * /` of the operands, and `sin cos sqrt` from here.
+"""The arithmetic in which joints and laws are written: `+ - * /` of the operands, and the functions from here.
 
 One formula serves floats (direct evaluation), complex numbers (derivative tests), Taylor numbers (the dense reference)
 and symbols (generated code): each room that brings its own kind of number registers it with these functions.
@@ -10,6 +10,9 @@ import cmath
 import math
 from functools import singledispatch
 from typing import Any
+
+from kinfmu.solver.curve import CurveData
+from kinfmu.solver.curve import curve as curve_value
 
 Value = Any  # float, complex, Taylor number, array or symbol: whatever the operands are
 
@@ -32,6 +35,50 @@ def sqrt(x: Value) -> Value:
     return math.sqrt(x)
 
 
+@singledispatch
+def floor(x: Value) -> Value:
+    """The largest whole number that is not above x; its derivative is 0, at the whole numbers too."""
+    return float(math.floor(x))
+
+
+@singledispatch
+def curve(x: Value, data: CurveData, order: int = 0) -> Value:
+    """The derivative of the given order (0: the value) of a piecewise function at x; data as in `solver.curve`."""
+    return curve_value(data, order, x)
+
+
+def atan2(y: Value, x: Value) -> Value:
+    """The angle of the vector (x, y) in [-pi, pi] [rad]; its derivative is that of the angle turned continuously."""
+    return atan2_like(x if isinstance(y, float | int) else y, y, x)
+
+
+@singledispatch
+def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  it decides by its type
+    """atan2(y, x) in the arithmetic of `like`, which is one of the two: what a new kind of number registers."""
+    return math.atan2(y, x)
+
+
 sin.register(complex, cmath.sin)
 cos.register(complex, cmath.cos)
 sqrt.register(complex, cmath.sqrt)
+
+
+# Complex numbers carry a derivative in their imaginary part (complex step): what has no analytic continuation follows
+# its real part, to first order.
+
+
+@floor.register
+def _(x: complex) -> complex:
+    return complex(math.floor(x.real))
+
+
+@curve.register
+def _(x: complex, data: CurveData, order: int = 0) -> complex:
+    return complex(curve_value(data, order, x.real), x.imag * curve_value(data, order + 1, x.real))
+
+
+@atan2_like.register
+def _(like: complex, y: complex, x: complex) -> complex:  # noqa: ARG001
+    y, x = complex(y), complex(x)
+    turned = (x.real * y.imag - y.real * x.imag) / (x.real * x.real + y.real * y.real)
+    return complex(math.atan2(y.real, x.real), turned)

@@ -89,16 +89,20 @@ class SolvePlan:
         return tuple(name for name, _ in self.watches)
 
     @cached_property
-    def text(self) -> str:
-        """The plan as text, the same for equal plans: its nodes numbered in order, then what is made of them."""
+    def nodes(self) -> tuple[Node, ...]:
+        """Every node that the plan is made of, arguments first."""
         roots = [node for block in self.blocks for node in _nodes(block)]
         roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
-        roots += [node for _, node in self.watches]
-        number = {node: k for k, node in enumerate(reachable(roots))}
+        return tuple(reachable([*roots, *(node for _, node in self.watches)]))
+
+    @cached_property
+    def text(self) -> str:
+        """The plan as text, the same for equal plans: its nodes numbered in order, then what is made of them."""
+        number = {node: k for k, node in enumerate(self.nodes)}
         lines = [f"plan {self.mechanism.name} size {self.size!r} anchor {self.anchor_values!r}"]
         for node, k in number.items():
-            made_of = " ".join(str(number[arg]) for arg in node.args) if node.args else node.value
-            lines.append(f"{k} = {node.op} {made_of}")
+            made_of = [*(number[arg] for arg in node.args), *([] if node.value is None else [node.value])]
+            lines.append(f"{k} = {node.op} {' '.join(map(str, made_of))}")
         for block in self.blocks:
             scales = f"{block.row_scales} {block.determinant_scale!r}"
             lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in _nodes(block)]}")

@@ -12,13 +12,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from kinfmu.equations.graph import Graph, evaluate, reachable, symbols
-from kinfmu.joints.arithmetic import cos, sin, sqrt
+from kinfmu.joints.arithmetic import atan2, atan2_like, cos, curve, floor, sin, sqrt
 from tests import power_series
 from tests.power_series import Series
 
 Expression = Callable[[dict[str, Any]], Any]  # from the values of x, y, z: numbers or nodes
 
 BINARY = (operator.add, operator.sub, operator.mul, operator.truediv)
+STEPS = (
+    (-1.0, 2.0),
+    ((0.0, (0.5, 1.0), 0.0, 0.0, 0.0), (0.25, (1.5, -0.5, 2.0), 0.75, 3.0, 0.5), (2.0, (3.0,), 0.0, 0.0, 0.0)),
+)
 special = st.sampled_from([0.0, 1.0, -1.0, 2.0, 0.5, -0.0])  # what simplifications look for
 uneven = st.integers(-(10**9), 10**9).map(lambda n: n / 1e8)  # decimals whose every operation rounds
 numbers = st.one_of(special, uneven)
@@ -32,18 +36,28 @@ def constant(value: float) -> Expression:
     return lambda _: value
 
 
+def stepped(x: Any) -> Any:
+    return curve(x, STEPS)
+
+
+def lean(y: Any, x: Any) -> Any:
+    """An angle between -pi/2 and pi/2: at pi the sign of a zero, which simplifications lose, would tell."""
+    return atan2(y, x * x + 1.0)
+
+
 def applied(operation: Callable[..., Any], *arguments: Expression) -> Expression:
     return lambda values: operation(*(argument(values) for argument in arguments))
 
 
 def expressions() -> st.SearchStrategy[Expression]:
-    """Trees of + - * / - sin cos over x, y, z and constants."""
+    """Trees of + - * / - sin cos floor atan2 and a curve over x, y, z and constants."""
     leaves = st.one_of(st.sampled_from("xyz").map(leaf), numbers.map(constant))
     return st.recursive(
         leaves,
         lambda inner: st.one_of(
             st.builds(applied, st.sampled_from(BINARY), inner, inner),
-            st.builds(applied, st.sampled_from((operator.neg, sin, cos)), inner),
+            st.builds(applied, st.sampled_from((operator.neg, sin, cos, floor, stepped)), inner),
+            st.builds(applied, st.just(lean), inner, inner),
         ),
         max_leaves=25,
     )
@@ -100,6 +114,9 @@ def test_derivatives_on_the_graph_are_those_of_power_series(
 def _series() -> None:
     sin.register(Series, power_series.sin)
     cos.register(Series, power_series.cos)
+    floor.register(Series, power_series.floor)
+    curve.register(Series, power_series.curve)
+    atan2_like.register(Series, lambda _, y, x: power_series.angle(y, x))
 
 
 @given(x=st.floats(1e-6, 1e6))

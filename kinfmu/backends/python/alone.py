@@ -49,7 +49,7 @@ class Alone:
             elif node.op in _OPERATIONS:
                 new[node] = _OPERATIONS[node.op](*(new[arg] for arg in node.args))
             elif node.args:
-                new[node] = node.graph.function(node.op, new[node.args[0]])
+                new[node] = node.graph.function(node.op, *(new[arg] for arg in node.args), value=node.value)
             else:
                 new[node] = node
         return [new[target] for target in targets]

@@ -48,7 +48,9 @@ class _Emitter:
         self.plan = plan
         self.solved = [block for block in plan.blocks if block.unknowns]
         self.number = {id(block): k for k, block in enumerate(self.solved)}
-        self.names = Names(name for block in plan.blocks for name in block.coordinates)
+        curves = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
+        self.curves = {data: f"CURVE_{k}" for k, data in enumerate(curves, start=1)}
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
         self.position_nodes: list[Node] = []
         for block in plan.blocks:
             for name, motion in block.assigned:
@@ -93,7 +95,10 @@ class _Emitter:
         large = [
             block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)
         ]
-        imports = ["from math import cos, inf, sin, sqrt"]
+        rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
+        imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
+        if self.curves:
+            imports += ["", "from .curve import curve"]
         if large:
             imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
         kinds = tuple(driver.quantity.kind for driver in plan.drivers)
@@ -119,11 +124,12 @@ class _Emitter:
             f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
             f"BLOCKS = {tuple(starts)!r}",
             f"ANCHOR = {(anchor_u, anchor_z)!r}",
+            *(f"{name} = {data!r}" for data, name in self.curves.items()),
             "",
         ]
 
     def _drive(self) -> list[str]:
-        writer = Writer(Names(), ())
+        writer = Writer(Names(curves=self.curves), ())
         orders = [[getattr(law, order) for law in self.plan.laws] for order in ("position", "rate", "acceleration")]
         flat = [node for nodes in orders for node in nodes]
         body = writer.statements(flat)

@@ -6,7 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.equations.graph import Node
+from kinfmu.equations.graph import FUNCTIONS, Node
+from kinfmu.solver.curve import CurveData
 
 _LEVEL = {"+": 1, "-": 1, "neg": 2, "*": 3, "/": 3}
 _ATOM = 4
@@ -19,9 +20,13 @@ def identifier(name: str) -> str:
 
 
 class Names:
-    """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order."""
+    """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order.
 
-    def __init__(self, reserved: Iterable[str] = ()) -> None:
+    curves: names of the constants that hold the data of curves.
+    """
+
+    def __init__(self, reserved: Iterable[str] = (), curves: Mapping[CurveData, str] | None = None) -> None:
+        self.curves = curves or {}
         self._numbered: dict[Node, str] = {}
         self._reserved = {identifier(name) for name in reserved}
         self._count = 0
@@ -59,9 +64,7 @@ class Writer:
         new = [node for node in self._reachable(targets) if node.args and node not in self.known]
         uses = Counter(arg for node in new for arg in node.args)
         uses.update(targets)
-        inline = {
-            node for node in new if uses[node] == 1 and node not in self.keep and node.op not in ("sin", "cos", "sqrt")
-        }
+        inline = {node for node in new if uses[node] == 1 and node not in self.keep and node.op not in FUNCTIONS}
         lines: list[str] = []
         text: dict[Node, tuple[str, int]] = {}
         for node in new:
@@ -113,8 +116,11 @@ class Writer:
 
     def _operation(self, node: Node, text: Mapping[Node, tuple[str, int]]) -> tuple[str, int]:
         parts = [self._reference(arg, text) for arg in node.args]
-        if node.op not in _LEVEL:
-            return f"{node.op}({parts[0][0]})", _ATOM
+        if node.op == "curve":
+            data, order = node.curve
+            return f"curve({self.names.curves[data]}, {order}, {parts[0][0]})", _ATOM
+        if node.op in FUNCTIONS:
+            return f"{node.op}({', '.join(text for text, _ in parts)})", _ATOM
         level = _LEVEL[node.op]
         if node.op == "neg":
             return f"-{_wrapped(parts[0], level + 1)}", level
