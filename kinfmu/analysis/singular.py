@@ -1,17 +1,16 @@
-"""Singular points of a one-driver mechanism over a turn of its driver, and the range that the driver can reach."""
+"""Singular points on the way of a driver, and the range that it can reach."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from kinfmu.backends.python import load_model
-from kinfmu.plan import SolvePlan
-from kinfmu.solver import Pose, Solver
-from kinfmu.solver.advance import Limit, advance
+from kinfmu.analysis.limits import parting
+from kinfmu.analysis.way import Way
+from kinfmu.solver import Pose
+from kinfmu.solver.advance import Limit
 from kinfmu.solver.bridge import Bridge
-
-_STEP = 0.1  # [rad, sizes] between looks at the determinants
 
 
 @dataclass(frozen=True)
@@ -19,57 +18,88 @@ class SingularPoint:
     """A driver value where a block's determinant vanishes.
 
     kind: 'change point' (branches cross, the motion goes on) or 'limit' (a dead centre: the motion turns back).
-    block: its number, from 1.
+    block: its number, from 1, among the blocks of the plan in which the driver moves alone; 0 where none is to blame.
     """
 
     value: float
     kind: str
     block: int
+    driver: str
+
+
+@dataclass(frozen=True)
+class LimitPosition:
+    """The mechanism where a driver can go no further.
+
+    value: of the driver [rad or length]; coordinates: all of them by name, in the world; bodies: those that can move
+    there while the drivers stand still.
+    """
+
+    value: float
+    coordinates: Mapping[str, float] = field(hash=False)
+    bodies: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class DriverRange:
-    """Singular points met on one turn either way from the anchor (or until a limit), in order; and the reachable range.
+    """How far a driver takes the mechanism, the other drivers at their start values, and what is singular on the way.
 
-    low and high are None where no limit was met.
+    driver, kind: its name, and 'angle' or 'length'; points: in the order of the driver value; lowest, highest: the
+    limits, None where none was met; turns: after so many turns of an angle the mechanism is back where it was, None if
+    it never was; reach: the values that were looked at [rad or length]; stopped: why it could not be followed further
+    where that is no limit.
     """
 
+    driver: str
+    kind: str
     points: tuple[SingularPoint, ...]
-    low: float | None
-    high: float | None
+    lowest: LimitPosition | None
+    highest: LimitPosition | None
+    turns: int | None
+    reach: tuple[float, float]
+    stopped: str | None = None
+
+    @property
+    def low(self) -> float | None:
+        """Lower limit of the driver [rad or length], None where none was met."""
+        return None if self.lowest is None else self.lowest.value
+
+    @property
+    def high(self) -> float | None:
+        """Upper limit of the driver [rad or length], None where none was met."""
+        return None if self.highest is None else self.highest.value
 
 
-def driver_range(plan: SolvePlan) -> DriverRange | None:
-    """Follow the branch one turn (or three sizes) either way from the anchor; None if there is not just one driver."""
-    if len(plan.drivers) != 1:
+def driver_range(way: Way) -> DriverRange:
+    """Singular points and limits met on a way."""
+    limits = [limit for limit in (way.low, way.high) if limit is not None]
+    found = [SingularPoint(limit.u[0], "limit", max(limit.block, -1) + 1, way.name) for limit in limits]
+    found += [
+        _change_point(way, bridge)
+        for bridge in way.bridges
+        if not any(bridge.low <= limit.u[0] <= bridge.high for limit in limits)  # a distance of 0 is no crossing
+    ]
+    found.sort(key=lambda point: point.value)
+    return DriverRange(
+        driver=way.name,
+        kind=way.kind,
+        points=tuple(found if way.kind != "angle" else _distinct(found, way.turns or 1)),
+        lowest=_position(way, way.low),
+        highest=_position(way, way.high),
+        turns=way.turns,
+        reach=(way.poses[0].u[0], way.poses[-1].u[0]),
+        stopped=way.stopped,
+    )
+
+
+def _position(way: Way, limit: Limit | None) -> LimitPosition | None:
+    if limit is None:
         return None
-    solver = Solver(load_model(plan))
-    is_angle = plan.drivers[0].quantity.kind == "angle"
-    reach, unit = (2.0 * math.pi, 1.0) if is_angle else (3.0 * plan.size, plan.size)
-    found: dict[float, SingularPoint] = {}
-    limits: list[float | None] = []
-    start = solver.anchor.u[0]
-    for side in (-1.0, 1.0):
-        pose, limit = solver.anchor, None
-        count = math.ceil(reach / (_STEP * unit))
-        for k in range(1, count + 1):
-            arrived = advance(solver.model, pose, (start + side * reach * k / count,))
-            if isinstance(arrived, Limit):
-                limit = arrived.u[0]
-                found[limit] = SingularPoint(limit, "limit", arrived.block + 1)
-                break
-            if not arrived.good:
-                break
-            pose = arrived
-            for bridge in pose.road.bridges if pose.road else ():
-                if bridge.centre not in found:
-                    found[bridge.centre] = _change_point(bridge)
-        limits.append(limit)
-    points = sorted(found.values(), key=lambda point: point.value)
-    return DriverRange(tuple(_distinct(points, is_angle)), limits[0], limits[1])
+    coordinates = way.at_limit(limit)
+    return LimitPosition(limit.u[0], coordinates, parting(way, coordinates))
 
 
-def _change_point(bridge: Bridge) -> SingularPoint:
+def _change_point(way: Way, bridge: Bridge) -> SingularPoint:
     """The zero of the determinant inside a bridge's window, by bisection on interpolated poses."""
     low, high = bridge.centre - 0.999 * bridge.half, bridge.centre + 0.999 * bridge.half
     block = _block(bridge)
@@ -83,7 +113,7 @@ def _change_point(bridge: Bridge) -> SingularPoint:
             low = middle
         else:
             high = middle
-    return SingularPoint(0.5 * (low + high), "change point", block + 1)
+    return SingularPoint(0.5 * (low + high), "change point", block + 1, way.name)
 
 
 def _block(bridge: Bridge) -> int:
@@ -97,36 +127,22 @@ def _determinant(bridge: Bridge, u: float, block: int) -> float:
     return float(pose.determinants[block])
 
 
-def _distinct(points: list[SingularPoint], is_angle: bool) -> list[SingularPoint]:
-    """Points that differ by whole turns are one, the one in [0, 2 pi)."""
-    if not is_angle:
-        return points
+def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint]:
+    """Points that differ by whole periods are one, the one in [0, 2 pi turns); alike in every turn, by whole turns."""
+    if turns > 1:
+        once, all_turns = _distinct(points, 1), _modulo(points, turns)
+        return once if len(all_turns) == turns * len(once) else all_turns
+    return _modulo(points, turns)
+
+
+def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
+    """Points brought to [0, 2 pi turns), each once, in order."""
     kept: dict[tuple[int, str], SingularPoint] = {}
+    period = turns * math.tau
     for point in points:
-        turned = point.value
+        value = point.value
         if point.kind == "change point":
-            turned = math.fmod(math.fmod(turned, math.tau) + math.tau, math.tau)
-            turned -= math.tau if math.tau - turned < 1e-9 else 0.0
-        kept.setdefault((round(turned * 1e7), point.kind), SingularPoint(turned, point.kind, point.block))
+            value = math.fmod(math.fmod(value, period) + period, period)
+            value -= period if period - value < 1e-9 else 0.0
+        kept.setdefault((round(value * 1e7), point.kind), replace(point, value=value))
     return sorted(kept.values(), key=lambda point: point.value)
-
-
-def written(value: float, unit: str, kind: str) -> str:
-    """'pi (180 deg)', '0.7227 rad (41.41 deg)' or '0.35 m': a driver value for people."""
-    if kind != "angle":
-        return f"{value:.9g} {unit}"
-    return f"{multiple_of_pi(value) or f'{value:.9g} rad'} ({round(math.degrees(value), 8) + 0.0:.9g} deg)"
-
-
-def multiple_of_pi(value: float) -> str | None:
-    """'0', 'pi', '3 pi/2' for values that are simple fractions of pi to nine digits."""
-    for denominator in (1, 2, 3, 4, 6):
-        numerator = value / math.pi * denominator
-        if abs(numerator - round(numerator)) < 1e-9:
-            whole = round(numerator)
-            if whole == 0:
-                return "0"
-            sign, size = ("-" if whole < 0 else ""), abs(whole)
-            top = "pi" if size == 1 else f"{size} pi"
-            return f"{sign}{top}" if denominator == 1 else f"{sign}{top}/{denominator}"
-    return None

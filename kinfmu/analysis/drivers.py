@@ -1,0 +1,195 @@
+"""Drivers against degrees of freedom: what is loose and could be driven, which drivers drive nothing of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
+from kinfmu.equations.assembly import motion_samples, null_space, rough_start
+from kinfmu.equations.system import FloatArray, System
+from kinfmu.errors import KinfmuError, MobilityError, listed
+from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.redundancy import Redundancy
+
+_SAMPLES = 4  # poses of the motion that the joints leave; a row that depends at all of them depends
+_IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
+_MOVES = 1e-6  # part of a free direction from which a coordinate counts as moving
+_LARGE = 600  # coordinates; the null space of more takes too long
+
+
+class SurplusDriver(NamedTuple):
+    """A driver whose quantity the joints and the drivers before it determine already.
+
+    implied_by: names of those drivers; none if the joints alone hold it.
+    """
+
+    name: str
+    implied_by: tuple[str, ...]
+
+
+class Suggestion(NamedTuple):
+    """A driver that could be added, and the keys of its table."""
+
+    name: str
+    keys: dict[str, Any]
+
+    def __str__(self) -> str:
+        said = ", ".join(f"{key} = {_toml(value)}" for key, value in self.keys.items())
+        return f"[drivers] {self.name} = {{ {said} }}"
+
+
+@dataclass(frozen=True)
+class DriverAdvice:
+    """What the drivers leave free, at generic poses of the motion that the joints leave.
+
+    missing: drivers needed besides those that count; surplus: drivers that drive nothing of their own; loose: names of
+    coordinates that joints and drivers leave free; suggestions: drivers that, added together, would determine
+    the motion.
+    """
+
+    missing: int
+    surplus: tuple[SurplusDriver, ...]
+    loose: tuple[str, ...]
+    suggestions: tuple[Suggestion, ...]
+
+    @property
+    def loose_bodies(self) -> tuple[str, ...]:
+        """Names of the bodies with a loose coordinate."""
+        return tuple(dict.fromkeys(name.rpartition(".")[0] for name in self.loose))
+
+
+def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None:
+    """Which drivers are surplus, what is loose, and what could be driven instead.
+
+    None where all is well, where the joints do not close, or where the mechanism is too large to tell.
+    """
+    if len(system.coordinates) > _LARGE:
+        return None
+    poses = motion_samples(system, rough_start(system), redundancy.kept, _SAMPLES)
+    if not poses:
+        return None
+    gradients = [system.scaled_jacobian(pose) for pose in poses]
+    rows, surplus = _sorted_out(system, gradients, list(redundancy.kept))
+    free = null_space(gradients[-1][rows])  # (n, free directions)
+    if free.shape[1] == 0 and not surplus:
+        return None
+    loose = tuple(
+        name for name, way in zip(system.coordinates, free, strict=True) if np.abs(way).max(initial=0.0) > _MOVES
+    )
+    return DriverAdvice(free.shape[1], tuple(surplus), loose, tuple(_suggestions(system, poses[-1], free)))
+
+
+def _sorted_out(
+    system: System, gradients: Sequence[FloatArray], rows: list[int]
+) -> tuple[list[int], list[SurplusDriver]]:
+    """The rows of joints and of the drivers that count, in file order, and the drivers that do not."""
+    surplus = []
+    counted: list[int] = []
+    for index in range(system.joint_row_count, len(system.rows)):
+        others = [*rows, *counted]
+        used = np.zeros(len(others), dtype=bool)
+        is_outside = False
+        for jacobian in gradients:
+            basis, gradient = jacobian[others].T, jacobian[index]
+            weights = np.linalg.lstsq(basis, gradient, rcond=1e-9)[0]
+            left = float(np.linalg.norm(gradient - basis @ weights))
+            is_outside |= left > _IN_SPAN * max(1.0, float(np.linalg.norm(gradient)))
+            used |= np.abs(weights) > _MOVES
+        if is_outside:
+            counted.append(index)
+        else:
+            by = [system.rows[k].owner for k, is_used in zip(others, used, strict=True) if is_used and k in counted]
+            surplus.append(SurplusDriver(system.rows[index].owner, tuple(by)))
+    return [*rows, *counted], surplus
+
+
+def _suggestions(system: System, pose: FloatArray, free: FloatArray) -> Iterator[Suggestion]:
+    """Drivers that take up the free directions one by one, the most natural first."""
+    taken = {driver.name for driver in system.mechanism.drivers}
+    for driver in _candidates(system.mechanism):
+        if free.shape[1] == 0:
+            return
+        gradient = _gradient(system, driver, pose) @ free  # what the driver sees of each free direction
+        if np.linalg.norm(gradient) <= 1e-3:
+            continue
+        name = driver.name
+        while name in taken:
+            name += "_2"
+        taken.add(name)
+        yield Suggestion(name, _keys(driver))
+        free = free @ null_space(gradient[None, :])
+
+
+def _candidates(mechanism: Mechanism) -> Iterator[Driver]:
+    """Drivers that an engineer would think of: motors on the ground, slides, motors between bodies, then any."""
+    pinned = [joint for joint in mechanism.joints if isinstance(joint, Revolute)]
+    slides = [joint for joint in mechanism.joints if isinstance(joint, Translational)]
+    slots = [joint for joint in mechanism.joints if isinstance(joint, PointOnLine)]
+    rigid = {body for joint in mechanism.joints if isinstance(joint, Fixed) for body in joint.bodies()[1:]}
+    for pin in pinned:
+        if GROUND_NAME in pin.bodies():
+            (name,) = (name for name in pin.bodies() if name != GROUND_NAME)
+            yield AngleDriver(name, name)
+    for on_ground in (True, False):
+        for slide in slides:
+            if (GROUND_NAME in slide.bodies()) is on_ground:
+                yield SlideDriver(slide.name, slide.between, slide.axis)
+    for pin in pinned:
+        if GROUND_NAME not in pin.bodies():
+            i, j = pin.bodies()
+            yield RelativeAngleDriver(pin.name, (i, j))
+    for slot in slots:
+        yield SlideDriver(slot.name, slot.between, slot.axis)
+    for body in mechanism.moving_bodies:
+        if body.name not in rigid:
+            yield AngleDriver(body.name, body.name)
+            for point in body.points:
+                for axis in ("x", "y"):
+                    yield CoordinateDriver(f"{body.name}_{axis}", f"{body.name}.{point}", axis)
+
+
+def _gradient(system: System, driver: Driver, pose: FloatArray) -> FloatArray:
+    """Gradient of what a driver moves, by the scaled coordinates, (n,)."""
+    probe = System(replace(system.mechanism, joints=(), drivers=(driver,)))
+    gradient = probe.jacobian(pose)[0] * system.column_scales
+    length = float(np.linalg.norm(gradient))
+    return np.asarray(gradient / length) if length > 0.0 else gradient
+
+
+def _keys(driver: Driver) -> dict[str, Any]:
+    """The keys of a driver's table, without its law and what may be left out."""
+    keys: dict[str, Any] = {"type": driver.type}
+    for field in fields(driver):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+        value = getattr(driver, field.name)
+        if field.name not in ("name", "law") and value != field.default:
+            keys[field.name] = list(value) if isinstance(value, tuple) else value
+    return keys
+
+
+def _toml(value: Any) -> str:
+    """A key's value as a mechanism file has it."""
+    if isinstance(value, list):
+        return f"[{listed(map(_toml, value))}]"
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def better_told(problem: KinfmuError, redundancy: Redundancy, advice: DriverAdvice | None) -> KinfmuError:
+    """The problem; or, where as many drivers as degrees of freedom fight over some of them, that they do."""
+    if advice is None or not advice.surplus or redundancy.inconsistent or not advice.loose:
+        return problem
+    fights = [
+        f"[drivers.{surplus.name}] drives what "
+        + (f"{listed(surplus.implied_by)} and the joints determine" if surplus.implied_by else "the joints hold")
+        for surplus in advice.surplus
+    ]
+    instead = f"; drive, for example, {advice.suggestions[0]}" if advice.suggestions else ""
+    return MobilityError(
+        f"{listed(fights)}, while {listed(advice.loose_bodies)} can still move{instead}",
+        mobility=redundancy.mobility,
+    )

@@ -1,0 +1,79 @@
+"""One driver alone: the mechanism in which the other drivers hold their start values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from kinfmu.drivers import Driver
+from kinfmu.joints.joint import Held
+from kinfmu.joints.measures import CoordinateOf, Measure
+from kinfmu.mechanism import Mechanism, Start
+from kinfmu.plan import SolvePlan, compile_plan
+
+
+@dataclass(frozen=True)
+class HeldDriver(Held):
+    """What a driver moves, held at a value.
+
+        Phi = measure - value, or what the measure has in its place        (1 row)
+
+    Only `check` makes it: the range of one driver is told with the others at their start values.
+    """
+
+    type: ClassVar[str] = "held_driver"
+    labels: ClassVar[tuple[str, ...]] = ("value",)
+
+    name: str
+    driver: Driver
+    value: float
+
+    def moved(self, dx: float, dy: float) -> HeldDriver:
+        measure = self.driver.measured()
+        if not isinstance(measure, CoordinateOf):
+            return self
+        return replace(self, value=self.value + (dx if measure.axis == "x" else dy))
+
+    def measured(self) -> tuple[Measure, float]:
+        return self.driver.measured(), self.value
+
+
+def alone(plan: SolvePlan, number: int) -> SolvePlan:
+    """The plan of one driver alone, by its number, with all coordinates among its outputs.
+
+    The others stand where the plan's anchor has them, and it starts from the anchor's pose. The plan itself where there
+    is nothing to hold.
+    """
+    mechanism = plan.mechanism
+    if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):
+        return plan
+    taken = {joint.name for joint in mechanism.joints}
+    held = []
+    for k, driver in enumerate(mechanism.drivers):
+        if k != number:
+            name = driver.name
+            while name in taken:
+                name += "_held"
+            taken.add(name)
+            held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
+    return compile_plan(
+        replace(
+            _started(mechanism, plan),
+            joints=(*mechanism.joints, *held),
+            drivers=(mechanism.drivers[number],),
+            coordinates="all",
+            points={},
+        )
+    )
+
+
+def _started(mechanism: Mechanism, plan: SolvePlan) -> Mechanism:
+    """The mechanism with the plan's anchor as its start pose."""
+    poses = iter(plan.anchor.q.reshape(-1, 3).tolist())
+    bodies = []
+    for body in mechanism.bodies:
+        if not body.is_ground:
+            x, y, phi = next(poses)
+            body = replace(body, start=Start(x + plan.origin.x, y + plan.origin.y, phi))
+        bodies.append(body)
+    return replace(mechanism, bodies=tuple(bodies))

@@ -1,0 +1,261 @@
+"""Loops that have a name: four-bars and slider-cranks, found among the joints in any order and form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from kinfmu.equations.system import size_of
+from kinfmu.joints import Angle, Coordinate, Distance, PointOnLine, Revolute, Translational
+from kinfmu.joints.placement import body_of
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+
+_SAME = 1e-12  # of the size; points of a body that are closer than this are one
+
+
+class Place(NamedTuple):
+    """A point by its body and its coordinates in the body's frame [length]."""
+
+    body: str
+    x: float
+    y: float
+
+
+class Link(NamedTuple):
+    """What keeps two pins of a loop apart: a body, or a distance joint (then is_body is False)."""
+
+    name: str
+    length: float
+    is_body: bool = True
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """Ground and three moving links in one loop of four pins.
+
+    frame: distance of the pins on the ground [length]; first and last are pinned to it, the coupler joins them. pins:
+    where O, P, Q, C lie, in the order of the loop (ground-first, first-coupler, coupler-last, last-ground).
+    """
+
+    frame: float
+    first: Link
+    coupler: Link
+    last: Link
+    pins: tuple[Place, Place, Place, Place]
+
+    @property
+    def lengths(self) -> tuple[float, float, float, float]:
+        """Ground, first, coupler, last [length]."""
+        return self.frame, self.first.length, self.coupler.length, self.last.length
+
+    @property
+    def links(self) -> tuple[str, str, str]:
+        return self.first.name, self.coupler.name, self.last.name
+
+    def turned_round(self) -> FourBar:
+        """The same loop read from its other end."""
+        return FourBar(self.frame, self.last, self.coupler, self.first, self.pins[::-1])
+
+
+@dataclass(frozen=True)
+class SliderCrank:
+    """A crank pinned to the ground, and a rod whose other end is guided along a line fixed in the ground.
+
+    offset: of the line from the crank's pivot, to the left of its direction [length]; direction: of the line [rad];
+    pins: where O, P, S lie; guide: name of the joint that guides; slider: the body that it guides, or the rod's name.
+    """
+
+    crank: Link
+    rod: Link
+    offset: float
+    direction: float
+    pins: tuple[Place, Place, Place]
+    guide: str
+    slider: str
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((self.crank.name, self.rod.name, self.slider)))
+
+
+class _Guide(NamedTuple):
+    """A line in the ground along which a point is guided, by a joint, perhaps as part of a body that cannot turn."""
+
+    x: float
+    y: float
+    direction: float
+    joint: str
+    slider: str | None
+
+
+class _Edge(NamedTuple):
+    link: Link
+    end: int
+
+
+def named_loops(
+    mechanism: Mechanism, without: Iterable[str] = ()
+) -> tuple[tuple[FourBar, ...], tuple[SliderCrank, ...]]:
+    """The four-bars and slider-cranks of a mechanism, in the order of its ground pins and joints.
+
+    A revolute joint counts as a pin, and so do two held coordinates of a point; a distance joint is a link of its own.
+    without: names of joints that are left out, such as redundant ones.
+    """
+    net = _Net(mechanism, set(without))
+    return tuple(net.four_bars()), tuple(net.slider_cranks())
+
+
+class _Net:
+    """Pins as nodes, links as edges between them.
+
+    A pin is a set of places, points of bodies that coincide in every pose.
+    """
+
+    def __init__(self, mechanism: Mechanism, without: set[str]) -> None:
+        self.mechanism = mechanism
+        self.grid = _SAME * size_of(mechanism)
+        self.joints = [joint for joint in mechanism.joints if joint.name not in without]
+        self.places: list[list[Place]] = []  # of each pin
+        self._pin: dict[tuple[str, int, int], int] = {}
+        for joint in self.joints:
+            if isinstance(joint, Revolute):
+                self._unite(*(self._place(point) for point in joint.between))
+        held = self._held_coordinates()
+        for (point, axis), (x, _) in held.items():
+            if axis == "x" and (point, "y") in held:  # both coordinates: a pin on the ground
+                self._unite(Place(GROUND_NAME, x, held[point, "y"][0]), self._place(point))
+        self.edges: dict[int, list[_Edge]] = {}
+        for joint in self.joints:  # their ends are pins too
+            if isinstance(joint, Distance):
+                a, b = (self._number(self._place(point)) for point in joint.between)
+                self._join(Link(joint.name, float(joint.length), is_body=False), a, b)
+        self.guides = self._guided()
+        by_body: dict[str, list[tuple[int, Place]]] = {}
+        for number, places in enumerate(self.places):
+            for place in places:
+                by_body.setdefault(place.body, []).append((number, place))
+        self.ground = dict(by_body.pop(GROUND_NAME, ()))
+        for body, pins in by_body.items():
+            for k, (a, at_a) in enumerate(pins):
+                for b, at_b in pins[k + 1 :]:
+                    self._join(Link(body, _distance(at_a, at_b)), a, b)
+
+    def four_bars(self) -> Iterator[FourBar]:
+        """Each loop once, from the end that comes first."""
+        seen: set[frozenset[object]] = set()
+        for o in self.ground:
+            for first, p in self._moving_edges(o):
+                for coupler, q in self._moving_edges(p):
+                    for last, c in self.edges.get(q, ()):
+                        names = {first.name, coupler.name, last.name}
+                        key = frozenset({*names, o, p, q, c})
+                        if c not in self.ground or c == o or q in (o, p) or len(names) < 3 or key in seen:
+                            continue
+                        seen.add(key)
+                        frame = _distance(self.ground[o], self.ground[c])
+                        pins = (self.ground[o], self._on(p, first, coupler), self._on(q, last, coupler), self.ground[c])
+                        yield FourBar(frame, first, coupler, last, pins)
+
+    def slider_cranks(self) -> Iterator[SliderCrank]:
+        for o, pivot in self.ground.items():
+            for crank, p in self._moving_edges(o):
+                for rod, s in self._moving_edges(p):
+                    for guide in self.guides.get(s, ()):
+                        if rod.name == crank.name or s == o or guide.slider in (crank.name, rod.name):
+                            continue
+                        c, n = math.cos(guide.direction), math.sin(guide.direction)
+                        offset = c * (guide.y - pivot.y) - n * (guide.x - pivot.x)
+                        offset = 0.0 if abs(offset) <= self.grid else offset
+                        pins = (pivot, self._on(p, crank, rod), self._on(s, rod, rod, guide.slider))
+                        slider = guide.slider or rod.name
+                        yield SliderCrank(crank, rod, offset, guide.direction, pins, guide.joint, slider)
+
+    def _moving_edges(self, pin: int) -> Iterator[_Edge]:
+        """Links from a pin to others that are not on the ground."""
+        for edge in self.edges.get(pin, ()):
+            if edge.end not in self.ground and edge.link.length > self.grid:
+                yield edge
+
+    def _on(self, pin: int, *wanted: Link | str | None) -> Place:
+        """A pin as a point of the first link among those wanted that is a body, else of any."""
+        names = [link.name if isinstance(link, Link) else link for link in wanted]
+        return next((place for name in names for place in self.places[pin] if place.body == name), self.places[pin][0])
+
+    def _place(self, point: str) -> Place:
+        x, y = self.mechanism.body_points[point]
+        return Place(body_of(point), float(x), float(y))
+
+    def _number(self, place: Place) -> int:
+        """The pin at a place; a new one if there is none."""
+        key = (place.body, round(place.x / self.grid), round(place.y / self.grid))
+        if key not in self._pin:
+            self._pin[key] = len(self.places)
+            self.places.append([place])
+        return self._pin[key]
+
+    def _unite(self, a: Place, b: Place) -> None:
+        into, gone = self._number(a), self._number(b)
+        if into != gone:
+            self.places[into] += self.places[gone]
+            self.places[gone] = []
+            self._pin = {key: into if pin == gone else pin for key, pin in self._pin.items()}
+
+    def _join(self, link: Link, a: int, b: int) -> None:
+        self.edges.setdefault(a, []).append(_Edge(link, b))
+        self.edges.setdefault(b, []).append(_Edge(link, a))
+
+    def _held_coordinates(self) -> dict[tuple[str, str], tuple[float, str]]:
+        """Value and joint of each held coordinate of a point, by point and axis."""
+        return {
+            (joint.of, joint.axis): (float(joint.value), joint.name)
+            for joint in self.joints
+            if isinstance(joint, Coordinate)
+        }
+
+    def _guided(self) -> dict[int, list[_Guide]]:
+        """Lines along which pins are guided, by pin."""
+        held = self._held_coordinates()
+        turns = {joint.of: float(joint.value) for joint in self.joints if isinstance(joint, Angle)}
+        guides: dict[int, list[_Guide]] = {}
+        for (point, axis), (value, name) in held.items():
+            if (point, "y" if axis == "x" else "x") in held:
+                continue
+            x, y, direction = (value, 0.0, 0.5 * math.pi) if axis == "x" else (0.0, value, 0.0)
+            body = body_of(point)
+            if body in turns:
+                self._guide_body(guides, _Guide(x, y, direction, name, body), self._place(point), turns[body])
+            else:
+                guides.setdefault(self._number(self._place(point)), []).append(_Guide(x, y, direction, name, None))
+        for joint in self.joints:
+            if isinstance(joint, PointOnLine | Translational) and GROUND_NAME in joint.bodies():
+                self._guide_joint(guides, joint)
+        return guides
+
+    def _guide_joint(self, guides: dict[int, list[_Guide]], joint: PointOnLine | Translational) -> None:
+        fixed, moving = (self._place(point) for point in joint.between)
+        axis, turn = float(joint.axis), float(joint.angle) if isinstance(joint, Translational) else 0.0
+        if fixed.body != GROUND_NAME:  # the line moves and the ground has the point
+            if isinstance(joint, PointOnLine):
+                return
+            fixed, moving, axis, turn = moving, fixed, axis - turn, -turn
+        if isinstance(joint, PointOnLine):
+            guides.setdefault(self._number(moving), []).append(_Guide(fixed.x, fixed.y, axis, joint.name, None))
+        else:
+            self._guide_body(guides, _Guide(fixed.x, fixed.y, axis, joint.name, moving.body), moving, turn)
+
+    def _guide_body(self, guides: dict[int, list[_Guide]], guide: _Guide, at: Place, turn: float) -> None:
+        """Every pin of a body that cannot turn moves along a line; that of the place `at` is known."""
+        c, s = math.cos(turn), math.sin(turn)
+        for pin, places in enumerate(self.places):
+            for place in places:
+                if place.body == guide.slider:
+                    dx, dy = place.x - at.x, place.y - at.y
+                    moved = guide._replace(x=guide.x + c * dx - s * dy, y=guide.y + s * dx + c * dy)
+                    guides.setdefault(pin, []).append(moved)
+
+
+def _distance(a: Place, b: Place) -> float:
+    return math.hypot(b.x - a.x, b.y - a.y)

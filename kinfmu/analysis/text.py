@@ -1,0 +1,236 @@
+"""The findings of a check as text for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from kinfmu.analysis.loops import FourBar, SliderCrank
+from kinfmu.analysis.singular import DriverRange, LimitPosition
+from kinfmu.analysis.transmission import TransmissionAngle
+from kinfmu.analysis.written import degrees, multiple_of_pi, written
+from kinfmu.errors import listed
+
+if TYPE_CHECKING:
+    from kinfmu.analysis.named import NamedLoop
+    from kinfmu.analysis.report import Report
+
+_MOST_LOOPS = 8  # of which the text tells; JSON has them all
+_MOST_NAMES = 24  # in one line; JSON has them all
+
+
+def lines(report: Report) -> list[str]:
+    """The findings, one a line, the subject in front."""
+    found = [f"{report.mechanism.name}: {report.mechanism.title}" if report.mechanism.title else report.mechanism.name]
+    for parts in (_count, _rows, _plan, _advice, _loops, _motion):
+        found += parts(report)
+    if report.problem is not None:
+        found.append(_line("problem", str(report.problem)))
+    return found
+
+
+def _line(subject: str, text: str) -> str:
+    return f"  {subject:<12}{text}"
+
+
+def _names(names: Iterable[str]) -> str:
+    """Names in a row; of very many, the first and how many more."""
+    names = list(names)
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return listed(names[:_MOST_NAMES]) + more
+
+
+def _count(report: Report) -> Iterator[str]:
+    mechanism = report.mechanism
+    rows = sum(len(joint.labels) for joint in mechanism.joints)
+    yield _line("bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}")
+    yield _line("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
+    yield _line("mobility", f"{report.mobility}, driven by {_names(driver.name for driver in mechanism.drivers)}")
+    if report.gruebler != report.mobility:
+        yield _line("", f"Gruebler's count gives {report.gruebler}: it does not see that rows are redundant")
+
+
+def _rows(report: Report) -> Iterator[str]:
+    for row in report.redundant:
+        reason = f"at every pose it follows from {listed(row.implied_by_joints)}; set aside and kept on watch"
+        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}")
+    if not report.redundancy.dependent:
+        yield _line("redundant", "none")
+    for row in report.inconsistent:
+        gap = f"{abs(row.gap):.6g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
+        reason = f"{listed(row.implied_by_joints)} leave it open by {gap} at every pose"
+        yield _line("contradicts", f"{row.row.owner} (row {row.row.name}): {reason}")
+
+
+def _plan(report: Report) -> Iterator[str]:
+    plan = report.plan
+    if plan is None:
+        return
+    unit = report.mechanism.length_unit
+    starts = zip(report.mechanism.drivers, plan.anchor.u, strict=True)
+    yield _line("start", _names(f"{d.name} = {written(float(u), unit, d.quantity.kind)}" for d, u in starts))
+    yield _line("coordinates", _names(plan.coordinates))
+    if plan.fixed:
+        yield _line("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
+    for k, block in enumerate(report.blocks[:_MOST_NAMES], start=1):
+        size = f"{len(block.rows)} x {len(block.unknowns)}"
+        determinant = f", determinant {block.determinant}" if block.determinant else ""
+        yield _line(f"block {k}", f"{size}: {listed(block.unknowns)} from {listed(block.rows)}{determinant}")
+    if len(report.blocks) > _MOST_NAMES:
+        yield _line("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
+
+
+def _advice(report: Report) -> Iterator[str]:
+    advice = report.advice
+    if advice is None:
+        return
+    for surplus in advice.surplus:
+        by = f"{listed(surplus.implied_by)} and the joints" if surplus.implied_by else "the joints alone"
+        yield _line("surplus", f"driver {surplus.name}: {by} determine what it drives; remove it")
+    if advice.missing:
+        more = (
+            f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
+        )
+        yield _line("loose", f"{_names(advice.loose)}: {more}")
+    for suggestion in advice.suggestions:
+        yield _line("could add", str(suggestion))
+
+
+def _loops(report: Report) -> Iterator[str]:
+    unit = report.mechanism.length_unit
+    for named in report.loops[:_MOST_LOOPS]:
+        loop = named.loop
+        if isinstance(loop, FourBar):
+            links = zip(("ground", *loop.links), loop.lengths, strict=True)
+            yield _line("loop", f"four-bar: {listed(f'{name} {length:.6g}' for name, length in links)} {unit}")
+            yield _line("", _four_bar_class(named, loop))
+        else:
+            sizes = f"crank {loop.crank.name} {loop.crank.length:.6g}, rod {loop.rod.name} {loop.rod.length:.6g}"
+            yield _line("loop", f"slider-crank: {sizes}, offset {loop.offset:.6g} {unit}")
+            yield _line("", _slider_crank_class(named, loop))
+        for angle in named.transmission:
+            yield _line("", _transmission(angle, unit))
+    if len(report.loops) > _MOST_LOOPS:
+        yield _line("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
+
+
+def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
+    kind, first, coupler, last = named.grashof, *loop.links
+    if kind.name == "does not close":
+        return f"does not close: its longest side {kind.small:.6g} is more than the others together, {kind.large:.6g}"
+    sign = _sign(kind.small, kind.large, kind.name)
+    sums = f"shortest + longest {kind.small:.6g} {sign} the two others {kind.large:.6g}"
+    if kind.name == "change point":
+        shape = f" ({kind.shape})" if kind.shape else ""
+        return f"change point{shape}: {sums}; the links fall in line"
+    turns = {
+        "crank-rocker": f"{first} turns all the way round, {last} rocks",
+        "rocker-crank": f"{last} turns all the way round, {first} rocks",
+        "double crank": f"{first} and {last} turn all the way round",
+        "double rocker": f"{coupler} turns all the way round, {first} and {last} rock",
+        "triple rocker": "no link turns all the way round",
+    }
+    return f"{kind.name}: {sums}; {turns[kind.name]}"
+
+
+def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
+    kind = named.grashof
+    if kind.name == "does not close":
+        return f"does not close: the slide lies {kind.small:.6g} off, crank and rod reach {kind.large:.6g}"
+    shorter, longer = ("crank", "rod") if loop.crank.length <= loop.rod.length else ("rod", "crank")
+    sums = f"{shorter} + offset {kind.small:.6g} {_sign(kind.small, kind.large, kind.name)} {longer} {kind.large:.6g}"
+    turns = {
+        "crank turns": f"{loop.crank.name} turns all the way round",
+        "rod turns": f"{loop.rod.name} turns all the way round, {loop.crank.name} rocks",
+        "nothing turns": f"{loop.crank.name} does not turn all the way round",
+        "change point": "branches cross where all is in line",
+    }
+    return f"{sums}; {turns[kind.name]}"
+
+
+def _sign(small: float, large: float, name: str) -> str:
+    return "=" if name == "change point" else "<" if small < large else ">"
+
+
+def _transmission(angle: TransmissionAngle, unit: str) -> str:
+    at = [
+        f"{angle.driver} at {degrees(u) if angle.kind == 'angle' else f'{u:.6g} {unit}'}"
+        for u in (angle.at_smallest, angle.at_largest)
+    ]
+    span = f"{degrees(angle.smallest)} ({at[0]}) to {degrees(angle.largest)} ({at[1]})"
+    verdict = {
+        "good": "good",
+        "poor": f"poor, {degrees(angle.worst)} from 0 or 180 where 40 is usual",
+        "locks": _in_line(angle),
+    }
+    return f"transmission angle {span}: {verdict[angle.verdict]}"
+
+
+def _in_line(angle: TransmissionAngle) -> str:
+    """What a transmission angle of 0 or 180 degrees looks like."""
+    if angle.is_slide:
+        return f"{angle.coupler} stands across the slide"
+    return f"{angle.coupler} and {angle.output} fall in line"
+
+
+def _motion(report: Report) -> Iterator[str]:
+    several = len(report.mechanism.drivers) > 1
+    for reach in report.ranges:
+        yield from _change_points(report, reach, several)
+    for reach in report.ranges:
+        yield from _range(report, reach)
+    if several and report.ranges:
+        yield _line("", "each with the other drivers at their start values")
+    if report.ranges and not report.singular and not any(reach.stopped for reach in report.ranges):
+        yield _line("singular", "nowhere on the way")
+    for note in report.notes:
+        yield _line("note", note)
+
+
+def _change_points(report: Report, reach: DriverRange, several: bool) -> Iterator[str]:
+    changes = [point.value for point in reach.points if point.kind == "change point"]
+    if changes:
+        places = _names(written(value, report.mechanism.length_unit, reach.kind) for value in changes)
+        every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
+        goes_on = "with several drivers no run goes over it" if several else "the motion goes on (bridged)"
+        yield _line("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
+
+
+def _all_multiples_of_pi(values: list[float]) -> bool:
+    """True for 0 and pi, modulo whole turns: k pi for every whole k."""
+    return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
+
+
+def _range(report: Report, reach: DriverRange) -> Iterator[str]:
+    unit = report.mechanism.length_unit
+    low, high = (written(end, unit, reach.kind) for end in (reach.low or 0.0, reach.high or 0.0))
+    seen = [written(end, unit, reach.kind) for end in reach.reach]
+    if reach.stopped is not None:
+        yield _line("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
+    elif reach.lowest is not None and reach.highest is not None:
+        ends = "dead centre at each limit"
+        if reach.kind == "length" and reach.low == 0.0 and not any(p.value == 0.0 and p.block for p in reach.points):
+            ends = "nothing is left of it at 0, dead centre at the other limit"
+        yield _line("range", f"{reach.driver} from {low} to {high}; {ends}")
+    elif reach.lowest is not None:
+        yield _line("range", f"{reach.driver} from {low}, a dead centre; no limit up to {seen[1]}")
+    elif reach.highest is not None:
+        yield _line("range", f"{reach.driver} up to {high}, a dead centre; no limit down to {seen[0]}")
+    elif reach.turns == 1:
+        yield _line("range", f"{reach.driver} turns all the way round")
+    elif reach.turns is not None:
+        yield _line("range", f"{reach.driver} turns all the way round; the mechanism repeats after {reach.turns} turns")
+    else:
+        yield _line("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
+    for limit in (reach.lowest, reach.highest):
+        if limit is not None and limit.bodies:
+            yield _line("", f"at {written(limit.value, unit, reach.kind)} {_parted(report, reach, limit)}")
+
+
+def _parted(report: Report, reach: DriverRange, limit: LimitPosition) -> str:
+    """What happens at a limit: two links in line, or bodies that nothing holds."""
+    for named in report.loops:
+        for angle in named.transmission:
+            if angle.driver == reach.driver and limit.value in angle.in_line_at:
+                return _in_line(angle)
+    return f"{_names(limit.bodies)} can move while {reach.driver} stands still"

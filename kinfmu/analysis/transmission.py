@@ -1,0 +1,249 @@
+"""Transmission angle: how well the coupler pushes the output, over the range of a driver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from kinfmu.analysis.loops import FourBar, Place, SliderCrank
+from kinfmu.analysis.way import Way
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.plan import SolvePlan
+from kinfmu.solver import Pose
+
+POOR = math.radians(40.0)  # [rad]; the usual bound below which forces and clearances are felt
+LOCKED = math.radians(1e-4)  # [rad]; below which it is 0 but for rounding: the angle is an arc cosine
+_STRAIGHT = 1e-7  # of 1; a cosine so near to 1 at a limit is 1, for the limit is where the coupler is in line
+_HALVINGS = 60
+
+Coordinates = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class TransmissionAngle:
+    """Extremes of the angle between coupler and output, 0 to pi; pi/2 pushes best, 0 and pi not at all.
+
+    driver, kind: whose values at_smallest and at_largest are, and whether it is an 'angle' or a 'length'; coupler,
+    output: names of the links; is_slide: the output slides, and the angle is that between rod and the normal of the
+    slide; in_line_at: limits of the driver where it is 0 or pi.
+    """
+
+    driver: str
+    kind: str
+    coupler: str
+    output: str
+    is_slide: bool
+    smallest: float
+    at_smallest: float
+    largest: float
+    at_largest: float
+    in_line_at: tuple[float, ...] = ()
+
+    @property
+    def worst(self) -> float:
+        """The smallest acute angle between the two [rad]."""
+        return min(self.smallest, math.pi - self.largest)
+
+    @property
+    def verdict(self) -> str:
+        """'locks' (0 somewhere), 'poor' (below 40 degrees) or 'good'."""
+        if self.worst <= LOCKED:
+            return "locks"
+        return "poor" if self.worst < POOR else "good"
+
+
+class _Cosine(NamedTuple):
+    """Cosine of the angle as a smooth function of a pose, and its rate from coordinates and their rates."""
+
+    value: Callable[[Coordinates], float]
+    slope: Callable[[Coordinates, Coordinates], float]
+
+
+def transmission_angle(way: Way, loop: FourBar | SliderCrank) -> TransmissionAngle | None:
+    """Extremes of a loop's transmission angle on the way of a driver, to round-off in the driver value.
+
+    None where the driver does not move the loop, or neither of its ends leads the other.
+    """
+    led = _led_four_bar(way.plan, loop) if isinstance(loop, FourBar) else _led_slider_crank(way.plan, loop)
+    if led is None:
+        return None
+    coupler, output, cosine, is_slide = led
+    found = _extremes(way, cosine)
+    if found is None:
+        return None
+    (least, at_least), (most, at_most), in_line_at = found
+    return TransmissionAngle(
+        driver=way.name,
+        kind=way.kind,
+        coupler=coupler,
+        output=output,
+        is_slide=is_slide,
+        smallest=_angle(most),
+        at_smallest=at_most,
+        largest=_angle(least),
+        at_largest=at_least,
+        in_line_at=in_line_at,
+    )
+
+
+def _angle(cosine: float) -> float:
+    return math.acos(max(-1.0, min(1.0, cosine)))
+
+
+def _led_four_bar(plan: SolvePlan, loop: FourBar) -> tuple[str, str, _Cosine, bool] | None:
+    """Coupler and output and the cosine of their angle, if one end of the loop is found before the rest.
+
+    cos mu = (b^2 + c^2 - f^2) / (2 b c)        f: distance of the input's pin P from the output's pivot C
+    """
+    if is_led_by_last(plan, loop):
+        loop = loop.turned_round()
+    elif not is_led_by_last(plan, loop.turned_round()):
+        return None
+    _, p, _, c = loop.pins
+    return loop.coupler.name, loop.last.name, _opposite(loop.coupler.length, loop.last.length, p, c), False
+
+
+def is_led_by_last(plan: SolvePlan, loop: FourBar) -> bool:
+    """True if the last link of a four-bar is found before the others."""
+    places = _block_of(plan)
+    first, coupler, last = (places.get(f"{name}.phi") for name in loop.links)
+    return _is_before(last, coupler, first)
+
+
+def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Cosine, bool] | None:
+    """Rod and slider led by the crank, or rod and crank led by the slider, and the cosine of their angle.
+
+    cos mu = n.(S - P) / l        n: normal of the slide
+    """
+    places = _block_of(plan)
+    crank, rod = (places.get(f"{link.name}.phi") for link in (loop.crank, loop.rod))
+    slider = None
+    if loop.slider != loop.rod.name:
+        slider = max((places.get(f"{loop.slider}.{axis}", -1) for axis in ("x", "y")), default=-1)
+    o, p, s = loop.pins
+    if _is_before(crank, rod, slider):
+        n = (-math.sin(loop.direction), math.cos(loop.direction))
+
+        def value(q: Coordinates) -> float:
+            (px, py), (sx, sy) = _point(p, q), _point(s, q)
+            return (n[0] * (sx - px) + n[1] * (sy - py)) / loop.rod.length
+
+        def slope(q: Coordinates, qd: Coordinates) -> float:
+            vx, vy = _velocity(p, q, qd)
+            return -(n[0] * vx + n[1] * vy) / loop.rod.length
+
+        return loop.rod.name, loop.slider if slider is not None else loop.guide, _Cosine(value, slope), True
+    if _is_before(slider, rod, crank) or _drives_end(plan, loop):
+        return loop.rod.name, loop.crank.name, _opposite(loop.rod.length, loop.crank.length, s, o), False
+    return None
+
+
+def _drives_end(plan: SolvePlan, loop: SliderCrank) -> bool:
+    """True if a driver moves the guided end of the rod itself along the slide."""
+    return loop.slider == loop.rod.name and any(
+        driver.quantity.kind == "length" and set(driver.bodies()) <= {loop.rod.name, GROUND_NAME}
+        for driver in plan.mechanism.drivers
+    )
+
+
+def _block_of(plan: SolvePlan) -> dict[str, int]:
+    """Number of the block in which each coordinate is found."""
+    return {name: k for k, block in enumerate(plan.blocks) for name in block.coordinates}
+
+
+def _is_before(leading: int | None, *others: int | None) -> bool:
+    """True if a coordinate is found in an earlier block than others, of which some may be no coordinates."""
+    later = [other for other in others if other is not None]
+    return leading is not None and bool(later) and leading < min(later)
+
+
+def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
+    """Cosine of the angle between sides b and c of a triangle whose third side joins p and q."""
+
+    def value(at: Coordinates) -> float:
+        (px, py), (qx, qy) = _point(p, at), _point(q, at)
+        return (b * b + c * c - (qx - px) ** 2 - (qy - py) ** 2) / (2.0 * b * c)
+
+    def slope(at: Coordinates, rates: Coordinates) -> float:
+        (px, py), (qx, qy) = _point(p, at), _point(q, at)
+        (pu, pv), (qu, qv) = _velocity(p, at, rates), _velocity(q, at, rates)
+        return -((qx - px) * (qu - pu) + (qy - py) * (qv - pv)) / (b * c)
+
+    return _Cosine(value, slope)
+
+
+def _point(place: Place, q: Coordinates) -> tuple[float, float]:
+    """World coordinates of a place."""
+    if place.body == GROUND_NAME:
+        return place.x, place.y
+    c, s = math.cos(q[f"{place.body}.phi"]), math.sin(q[f"{place.body}.phi"])
+    return q[f"{place.body}.x"] + c * place.x - s * place.y, q[f"{place.body}.y"] + s * place.x + c * place.y
+
+
+def _velocity(place: Place, q: Coordinates, qd: Coordinates) -> tuple[float, float]:
+    """Rates of a place's world coordinates."""
+    if place.body == GROUND_NAME:
+        return 0.0, 0.0
+    x, y = _point(place, q)
+    omega = qd[f"{place.body}.phi"]
+    return (
+        qd[f"{place.body}.x"] - omega * (y - q[f"{place.body}.y"]),
+        qd[f"{place.body}.y"] + omega * (x - q[f"{place.body}.x"]),
+    )
+
+
+def _extremes(way: Way, cosine: _Cosine) -> tuple[tuple[float, float], tuple[float, float], tuple[float, ...]] | None:
+    """Smallest and largest cosine, each with its driver value, and the limits where it is -1 or 1; None if it does not
+    change on the way.
+    """
+
+    def slope(pose: Pose) -> float:
+        return cosine.slope(way.coordinates(pose), way.speeds(pose))
+
+    slopes = [slope(pose) for pose in way.poses]
+    if max(map(abs, slopes)) * (way.poses[-1].u[0] - way.poses[0].u[0]) < 1e-9:
+        return None
+    found = []
+    for before, after, a, b in zip(way.poses, way.poses[1:], slopes, slopes[1:], strict=False):
+        if a * b < 0.0:
+            pose = _flat(way, slope, before, after, a)
+            found.append((cosine.value(way.coordinates(pose)), pose.u[0]))
+    found += [(cosine.value(way.coordinates(pose)), pose.u[0]) for pose in way.poses]
+    in_line = []
+    for limit in (way.low, way.high):
+        if limit is not None:
+            value = cosine.value(way.at_limit(limit))
+            if abs(value) > 1.0 - _STRAIGHT:
+                in_line.append(limit.u[0])
+                value = math.copysign(1.0, value)
+            found.append((value, limit.u[0]))
+    return _told(way, min(found)), _told(way, max(found)), tuple(in_line)
+
+
+def _told(way: Way, found: tuple[float, float]) -> tuple[float, float]:
+    """An extreme with its driver value in [0, 2 pi turns) where the mechanism comes back."""
+    cosine, value = found
+    if way.turns is None:
+        return found
+    period = way.turns * math.tau
+    value = math.fmod(math.fmod(value, period) + period, period)
+    return cosine, 0.0 if period - value < 1e-12 else value
+
+
+def _flat(way: Way, slope: Callable[[Pose], float], low: Pose, high: Pose, at_low: float) -> Pose:
+    """The pose between two where a slope vanishes, by bisection."""
+    for _ in range(_HALVINGS):
+        u = 0.5 * (low.u[0] + high.u[0])
+        middle = way.solver.solve(low, (u,))
+        if not middle.good or u in (low.u[0], high.u[0]):
+            break
+        at_middle = slope(middle)
+        if at_middle == 0.0:
+            return middle
+        if (at_middle < 0.0) == (at_low < 0.0):
+            low, at_low = middle, at_middle
+        else:
+            high = middle
+    return low

@@ -1,0 +1,160 @@
+"""Way: the poses that one driver takes the mechanism through, the others at their start values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from kinfmu.analysis.held import alone
+from kinfmu.backends.python import load_model
+from kinfmu.joints.measures import DistanceBetween
+from kinfmu.plan import SolvePlan
+from kinfmu.solver import Pose, Solver
+from kinfmu.solver.advance import NO_BLOCK, Limit, advance
+from kinfmu.solver.bridge import Bridge
+
+STEP = 0.1  # [rad, sizes] between looks at the determinants
+MOST_TURNS = 12  # after which a mechanism that has not come back to its start is left: gears of odd ratios
+SIZES = 3.0  # reach of a driver of a length, either way
+_LARGE = 150  # coordinates; a mechanism of more is followed for one turn only
+_BESIDE_LIMIT = 1e-6  # [rad, sizes]; how near a limit the poses lie from which its own is extrapolated
+_REPEATS = 1e-6  # [rad, sizes]; poses closer than this are the same
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """What one driver meets from the anchor on: until limits, a return to the start, or far enough.
+
+    name, kind: of the driver, 'angle' or 'length'; plan, solver: those in which it moves alone; poses: in the order of
+    the driver value, the anchor among them; bridges: those crossed; low, high: the limits, None where none was met;
+    turns: after so many the mechanism is back where it was, None for a length or if it did not come back; stopped: why
+    the way ended where that was no limit.
+    """
+
+    name: str
+    kind: str
+    plan: SolvePlan
+    solver: Solver
+    poses: tuple[Pose, ...]
+    bridges: tuple[Bridge, ...]
+    low: Limit | None
+    high: Limit | None
+    turns: int | None
+    stopped: str | None
+
+    def coordinates(self, pose: Pose) -> dict[str, float]:
+        """All coordinates of a pose by name, the fixed ones among them, in the world."""
+        return {**self.plan.fixed, **dict(zip(self.plan.outputs, self.solver.outputs(pose), strict=True))}
+
+    def speeds(self, pose: Pose) -> dict[str, float]:
+        """Rates of all coordinates per unit of the driver, by name."""
+        rates = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
+        return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
+
+    def at_limit(self, limit: Limit) -> dict[str, float]:
+        """All coordinates by name at one of the limits.
+
+        There they go like a + b sqrt(s) + c s with the way s that is left: three poses beside it give a.
+        """
+        is_low = limit is self.low
+        start, inwards = (self.poses[0], 1.0) if is_low else (self.poses[-1], -1.0)
+        near = []
+        for part in (1.0, 4.0, 9.0):
+            u = limit.u[0] + inwards * part * _BESIDE_LIMIT * self.solver.model.REACH[0]
+            pose = self.solver.solve(start, (u,))
+            if not pose.good:
+                return self.coordinates(start)
+            near.append(self.coordinates(pose))
+        first, second, third = near
+        return {name: 3.0 * first[name] - 3.0 * second[name] + third[name] for name in first}
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A part of a way in one direction: its poses, bridges, and the limit or other reason that ended it early."""
+
+    poses: list[Pose]
+    bridges: list[Bridge]
+    limit: Limit | None = None
+    stopped: str | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        return self.limit is None and self.stopped is None
+
+
+def follow(plan: SolvePlan, number: int) -> Way:
+    """The way of one driver, by its number, the others at the values of the plan's anchor.
+
+    An angle is turned on until the mechanism is back where it was (or for 12 turns), a length moved by three sizes
+    either way, a distance down to 0. Raises a KinfmuError if the driver cannot be planned alone.
+    """
+    single = alone(plan, number)
+    driver = plan.mechanism.drivers[number]
+    solver = Solver(load_model(single))
+    anchor, turns, low = solver.anchor, None, None
+    if driver.quantity.kind == "angle":
+        up, turns = _turned(solver, single)
+        down = _Leg([], []) if turns is not None else _leg(solver, anchor, -math.tau, 1.0)
+    else:
+        reach = SIZES * plan.size
+        least = 0.0 if isinstance(driver.measured(), DistanceBetween) else -math.inf
+        up = _leg(solver, anchor, reach, plan.size)
+        down = _leg(solver, anchor, -min(reach, anchor.u[0] - least), plan.size)
+        if down.is_whole and anchor.u[0] - reach <= least:
+            low = Limit((least,), NO_BLOCK)
+    return Way(
+        name=driver.name,
+        kind=driver.quantity.kind,
+        plan=single,
+        solver=solver,
+        poses=(*down.poses[::-1], anchor, *up.poses),
+        bridges=(*down.bridges, *up.bridges),
+        low=down.limit or low,
+        high=up.limit,
+        turns=turns,
+        stopped=up.stopped or down.stopped,
+    )
+
+
+def _turned(solver: Solver, plan: SolvePlan) -> tuple[_Leg, int | None]:
+    """Turn after turn forwards, and how many bring the mechanism back."""
+    whole = _Leg([], [])
+    pose = solver.anchor
+    most = 1 if len(plan.mechanism.coordinate_names) > _LARGE else MOST_TURNS
+    for turn in range(1, most + 1):
+        leg = _leg(solver, pose, math.tau, 1.0)
+        whole = _Leg(whole.poses + leg.poses, whole.bridges + leg.bridges, leg.limit, leg.stopped)
+        if not whole.is_whole:
+            return whole, None
+        pose = whole.poses[-1]
+        if _is_back(plan, solver.outputs(solver.anchor), solver.outputs(pose)):
+            return whole, turn
+    return whole, None
+
+
+def _is_back(plan: SolvePlan, before: tuple[float, ...], after: tuple[float, ...]) -> bool:
+    """True if two poses are the same but for whole turns."""
+    for name, a, b in zip(plan.outputs, before, after, strict=True):
+        apart = math.remainder(b - a, math.tau) if name.endswith(".phi") else (b - a) / plan.size
+        if abs(apart) > _REPEATS:
+            return False
+    return True
+
+
+def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
+    """From a pose over a distance of the driver, in steps that no singular point escapes."""
+    poses: list[Pose] = []
+    bridges: list[Bridge] = []
+    pose, count = start, math.ceil(abs(distance) / (STEP * unit))
+    for k in range(1, count + 1):
+        arrived = advance(solver.model, pose, (start.u[0] + distance * k / count,))
+        if isinstance(arrived, Limit):
+            return _Leg(poses, bridges, limit=arrived)
+        if not arrived.good:
+            return _Leg(poses, bridges, stopped=arrived.message)
+        pose = arrived
+        poses.append(pose)
+        known = {bridge.centre for bridge in bridges}
+        bridges += [bridge for bridge in (pose.road.bridges if pose.road else ()) if bridge.centre not in known]
+    return _Leg(poses, bridges)

@@ -1,0 +1,31 @@
+"""Driver values, lengths and angles as people read them."""
+
+from __future__ import annotations
+
+import math
+
+
+def written(value: float, unit: str, kind: str) -> str:
+    """'pi (180 deg)', '0.7227 rad (41.41 deg)' or '0.35 m': a driver value for people."""
+    if kind != "angle":
+        return f"{value:.9g} {unit}"
+    return f"{multiple_of_pi(value) or f'{value:.9g} rad'} ({round(math.degrees(value), 8) + 0.0:.9g} deg)"
+
+
+def multiple_of_pi(value: float) -> str | None:
+    """'0', 'pi', '3 pi/2' for values that are simple fractions of pi to nine digits."""
+    for denominator in (1, 2, 3, 4, 6):
+        numerator = value / math.pi * denominator
+        if abs(numerator - round(numerator)) < 1e-9:
+            whole = round(numerator)
+            if whole == 0:
+                return "0"
+            sign, size = ("-" if whole < 0 else ""), abs(whole)
+            top = "pi" if size == 1 else f"{size} pi"
+            return f"{sign}{top}" if denominator == 1 else f"{sign}{top}/{denominator}"
+    return None
+
+
+def degrees(angle: float) -> str:
+    """'41.4096 deg': an angle [rad] for people."""
+    return f"{round(math.degrees(angle), 4) + 0.0:.6g} deg"
