@@ -134,9 +134,8 @@ def five_bar() -> Mechanism:
     )
 
 
-def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0) -> Mechanism:
-    """A slider-crank from a revolute crank and a rod whose end stays on y = offset."""
-    start = 0.7
+def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0, start: float = 0.7) -> Mechanism:
+    """A slider-crank from a revolute crank, started at an angle [rad], and a rod whose end stays on y = offset."""
     px, py = crank * math.cos(start), crank * math.sin(start)
     lean = math.asin((offset - py) / rod)
     return Mechanism(

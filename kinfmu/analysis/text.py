@@ -160,7 +160,7 @@ def _transmission(angle: TransmissionAngle, unit: str) -> str:
     span = f"{degrees(angle.smallest)} ({at[0]}) to {degrees(angle.largest)} ({at[1]})"
     verdict = {
         "good": "good",
-        "poor": f"poor, {degrees(angle.worst)} from 0 or 180 where 40 is usual",
+        "poor": f"poor, {degrees(angle.worst)} from 0 or 180 where 40 deg is usual",
         "locks": _in_line(angle),
     }
     return f"transmission angle {span}: {verdict[angle.verdict]}"

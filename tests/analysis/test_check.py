@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import row_reduced
-from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar
+from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 
 def test_the_fourbar_is_told_with_its_redundant_row_and_why() -> None:
@@ -73,10 +75,37 @@ def test_a_driver_off_the_loop_of_a_triad_has_its_range() -> None:
     assert run.status.tolist()[0] < 3
 
 
-def test_several_drivers_have_no_range_yet() -> None:
+def test_several_drivers_have_a_range_each() -> None:
     report = kinfmu.check(five_bar())
     assert report.range is None
+    assert [reach.driver for reach in report.ranges] == ["shoulder", "elbow"]
     assert report.mobility == 2
+
+
+def test_findings_have_ranges_loops_and_transmission_as_numbers() -> None:
+    findings = json.loads(json.dumps(kinfmu.check(fourbar(4, 3, 1.5, 1, start=0.2)).as_json()))
+    limit = math.acos((16 + 9 - 2.5**2) / 24)
+    (reach,) = findings["ranges"]
+    assert (reach["driver"], reach["kind"], reach["turns"]) == ("crank", "angle", None)
+    assert [reach["low"], reach["high"]] == pytest.approx([-limit, limit], abs=1e-10)
+    assert [place["bodies"] for place in reach["limits"]] == [["coupler", "rocker"]] * 2
+    assert reach["limits"][1]["coordinates"]["crank.phi"] == pytest.approx(limit, abs=1e-9)
+    assert [(point["driver"], point["kind"], point["block"]) for point in findings["singular"]] == [
+        ("crank", "limit", 1)
+    ] * 2
+    (loop,) = findings["loops"]
+    assert loop["lengths"] == {"ground": 4.0, "crank": 3.0, "coupler": 1.5, "rocker": 1.0}
+    assert (loop["kind"], loop["class"], loop["sums"]) == ("four-bar", "triple rocker", [5.0, 4.5])
+    assert loop["transmission"][0]["largest"] == math.pi
+    assert findings["start"] == {"crank": pytest.approx(0.2)}
+    assert findings["length_unit"] == "m"
+
+
+def test_findings_have_the_keys_that_their_docstring_names() -> None:
+    described = as_json.__doc__ or ""
+    for mechanism in (reference_fourbar(), five_bar(), slider_crank(), reference_fourbar(bar=1.01)):
+        for key in kinfmu.check(mechanism).as_json():
+            assert re.search(rf"\b{key}\b", described)
 
 
 def test_a_contradiction_stands_in_the_report_and_does_not_raise() -> None:

@@ -1,0 +1,93 @@
+"""Missing and surplus drivers: named, with what could be driven instead."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Fixed, Mechanism, Revolute, Translational
+from kinfmu.drivers import DRIVERS
+from kinfmu.errors import MobilityError
+from tests.mechanisms import five_bar, fourbar
+
+
+def with_arm(*drivers: kinfmu.AngleDriver) -> Mechanism:
+    """A crank-rocker with an arm of its own on the rocker's pivot, two degrees of freedom."""
+    linkage = fourbar(4, 1, 3.5, 3)
+    arm = Body("arm", {"C": (0, 0), "end": (1, 0)}, (4, 0, 0.3))
+    return replace(
+        linkage,
+        bodies=(*linkage.bodies, arm),
+        joints=(*linkage.joints, Revolute("arm", ("ground.C", "arm.C"))),
+        drivers=(*linkage.drivers, *drivers),
+    )
+
+
+def test_a_missing_driver_is_told_with_what_is_loose_and_what_could_be_driven() -> None:
+    report = kinfmu.check(with_arm())
+    assert report.advice is not None
+    assert (report.advice.missing, report.advice.loose, report.advice.surplus) == (1, ("arm.phi",), ())
+    text = str(report)
+    assert "  loose       arm.phi: 1 more driver needed" in text
+    assert '  could add   [drivers] arm = { type = "angle", of = "arm" }' in text
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_suggested_drivers_make_the_mechanism_move(count: int) -> None:
+    mechanism = replace(five_bar(), drivers=five_bar().drivers[:count])
+    advice = kinfmu.check(mechanism).advice
+    assert advice is not None
+    assert len(advice.suggestions) == advice.missing == 2 - count
+    types = {cls.type: cls for cls in DRIVERS}
+    added = []
+    for suggestion in advice.suggestions:
+        keys = dict(suggestion.keys)
+        added.append(types[keys.pop("type")](suggestion.name, **keys))
+    assert kinfmu.check(replace(mechanism, drivers=(*mechanism.drivers, *added))).problem is None
+
+
+def test_a_body_in_the_open_could_be_driven_by_its_angle_and_a_point() -> None:
+    advice = kinfmu.check(Mechanism("block", [Body("block", {"P": (1, 0)})])).advice
+    assert advice is not None
+    assert [suggestion.keys["type"] for suggestion in advice.suggestions] == ["angle", "coordinate", "coordinate"]
+
+
+def test_a_slide_could_be_driven_along_its_axis() -> None:
+    bodies = [Body("ground", {"G": (0, 0)}), Body("block", {"P": (0, 0)})]
+    advice = kinfmu.check(Mechanism("slide", bodies, [Translational("rail", ("ground.G", "block.P"), 0.5)])).advice
+    assert advice is not None
+    (suggestion,) = advice.suggestions
+    assert str(suggestion) == '[drivers] rail = { type = "slide", between = ["ground.G", "block.P"], axis = 0.5 }'
+
+
+def test_a_driver_too_many_is_named_with_the_one_it_fights() -> None:
+    linkage = fourbar(4, 1, 3.5, 3)
+    two = AngleDriver("two", "rocker", ConstantSpeed(1.9, 1.0))
+    report = kinfmu.check(replace(linkage, drivers=(*linkage.drivers, two)))
+    assert report.advice is not None
+    assert report.advice.surplus == (("two", ("crank",)),)
+    assert "  surplus     driver two: crank and the joints determine what it drives; remove it" in str(report)
+    assert report.as_json()["advice"]["surplus"] == [{"name": "two", "implied_by": ["crank"]}]
+
+
+def test_two_drivers_on_one_freedom_while_another_is_free_are_told() -> None:
+    report = kinfmu.check(with_arm(AngleDriver("two", "rocker", ConstantSpeed(1.9, 1.0))))
+    assert isinstance(report.problem, MobilityError)
+    assert str(report.problem) == (
+        "[drivers.two] drives what crank and the joints determine, while arm can still move; "
+        'drive, for example, [drivers] arm = { type = "angle", of = "arm" }'
+    )
+
+
+def test_a_driver_of_what_the_joints_hold_is_told() -> None:
+    bodies = [Body("ground", {"G": (0, 0)}), Body("block", {"P": (0, 0)})]
+    stuck = Mechanism("stuck", bodies, [Fixed("weld", ("ground.G", "block.P"))], [AngleDriver("turn", "block")])
+    assert "  surplus     driver turn: the joints alone determine what it drives; remove it" in str(kinfmu.check(stuck))
+
+
+def test_drivers_that_match_need_no_advice() -> None:
+    report = kinfmu.check(five_bar())
+    assert report.advice is None
+    assert report.as_json()["advice"] is None

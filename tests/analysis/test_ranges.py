@@ -1,0 +1,199 @@
+"""Ranges of drivers, limit positions and change points against closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import (
+    AngleDriver,
+    Body,
+    ConstantSpeed,
+    Gear,
+    Mechanism,
+    RackAndPinion,
+    Revolute,
+    RunSettings,
+    Translational,
+)
+from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
+from tests.mechanisms import five_bar, fourbar, slider_crank
+
+
+def dead_centres(ground: float, crank: float, reach: float) -> float:
+    """Crank angle at which coupler and rocker, in line, span `reach`: law of cosines [rad]."""
+    return math.acos((ground**2 + crank**2 - reach**2) / (2 * ground * crank))
+
+
+@pytest.mark.parametrize("lengths", [(4.0, 3.0, 1.5, 1.0), (3.0, 2.5, 2.0, 1.0), (5.0, 3.3, 2.9, 0.5)])
+def test_limits_of_four_bars_are_where_coupler_and_rocker_fall_in_line(lengths: tuple[float, ...]) -> None:
+    ground, crank, coupler, rocker = lengths
+    exact = dead_centres(ground, crank, coupler + rocker)
+    inner = abs(coupler - rocker) > abs(ground - crank)
+    least = dead_centres(ground, crank, abs(coupler - rocker)) if inner else -exact
+    start = 0.5 * (exact + (least if inner else 0.0))
+    report = kinfmu.check(fourbar(*lengths, start=start))
+    assert report.range is not None
+    assert report.range.high == pytest.approx(exact, abs=1e-10)
+    assert report.range.low == pytest.approx(least, abs=1e-10)
+    assert {point.kind for point in report.singular} == {"limit"}
+    assert "coupler and rocker fall in line" in str(report)
+
+
+def test_the_position_at_a_limit_is_told() -> None:
+    report = kinfmu.check(fourbar(4.0, 3.0, 1.5, 1.0, start=0.2))
+    assert report.range is not None
+    assert report.range.highest is not None
+    at, limit = report.range.highest.coordinates, dead_centres(4.0, 3.0, 2.5)
+    px, py = 3.0 * math.cos(limit), 3.0 * math.sin(limit)
+    lean = math.atan2(-py, 4.0 - px)  # all of coupler and rocker point along the diagonal
+    assert at["crank.phi"] == pytest.approx(limit, abs=1e-10)
+    assert at["coupler.x"] == pytest.approx(px, abs=1e-8)
+    assert math.remainder(at["coupler.phi"] - lean, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert math.remainder(at["rocker.phi"] - lean - math.pi, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert at["rocker.x"] == 4.0
+    assert report.range.highest.bodies == ("coupler", "rocker")
+
+
+@pytest.mark.parametrize(("crank", "rod", "offset"), [(2.0, 1.0, 0.0), (2.0, 1.2, 0.5), (1.0, 1.5, -0.8)])
+def test_limits_of_a_slider_crank_are_where_the_rod_stands_across_the_slide(
+    crank: float, rod: float, offset: float
+) -> None:
+    start = math.asin(offset / crank)  # the rod along the slide
+    report = kinfmu.check(slider_crank(crank, rod, offset, start))
+    assert report.range is not None
+    for end, side in ((report.range.low, -1.0), (report.range.high, 1.0)):
+        sine = (offset + side * rod) / crank
+        expected = math.asin(sine) if abs(sine) < 1.0 else side * math.pi - math.asin((offset - side * rod) / crank)
+        assert end == pytest.approx(expected, abs=1e-10)
+    assert "rod stands across the slide" in str(report)
+
+
+def test_a_slider_that_drives_goes_from_crank_and_rod_folded_to_stretched() -> None:
+    crank, rod, offset = 1.0, 2.5, 0.3
+    report = kinfmu.check(pushed_crank(crank, rod, offset))
+    assert report.range is not None
+    assert report.range.kind == "length"
+    assert report.range.low == pytest.approx(math.sqrt((rod - crank) ** 2 - offset**2), abs=1e-10)
+    assert report.range.high == pytest.approx(math.sqrt((rod + crank) ** 2 - offset**2), abs=1e-10)
+    assert "rod and crank fall in line" in str(report)
+
+
+def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
+    upper, (left, right) = 1.5, (1.2, 2.0)
+    report = kinfmu.check(five_bar_arm(upper, (left, right)))
+    assert report.range is None
+    assert [reach.driver for reach in report.ranges] == ["shoulder", "elbow"]
+    qx, qy = 3.0 + math.cos(right), math.sin(right)
+    away, lean = math.hypot(qx, qy), math.atan2(qy, qx)
+    half = math.acos((1.0 + away**2 - (2 * upper) ** 2) / (2 * away))  # |P - Q| = 2 upper
+    shoulder, elbow = report.ranges
+    assert shoulder.low == pytest.approx(lean - half, abs=1e-10)
+    assert shoulder.high == pytest.approx(lean + half, abs=1e-10)
+    px, py = math.cos(left) - 3.0, math.sin(left)
+    away, lean = math.hypot(px, py), math.atan2(py, px)
+    half = math.acos((1.0 + away**2 - (2 * upper) ** 2) / (2 * away))
+    assert elbow.low == pytest.approx(lean - half, abs=1e-10)
+    assert elbow.high == pytest.approx(lean + half, abs=1e-10)
+    text = str(report)
+    assert "each with the other drivers at their start values" in text
+    assert "forearm, strut can move while shoulder stands still" in text
+
+
+def test_cylinders_go_as_far_as_their_triangles() -> None:
+    foot, lug = 1.1, 2.0
+    report = kinfmu.check(digger(foot, lug))
+    lift, crowd = report.ranges
+    assert (lift.driver, lift.kind) == ("lift", "length")
+    assert lift.low == pytest.approx(abs(foot - lug), abs=1e-10)
+    assert lift.high == pytest.approx(foot + lug, abs=1e-10)
+    rear, tail = math.hypot(4 - 2.5, 0.4), math.hypot(0.7, 0.2)
+    assert crowd.low == pytest.approx(abs(rear - tail), abs=1e-10)
+    assert crowd.high == pytest.approx(rear + tail, abs=1e-10)
+
+
+def test_a_cylinder_that_closes_wholly_ends_at_zero() -> None:
+    report = kinfmu.check(digger(foot=2.0, lug=2.0))
+    assert report.ranges[0].low == pytest.approx(0.0, abs=1e-12)
+    assert report.ranges[0].high == pytest.approx(4.0, abs=1e-10)
+    assert [point.kind for point in report.ranges[0].points] == ["limit", "limit"]
+
+
+def test_change_points_show_with_several_drivers_too() -> None:
+    linkage = fourbar(2, 1, 2, 1)
+    arm = Body("arm", {"T": (0, 0), "end": (1, 0)}, (4, 0, 0.3))
+    ground = Body("ground", {**linkage.bodies[0].points, "T": (4, 0)})
+    both = replace(
+        linkage,
+        bodies=(ground, *linkage.bodies[1:], arm),
+        joints=(*linkage.joints, Revolute("T", ("ground.T", "arm.T"))),
+        drivers=(*linkage.drivers, AngleDriver("arm", "arm", ConstantSpeed(0.3, 1.0))),
+    )
+    report = kinfmu.check(both)
+    crank, arm_alone = report.ranges
+    np.testing.assert_allclose([point.value for point in crank.points], [0.0, math.pi], atol=1e-11)
+    assert arm_alone.points == ()
+    assert "branches cross, with several drivers no run goes over it" in str(report)
+
+
+def test_a_geared_linkage_turns_until_it_is_back() -> None:
+    mechanism = Mechanism(
+        "gears",
+        [
+            Body("ground", {"A": (0, 0), "B": (3, 0)}),
+            Body("wheel", {"A": (0, 0)}, (0, 0, 0.4)),
+            Body("pinion", {"B": (0, 0)}, (3, 0, 0.6)),
+        ],
+        [
+            Revolute("A", ("ground.A", "wheel.A")),
+            Revolute("B", ("ground.B", "pinion.B")),
+            Gear("mesh", ("wheel", "pinion"), ratio=2.0 / 3.0),
+        ],
+        [AngleDriver("drive", "wheel", ConstantSpeed(0.4, 1.0))],
+    )
+    (reach,) = kinfmu.check(mechanism).ranges
+    turns_of_pinion = abs(float(kinfmu.solve(mechanism, drive_angle=[0.4]).rates[0][1]))
+    assert reach.turns == 3
+    assert reach.turns * turns_of_pinion == pytest.approx(round(reach.turns * turns_of_pinion), abs=1e-12)
+
+
+def test_a_rack_never_comes_back_and_has_no_limit() -> None:
+    mechanism = Mechanism(
+        "rack_drive",
+        [
+            Body("ground", {"O": (0, 0), "G": (0, -1)}),
+            Body("pinion", {"O": (0, 0)}, (0, 0, 0)),
+            Body("rack", {"G": (0, 0)}, (0, -1, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "pinion.O")),
+            Translational("slide", ("ground.G", "rack.G")),
+            RackAndPinion("mesh", ("ground.G", "rack.G"), "pinion", 1.0),
+        ],
+        [AngleDriver("drive", "pinion", ConstantSpeed(0.0, 1.0))],
+    )
+    report = kinfmu.check(mechanism)
+    assert report.range is not None
+    assert (report.range.low, report.range.high, report.range.turns) == (None, None, None)
+    assert "drive: no limit from" in str(report)
+
+
+def test_a_run_past_the_range_is_noted() -> None:
+    swinging = fourbar(4.0, 3.0, 1.5, 1.0, start=0.2)
+    report = kinfmu.check(replace(swinging, run=RunSettings(0.0, 2.0, 0.1)))
+    assert report.notes == (
+        "[run] takes crank from 0.2 rad (11.4591559 deg) to 2.2 rad (126.050715 deg): beyond the range",
+    )
+    assert kinfmu.check(replace(swinging, run=RunSettings(0.0, 0.4, 0.1))).notes == ()
+
+
+def test_a_run_of_several_drivers_that_stops_is_noted_with_its_time() -> None:
+    stretched = replace(five_bar_arm(), run=RunSettings(0.0, 40.0, 0.1))
+    (note,) = kinfmu.check(stretched).notes
+    assert note.startswith("[run] at t = ")
+    assert "cannot be reached: the limit is" in note
+    assert kinfmu.check(replace(five_bar(), run=RunSettings(0.0, 0.5, 0.1))).notes == ()
