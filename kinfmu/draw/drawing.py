@@ -79,12 +79,14 @@ def sheet_of(shown: Instant) -> Sheet:
 def _marks(shown: Instant) -> list[Mark]:
     """Everything to draw, what is drawn later on top."""
     sliding = slides(shown)
+    plates, bars = links(shown, rods(shown, sliding))
     return [
-        *paths(shown),
         *wheels(shown),
         *supports(shown),
         *rails(shown, sliding),
-        *links(shown, rods(shown, sliding)),
+        *plates,
+        *paths(shown),
+        *bars,
         *slots_and_blocks(shown, sliding),
         *racks(shown),
         *motion(shown),

@@ -87,8 +87,7 @@ def hatched(sheet: Sheet, line: FloatArray, towards: FloatArray, size: float) ->
     for k in range(count):
         top = line[0] + along * length * (k + 0.8) / count
         strokes.append([top, top + _HATCH * size * (towards - 0.8 * along)])
-    for stroke in strokes:
-        sheet.line(stroke, 0.6, EDGE, butt=True, matters=0.0)
+    sheet.strokes(strokes, 0.6, EDGE)
     sheet.line(line, 1.1, EDGE, matters=1.5)
     sheet.cover(line + 0.5 * _HATCH * size * towards, 1.0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,13 +37,18 @@ class Instant:
     poses: Mapping[str, FloatArray]
     ways: Mapping[str, float]
 
+    @cached_property
+    def body_points(self) -> Mapping[str, tuple[float, float]]:
+        """Body-fixed coordinates of every point, by 'body.point'."""
+        return self.mechanism.body_points
+
     def track(self, point: str) -> FloatArray:
         """World coordinates (1 + n, 2) of 'body.point', the first as drawn."""
-        return world(self.poses[body_of(point)], self.mechanism.body_points[point])
+        return world(self.poses[body_of(point)], self.body_points[point])
 
     def point(self, point: str) -> FloatArray:
         """World coordinates (2,) of 'body.point' as drawn."""
-        return np.asarray(self.track(point)[0])
+        return np.asarray(world(self.poses[body_of(point)][:1], self.body_points[point])[0])
 
     def placed(self, body: str, points: FloatArray) -> FloatArray:
         """World coordinates (k, 2) of points (k, 2) in a body's frame, as drawn."""
@@ -56,7 +62,7 @@ class Instant:
         """What a driver measures as drawn [rad or length]."""
         poses = {name: Pose.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
-        return float(found.measured().value(Placement(poses, self.mechanism.body_points)))
+        return float(found.measured().value(Placement(poses, self.body_points)))
 
 
 def instant(mechanism: Mechanism) -> Instant:

@@ -73,8 +73,8 @@ class ThinBar(Mark):
         return [Name(self.name, anchors, 0.3 * BAR * sheet.fine + 1.5, colour, italic=True, rank=2)]
 
 
-def links(shown: Instant, rods: Mapping[str, FloatArray]) -> list[Mark]:
-    """All moving bodies, plates first, and massless bars.
+def links(shown: Instant, rods: Mapping[str, FloatArray]) -> tuple[list[Mark], list[Mark]]:
+    """All moving bodies and massless bars: the plates, which lie below, and the bars.
 
     rods: by body, ends (r, 2, 2) of its slots and rods in its own frame.
     """
@@ -91,7 +91,7 @@ def links(shown: Instant, rods: Mapping[str, FloatArray]) -> list[Mark]:
         for joint in shown.mechanism.joints
         if isinstance(joint, Distance)
     ]
-    return plates + thin + bars
+    return plates, thin + bars
 
 
 def shortest(marks: list[Mark], size: float) -> float:

@@ -93,17 +93,14 @@ def paths(shown: Instant) -> list[Mark]:
 def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
     """All places that have a name."""
     mechanism = shown.mechanism
-    names = list(mechanism.body_points)
+    names = list(shown.body_points)
     where = np.array([shown.point(name) for name in names]).reshape(-1, 2)
     near = _SAME * (float(np.ptp(where, axis=0).max(initial=0.0)) or 1.0)
-    places: list[_Place] = []
     home: dict[str, _Place] = {}
-    for name, at in zip(names, where, strict=True):
-        known = np.array([place.at for place in places]).reshape(-1, 2)
-        same = np.flatnonzero(np.hypot(*(known - at).T) <= near)
-        if not len(same):
-            places.append(_Place(at))
-        home[name] = places[int(same[0])] if len(same) else places[-1]
+    for k, (name, at) in enumerate(zip(names, where, strict=True)):
+        same = np.flatnonzero(np.hypot(*(where[:k] - at).T) <= near)
+        home[name] = home[names[int(same[0])]] if len(same) else _Place(at)
+    places = list(dict.fromkeys(home.values()))
     _note_joints(shown, sliding, home)
     used = {name for place in places for name in place.points}
     held = {joint.between[0] for joint in mechanism.joints if isinstance(joint, Translational | PointOnLine)}

@@ -74,7 +74,6 @@ class Sheet:
         matters: float = 1.0,
         closed: bool = False,
         fill: Colour | None = None,
-        butt: bool = False,
         style: Any = "solid",
     ) -> None:
         """A stroke `width` [pt] through points (k, 2), round at its ends; closed and filled if asked for."""
@@ -86,13 +85,13 @@ class Sheet:
         codes = [Outline.MOVETO, *[Outline.LINETO] * (len(route) - 1)]
         if closed:
             codes[-1] = Outline.CLOSEPOLY
-        self.axes.add_patch(
+        self.axes.add_artist(
             PathPatch(
                 Outline(route, codes),
                 linewidth=width,
                 edgecolor=ink(colour),
                 facecolor=ink(fill) if fill else "none",
-                capstyle="butt" if butt else "round",
+                capstyle="round",
                 joinstyle="round",
                 linestyle=style,
                 zorder=self._next(),
@@ -100,6 +99,16 @@ class Sheet:
         )
         if matters:
             self.cover(route, matters, width)
+
+    def strokes(self, ends: ArrayLike, width: float, colour: Colour) -> None:
+        """Straight strokes with ends (k, 2, 2), all alike, that nobody keeps away from: hatching."""
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path as Outline
+
+        points = np.asarray(ends, dtype=float).reshape(-1, 2)
+        codes = [Outline.MOVETO, Outline.LINETO] * (len(points) // 2)
+        look = {"linewidth": width, "edgecolor": ink(colour), "facecolor": "none", "capstyle": "butt"}
+        self.axes.add_artist(PathPatch(Outline(points, codes), zorder=self._next(), **look))
 
     def circle(
         self,
@@ -116,7 +125,7 @@ class Sheet:
         from matplotlib.patches import Circle
 
         x, y = np.asarray(centre, dtype=float)
-        self.axes.add_patch(
+        self.axes.add_artist(
             Circle(
                 (x, y),
                 radius,

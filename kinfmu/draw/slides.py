@@ -120,7 +120,7 @@ def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
     found: dict[str, list[FloatArray]] = {}
     for slide in sliding:
         if slide.holder != GROUND_NAME:
-            origin = np.array(shown.mechanism.body_points[slide.origin])
+            origin = np.array(shown.body_points[slide.origin])
             line = [origin, *slide.ends]
             along = slide.ends[1] - slide.ends[0]
             order = np.argsort([float(point @ along) for point in line])
@@ -165,7 +165,7 @@ def slots_and_blocks(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
 def _ends(shown: Instant, a: str, b: str, axis: float) -> FloatArray:
     """Ends (2, 2) of the way of b along an axis [rad] through a, in the frame of a's body."""
     e = np.array(unit_vector(axis))
-    origin = np.array(shown.mechanism.body_points[a])
+    origin = np.array(shown.body_points[a])
     way = (seen_from(shown.poses[body_of(a)], shown.track(b)) - origin) @ e
     return np.array([origin + np.nanmin(way) * e, origin + np.nanmax(way) * e])
 
