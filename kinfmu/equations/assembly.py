@@ -2,36 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.equations.blocks import Ordered, ordered_blocks
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
+from kinfmu.errors import AssemblyError, listed
 
 CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
 SINGULAR = 1e-6  # margin below which a start pose counts as singular: double roots are known to half the digits
 COMFORTABLE = 0.03  # margin below which a pose beside the start makes a better anchor
 BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
+MOST_DENSE = 900  # coordinates; what needs all rows at once takes minutes beyond
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
 
 
-def close(system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | None = None) -> tuple[FloatArray, float]:
-    """The pose nearest to q where the chosen rows hold (all of them if None), and its residual relative to the size.
+def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
+    """The pose nearest to q where all rows of a system or of a part of it hold, and its residual relative to the size.
 
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near by, so that redundant rows and singular points do
     no harm. Stops on the residual: a residual above CLOSED means that the pose does not close.
     """
-    chosen = list(range(len(system.rows))) if rows is None else list(rows)
-    row_scales = system.scales[chosen] * system.size
-    best, residual = q.copy(), system.residual(q, u)[chosen] / row_scales
+    part = Part(part) if isinstance(part, System) else part
+    best, residual = q.copy(), part.residual(q, u)
     damping = 1e-3
     for _ in range(_ITERATIONS):
         norm = float(np.linalg.norm(residual))
-        jacobian = system.scaled_jacobian(best)[chosen]
+        if norm == 0.0:
+            break
+        jacobian = part.jacobian(best)
         if norm <= 1e-3:  # close enough for the full step
             step = np.linalg.lstsq(jacobian, -residual, rcond=_RANK)[0]
         else:
@@ -39,8 +44,8 @@ def close(system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | No
             step = np.linalg.lstsq(damped, np.concatenate([-residual, np.zeros(jacobian.shape[1])]), rcond=None)[0]
             longest = float(np.abs(step).max(initial=0.0))
             step *= min(1.0, 0.5 / longest) if longest > 0.0 else 1.0  # half a radian or half a size at most
-        trial = best + system.column_scales * step
-        trial_residual = system.residual(trial, u)[chosen] / row_scales
+        trial = best + part.column_scales * step
+        trial_residual = part.residual(trial, u)
         if np.linalg.norm(trial_residual) < norm:
             best, residual = trial, trial_residual
             damping = max(damping / 5.0, 1e-12)
@@ -51,22 +56,20 @@ def close(system: System, q: FloatArray, u: FloatArray, rows: Sequence[int] | No
     return best, float(np.abs(residual).max(initial=0.0))
 
 
-def motion_samples(
-    system: System, q: FloatArray, rows: Sequence[int], count: int, step: float = 0.2
-) -> list[FloatArray]:
-    """Up to `count` poses spread along the motion that the chosen rows leave, starting with the one nearest to q.
+def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:
+    """Up to `count` poses spread along the motion that the rows of a part leave, starting with the one nearest to q.
 
-    Random directions of the null space of the scaled Jacobian (seeded), `step` in radians and sizes. Empty if the rows
-    do not close near q; one pose if they leave no motion.
+    Random directions of the null space of its Jacobian (seeded), `step` in radians and sizes. Empty if the rows do not
+    close near q; one pose if they leave no motion. Drivers among the rows stand at 0.
     """
-    u = np.zeros(len(system.mechanism.drivers))
+    u = np.zeros(len(part.system.mechanism.drivers))
     rng = np.random.default_rng(1989)
-    start, gap = close(system, q, u, rows)
+    start, gap = close(part, q, u)
     if gap > CLOSED:
         return []
     samples, direction = [start], None
     while len(samples) < count:
-        free = null_space(system.scaled_jacobian(samples[-1])[list(rows)])  # (n, free directions)
+        free = null_space(part.jacobian(samples[-1]))  # (n, free directions)
         if free.shape[1] == 0:
             break
         if direction is None:
@@ -75,7 +78,7 @@ def motion_samples(
         direction /= np.abs(direction).max()
         length = step
         while length > 1e-3:
-            pose, gap = close(system, samples[-1] + length * system.column_scales * direction, u, rows)
+            pose, gap = close(part, samples[-1] + length * part.column_scales * direction, u)
             if gap <= CLOSED:
                 break
             length /= 2.0
@@ -101,10 +104,12 @@ def start_targets(system: System) -> FloatArray:
     """Driver values of the start pose, (d,): measured in it where it gives what the driver moves, else by the law."""
     given = [value is not None for body in system.mechanism.moving_bodies for value in body.start]
     q = rough_start(system)
-    measured, seen = system.measure(q), system.jacobian(q)[system.joint_row_count :] != 0.0
+    measured = system.measure(q)
     targets = []
     for k, driver in enumerate(system.mechanism.drivers):
-        is_given = all(known for known, used in zip(given, seen[k], strict=True) if used)
+        member = system.members[len(system.mechanism.joints) + k]
+        (seen,) = system.gradients(member, q) != 0.0
+        is_given = all(given[column] for column, used in zip(member.columns, seen, strict=True) if used)
         law = {name: getattr(driver.law, name) for name in driver.law.orders}
         targets.append(measured[k] if is_given else driver.law.target(system.mechanism.run.start, **law))
     return np.array(targets, dtype=float)
@@ -115,15 +120,25 @@ class Assembled(NamedTuple):
 
     q: FloatArray
     u: FloatArray
-    margin: float  # smallest over largest singular value of the scaled Jacobian of all rows
+    margin: float  # the smallest over the blocks of smallest over largest singular value of the scaled Jacobian
 
 
+@lru_cache(maxsize=4)
 def assemble(system: System) -> Assembled | None:
     """The start pose, closed; if it is singular or nearly so, the most regular of it and the poses a little beside it.
 
-    None if the rows, all together, do not close near the start pose.
+    Block by block where rows and coordinates allow an order; all rows at once where they do not, or where a block is
+    open or singular. None if the rows, all together, do not close near the start pose.
     """
     u = start_targets(system)
+    found, trouble = _assembled_in_order(system, u)
+    if found is not None:
+        return found
+    if len(system.coordinates) > MOST_DENSE:
+        raise AssemblyError(
+            f"a mechanism of {len(system.coordinates)} coordinates (more than {MOST_DENSE}) must assemble block by "
+            f"block from its start pose, but {trouble}"
+        )
     q, gap = close(system, rough_start(system), u)
     if gap > CLOSED:
         return None
@@ -140,6 +155,44 @@ def assemble(system: System) -> Assembled | None:
         if near is not None:
             beside.append(Assembled(near, u + way, margin(system, near)))
     return max([found, *beside], key=lambda pose: pose.margin)
+
+
+def in_order(system: System) -> Ordered:
+    """The order of solving all rows, from where their gradients vanish at a random pose."""
+    rng = np.random.default_rng(1989)
+    q = rng.uniform(-1.0, 1.0, len(system.coordinates)) * system.column_scales
+    meets: list[list[int]] = []
+    for member in system.members:
+        for gradient in system.gradients(member, q):
+            meets.append([column for column, slope in zip(member.columns, gradient, strict=True) if slope != 0.0])
+    return ordered_blocks(meets, len(system.coordinates))
+
+
+def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] | tuple[None, str]:
+    """The start pose closed block by block, or None and what stands in the way; never a pose that is nearly singular."""
+    order = in_order(system)
+    if order.unmatched_columns:
+        return None, f"nothing determines {listed(system.coordinates[k] for k in order.unmatched_columns[:5])}"
+    if order.unmatched_rows:
+        return None, f"there are rows to spare: {listed(system.rows[k].name for k in order.unmatched_rows[:5])}"
+    q, least = rough_start(system), 1.0
+    for rows, columns in order.blocks:
+        part = Part(system, rows, columns, q)
+        q[list(columns)], gap = close(part, q[list(columns)], u)
+        if gap > CLOSED:
+            return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} do not close"
+        least = min(least, _block_margin(part.jacobian(q[list(columns)])))
+        if least <= COMFORTABLE:
+            return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
+    return Assembled(q, u, least), ""
+
+
+def _block_margin(jacobian: FloatArray) -> float:
+    """Smallest over largest singular value; of a single row, where that says nothing, its slope."""
+    if jacobian.size == 1:
+        return min(1.0, abs(float(jacobian[0, 0])))
+    singular = np.linalg.svd(jacobian, compute_uv=False)
+    return float(singular[-1] / singular[0])
 
 
 def _walked(system: System, q: FloatArray, u: FloatArray, way: FloatArray) -> FloatArray | None:

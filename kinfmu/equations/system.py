@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinfmu.drivers import Driver
 from kinfmu.equations.taylor import Taylor
-from kinfmu.joints import GROUND, Placement, Pose
+from kinfmu.joints import GROUND, Joint, Placement, Pose
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.units import METRES
@@ -29,6 +31,16 @@ class Row(NamedTuple):
     @property
     def name(self) -> str:
         return f"{self.owner}.{self.label}"
+
+
+class Member(NamedTuple):
+    """A joint or a driver: its moving bodies, and places of its rows and of its bodies' coordinates in the system."""
+
+    owner: Joint | Driver
+    bodies: tuple[str, ...]
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]  # three a body
+    driver: int | None = None  # number of the driver, if it is one
 
 
 class System:
@@ -73,11 +85,54 @@ class System:
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
         """Phi_q, (m, n)."""
-        unit = np.eye(len(self.coordinates))
-        along = [Taylor(value, unit[k]) for k, value in enumerate(_floats(q))]
-        n = len(self.coordinates)
-        rows = [_lines(phi, n) for phi in self.evaluate(along, [0.0] * len(self.mechanism.drivers))]
-        return np.array(rows).reshape(len(self.rows), n)
+        at = np.asarray(q, dtype=float)
+        matrix = np.zeros((len(self.rows), len(self.coordinates)))
+        for member in self.members:
+            matrix[np.ix_(member.rows, member.columns)] = self.gradients(member, at)
+        return matrix
+
+    @cached_property
+    def members(self) -> tuple[Member, ...]:
+        """Joints, then drivers."""
+        number = {body.name: k for k, body in enumerate(self.mechanism.moving_bodies)}
+        members, first = [], 0
+        for owner in (*self.mechanism.joints, *self.mechanism.drivers):
+            bodies = tuple(dict.fromkeys(name for name in owner.bodies() if name in number))
+            columns = tuple(3 * number[name] + k for name in bodies for k in range(3))
+            count = len(owner.labels) if isinstance(owner, Joint) else 1
+            driver = None if isinstance(owner, Joint) else first - self.joint_row_count
+            members.append(Member(owner, bodies, tuple(range(first, first + count)), columns, driver))
+            first += count
+        return tuple(members)
+
+    @cached_property
+    def member_of(self) -> tuple[int, ...]:
+        """Number of the joint or driver to which each row belongs, by index into `members`."""
+        return tuple(number for number, member in enumerate(self.members) for _ in member.rows)
+
+    def values(self, member: Member, q: FloatArray, u: FloatArray) -> list[float]:
+        """Phi of one joint or driver, a value a row; q: (n,) all coordinates."""
+        target = 0.0 if member.driver is None else float(u[member.driver])
+        return [float(value) for value in self._alone(member, q[list(member.columns)].tolist(), target)]
+
+    def gradients(self, member: Member, q: FloatArray) -> FloatArray:
+        """Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
+        unit = np.eye(len(member.columns))
+        along = [Taylor(value, unit[k]) for k, value in enumerate(q[list(member.columns)].tolist())]
+        lines = [_lines(phi, len(along)) for phi in self._alone(member, along, 0.0)]
+        return np.array(lines).reshape(len(member.rows), len(along))
+
+    def _alone(self, member: Member, coordinates: Sequence[Any], target: Any) -> Sequence[Any]:
+        """Rows of one joint or driver in whatever arithmetic the coordinates of its bodies are in."""
+        poses = {GROUND_NAME: GROUND}
+        for k, name in enumerate(member.bodies):
+            poses[name] = Pose.of(*coordinates[3 * k : 3 * k + 3])
+        at, owner = Placement(poses, self._points), member.owner
+        return owner.residual(at) if isinstance(owner, Joint) else (owner.residual(at, target),)
+
+    @cached_property
+    def _points(self) -> dict[str, tuple[float, float]]:
+        return self.mechanism.body_points
 
     def nu(self, q: ArrayLike, u: ArrayLike, ud: ArrayLike) -> FloatArray:
         """Right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""

@@ -16,6 +16,7 @@ from kinfmu.equations.assembly import (
     rough_start,
     start_targets,
 )
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
 
@@ -48,7 +49,7 @@ def _does_not_close(system: System) -> AssemblyError:
     pose, _ = close(system, rough_start(system), u)
     widest = system.rows[int(system.relative_gaps(system.residual(pose, u)).argmax())].owner
     others = [k for k, row in enumerate(system.rows) if row.owner != widest]
-    pose, _ = close(system, pose, u, others)
+    pose, _ = close(Part(system, others), pose, u)
     phi = system.residual(pose, u)
     gaps, relative = system.gaps(phi), system.relative_gaps(phi)
     of_widest = [k for k, row in enumerate(system.rows) if row.owner == widest]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start
 from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import InconsistentError, MechanismError, MobilityError, listed, suggestion
 from kinfmu.mechanism import Mechanism, Point
@@ -255,7 +256,7 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
 def _loose(system: System, redundancy: Redundancy) -> list[str]:
     """Bodies that joints and drivers together do not hold."""
     rows = [*redundancy.kept, *range(system.joint_row_count, len(system.rows))]
-    pose = next(iter(motion_samples(system, rough_start(system), redundancy.kept, 1)), rough_start(system))
+    pose = next(iter(motion_samples(Part(system, redundancy.kept), rough_start(system), 1)), rough_start(system))
     free = null_space(system.scaled_jacobian(pose)[rows])
     moves = {
         name.partition(".")[0] for name, way in zip(system.coordinates, free, strict=True) if abs(way).max() > 1e-6

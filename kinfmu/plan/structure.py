@@ -6,13 +6,10 @@ rows -> constants -> matching and strongly connected components -> blocks in ord
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
-
+from kinfmu.equations.blocks import ordered_blocks
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.equations.system import System
 from kinfmu.errors import MobilityError, listed
@@ -77,9 +74,14 @@ def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_asid
         index: [number[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in number]
         for index in open_rows
     }
+    order = ordered_blocks([meets[index] for index in open_rows], len(unknown))
+    if order.unmatched_rows or order.unmatched_columns:
+        missed = [unknown[k] for k in order.unmatched_columns]
+        spare = [system.rows[open_rows[k]].name for k in order.unmatched_rows]
+        raise MobilityError(f"nothing determines {listed(missed)}; rows to spare: {listed(spare)}")
     blocks = [
         _torn(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
-        for rows, columns in _blocks(system, open_rows, unknown, meets)
+        for rows, columns in order.blocks
     ]
     return Structure(fixed, tuple(_with_companions(system, row, known, blocks, kept, set_aside)))
 
@@ -129,53 +131,6 @@ def _constants(
             heapq.heappush(waiting, again)
     fixed = {name: node.constant for name in system.coordinates if (node := values.get(name)) is not None}
     return {name: value for name, value in fixed.items() if value is not None}, used
-
-
-def _blocks(
-    system: System, rows: Sequence[int], unknown: Sequence[str], meets: Mapping[int, Sequence[int]]
-) -> list[tuple[list[int], list[int]]]:
-    """Blocks of rows and columns (positions in `rows` and `unknown`) in the order of solving."""
-    row_number = np.repeat(np.arange(len(rows)), [len(meets[index]) for index in rows])
-    column = np.array([k for index in rows for k in meets[index]], dtype=int)
-    shape = (len(rows), len(unknown))
-    incidence = csr_matrix((np.ones(len(column)), (row_number, column)), shape=shape)
-    match = maximum_bipartite_matching(incidence, perm_type="column")  # column of each row, -1 if none
-    if len(rows) != len(unknown) or (match < 0).any():
-        missed = [unknown[k] for k in range(len(unknown)) if k not in set(match.tolist())]
-        spare = [system.rows[index].name for index, k in zip(rows, match, strict=True) if k < 0]
-        raise MobilityError(f"nothing determines {listed(missed)}; rows to spare: {listed(spare)}")
-    owner = np.empty(len(unknown), dtype=int)
-    owner[match] = np.arange(len(rows))
-    needs = csr_matrix((np.ones(len(column)), (row_number, owner[column])), shape=(len(rows), len(rows)))
-    _, component = connected_components(needs, connection="strong")
-    members: dict[int, list[int]] = {}
-    for k, label in enumerate(component):
-        members.setdefault(int(label), []).append(k)
-    order = _topological(component, row_number, owner[column], members)
-    return [(members[label], sorted(int(match[k]) for k in members[label])) for label in order]
-
-
-def _topological(
-    component: Sequence[int], row_number: Iterable[int], needed: Iterable[int], members: Mapping[int, Sequence[int]]
-) -> list[int]:
-    """Components in an order where each comes after those it needs; ties go to the earlier row of the file."""
-    before: dict[int, set[int]] = {label: set() for label in members}
-    after: dict[int, set[int]] = {label: set() for label in members}
-    for a, b in zip(row_number, needed, strict=True):
-        if component[a] != component[b]:
-            before[int(component[a])].add(int(component[b]))
-            after[int(component[b])].add(int(component[a]))
-    ready = [(members[label][0], label) for label, needs in before.items() if not needs]
-    heapq.heapify(ready)
-    order = []
-    while ready:
-        _, label = heapq.heappop(ready)
-        order.append(label)
-        for later in sorted(after[label]):
-            before[later].discard(label)
-            if not before[later]:
-                heapq.heappush(ready, (members[later][0], later))
-    return order
 
 
 def _torn(

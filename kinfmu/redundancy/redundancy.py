@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import assemble, motion_samples, rough_start
+from kinfmu.equations.assembly import COMFORTABLE, assemble, motion_samples, null_space, rough_start
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System
 
 CONSISTENT = 1e-11  # gap relative to the mechanism's size up to which a dependent row counts as consistent
+_DEPENDENT = 1e-6  # part of a row in a combination that counts; a singular value that counts as zero
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
 _SAMPLES = 6
 
@@ -64,19 +66,19 @@ def find_redundancy(system: System) -> Redundancy:
     rank at one pose; along the motion, a parallel third crank shows as redundant and a stretched linkage does not.
     """
     assembled = assemble(system)
+    free, joint_rows = len(system.coordinates), range(system.joint_row_count)
+    if assembled is not None and assembled.margin > COMFORTABLE and len(system.rows) == free:
+        return Redundancy(free - len(joint_rows), tuple(joint_rows), ())  # regular with its drivers: all independent
     start = rough_start(system) if assembled is None else assembled.q
-    kept = list(range(system.joint_row_count))
-    free = len(system.coordinates)
-    if free - len(kept) == len(system.mechanism.drivers) and _independent_somewhere(system, start, kept):
-        return Redundancy(free - len(kept), tuple(kept), ())
-    dependent: list[DependentRow] = []
-    for index in reversed(range(system.joint_row_count)):
+    suspects = _suspects(system, None if assembled is None else assembled.q)
+    kept, dependent = list(joint_rows), []
+    u = np.zeros(len(system.mechanism.drivers))
+    for index in reversed(suspects):
         others = [k for k in kept if k != index]
-        poses = motion_samples(system, start, others, _SAMPLES)
+        poses = motion_samples(Part(system, others), start, _SAMPLES)
         if not poses or not all(_in_span(system, pose, index, others) for pose in poses):
             continue
         kept = others
-        u = np.zeros(len(system.mechanism.drivers))
         residuals = [system.residual(pose, u) for pose in poses]
         gap = max((float(system.gaps(phi)[index]) for phi in residuals), key=abs)
         implied_by = _implied_by(system, poses, index, others)
@@ -85,27 +87,35 @@ def find_redundancy(system: System) -> Redundancy:
     return Redundancy(free - len(kept), tuple(kept), tuple(dependent))
 
 
-def _independent_somewhere(system: System, start: FloatArray, rows: Sequence[int]) -> bool:
-    """True if all rows close together and are independent at one pose of their motion: then none is redundant."""
-    for pose in motion_samples(system, start, rows, _SAMPLES):
-        singular = np.linalg.svd(system.scaled_jacobian(pose)[list(rows)], compute_uv=False)
-        if len(singular) == 0 or singular[-1] > 1e-4 * singular[0]:
-            return True
-    return False
+def _suspects(system: System, closed: FloatArray | None) -> list[int]:
+    """Joint rows that may be dependent: those with a part in a combination of gradients that vanishes.
+
+    Where all rows hold together, what is dependent all along the motion is dependent there too. Where they do not close,
+    all rows are suspects.
+    """
+    joint_rows = list(range(system.joint_row_count))
+    if closed is None or not joint_rows:
+        return joint_rows
+    combinations = null_space(Part(system, joint_rows).jacobian(closed).T, _DEPENDENT)  # (rows, combinations)
+    return [k for k in joint_rows if np.abs(combinations[k]).max(initial=0.0) > _DEPENDENT]
 
 
 def _in_span(system: System, pose: FloatArray, index: int, others: Sequence[int]) -> bool:
-    jacobian = system.scaled_jacobian(pose)
-    gradient = jacobian[index]
-    weights = np.linalg.lstsq(jacobian[list(others)].T, gradient, rcond=1e-9)[0]
-    outside = gradient - jacobian[list(others)].T @ weights
+    _, gradient, outside = _combination(system, pose, index, others)
     return bool(np.linalg.norm(outside) <= _IN_SPAN * max(1.0, float(np.linalg.norm(gradient))))
 
 
 def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others: Sequence[int]) -> tuple[str, ...]:
     used = np.zeros(len(others), dtype=bool)
     for pose in poses:
-        jacobian = system.scaled_jacobian(pose)
-        weights = np.linalg.lstsq(jacobian[list(others)].T, jacobian[index], rcond=1e-9)[0]
-        used |= np.abs(weights) > 1e-6
+        used |= np.abs(_combination(system, pose, index, others)[0]) > 1e-6
     return tuple(system.rows[k].name for k, is_used in zip(others, used, strict=True) if is_used)
+
+
+def _combination(
+    system: System, pose: FloatArray, index: int, others: Sequence[int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weights of the other rows whose sum comes nearest to a row's gradient, the gradient, and what they leave of it."""
+    jacobian = Part(system, [*others, index]).jacobian(pose)
+    weights = np.asarray(np.linalg.lstsq(jacobian[:-1].T, jacobian[-1], rcond=1e-9)[0])
+    return weights, jacobian[-1], jacobian[-1] - jacobian[:-1].T @ weights
