@@ -30,7 +30,7 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
     no harm. Stops on the residual: a residual above CLOSED means that the pose does not close.
     """
     part = Part(part) if isinstance(part, System) else part
-    best, residual = q.copy(), part.residual(q, u)
+    best, residual = _straight(part, q, u)
     damping = 1e-3
     for _ in range(_ITERATIONS):
         norm = float(np.linalg.norm(residual))
@@ -54,6 +54,17 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
         else:
             damping *= 8.0
     return best, float(np.abs(residual).max(initial=0.0))
+
+
+def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Pose and residual after one whole Gauss-Newton step if that closes linear rows, else as they are at q."""
+    residual = part.residual(q, u)
+    if np.abs(residual).max(initial=0.0) == 0.0:
+        return q.copy(), residual
+    there = q + part.column_scales * np.linalg.lstsq(part.jacobian(q), -residual, rcond=_RANK)[0]
+    left = part.residual(there, u)
+    linear = np.abs(left).max(initial=0.0) <= 1e-3 * CLOSED
+    return (there, left) if linear else (q.copy(), residual)
 
 
 def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:

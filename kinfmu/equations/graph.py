@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
@@ -165,15 +165,20 @@ class Graph:
             return self.constant(_applied(name, value, numbers))
         return self._intern(name, args, value)
 
-    def derivative(self, targets: Sequence[Node], rates: Mapping[Node, Node]) -> list[Node]:
-        """Derivatives of the targets when symbols move at the given rates; symbols without a rate stand still."""
+    def derivative(
+        self, targets: Sequence[Node], rates: Mapping[Node, Node], still: Collection[Node] = ()
+    ) -> list[Node]:
+        """Derivatives of the targets when symbols move at the given rates, without those that stand still.
+
+        A symbol without a rate stands still, too.
+        """
         zero, one = self.constant(0.0), self.constant(1.0)
         d: dict[Node, Node] = {}
         for node in reachable(targets):
             a = node.args[0] if node.args else node
             b = node.args[-1] if node.args else node
             if node.op in ("constant", "symbol"):
-                d[node] = rates.get(node, zero)
+                d[node] = zero if node in still else rates.get(node, zero)
             elif node.op == "+":
                 d[node] = d[a] + d[b]
             elif node.op == "-":

@@ -35,7 +35,10 @@ def find_anchor(system: System) -> Assembled:
         raise MobilityError(
             f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too"
         )
-    start, _ = close(system, rough_start(system), start_targets(system))
+    targets = start_targets(system)
+    if np.array_equal(found.u, targets):
+        return found  # the start pose itself
+    start, _ = close(system, rough_start(system), targets)
     if margin(system, start) <= SINGULAR:
         leaving = branches(system, start, found.u)
         if len(leaving) > 1:

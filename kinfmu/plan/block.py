@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.equations.graph import Node, evaluate
+from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.equations.system import System
 from kinfmu.naming import derivative_name
 from kinfmu.plan.structure import BlockStructure, RowTracer, given_value
@@ -65,16 +66,14 @@ class Rates:
         self.both[symbol] = rate
         self.both[rate] = acceleration
 
-    def of(self, nodes: Sequence[Node], at_rest: Sequence[Node] = ()) -> list[Node]:
+    def of(self, nodes: Sequence[Node], at_rest: Collection[Node] = ()) -> list[Node]:
         """First derivatives, with the symbols `at_rest` standing still."""
-        moving = {symbol: rate for symbol, rate in self.first.items() if symbol not in at_rest}
-        return self.graph.derivative(nodes, moving)
+        return self.graph.derivative(nodes, self.first, at_rest)
 
-    def second(self, nodes: Sequence[Node], unaccelerated: Sequence[Node] = ()) -> list[Node]:
+    def second(self, nodes: Sequence[Node], unaccelerated: Collection[Node] = ()) -> list[Node]:
         """Second derivatives, with the accelerations of the symbols `unaccelerated` zero."""
         still = {self.first[symbol] for symbol in unaccelerated}
-        moving = {symbol: rate for symbol, rate in self.both.items() if symbol not in still}
-        return self.graph.derivative(self.of(nodes), moving)
+        return self.graph.derivative(self.of(nodes), self.both, still)
 
 
 def build_block(
@@ -87,7 +86,7 @@ def build_block(
     anchor: Mapping[str, float],
 ) -> Block:
     """Trace the rows of a block once and take everything from that trace. anchor: all coordinates, by name."""
-    known = dict(fixed)
+    known = ChainMap[str, Node]({}, fixed)  # type: ignore[arg-type]  # the fixed ones are not written to
     assigned = []
     for name, index in structure.assigned:
         value = given_value(tracer, row, index, name, known)
@@ -136,6 +135,8 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
         return 1.0
     rng = np.random.default_rng(1989)
     largest = 0.0
+    flat = [entry for row in jacobian for entry in row]
+    met = {symbol.name: anchor[symbol.name] for symbol in symbols(flat)}
     for sample in range(_DETERMINANT_SAMPLES):
         turned = {
             name: value
@@ -143,8 +144,8 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
             else rng.uniform(-np.pi, np.pi)
             if name.endswith(".phi")
             else value + size * rng.uniform(-0.5, 0.5)
-            for name, value in anchor.items()
+            for name, value in met.items()
         }
-        entries = evaluate([entry for row in jacobian for entry in row], turned)
+        entries = evaluate(flat, turned)
         largest = max(largest, abs(block_determinant(np.reshape(entries, (len(jacobian), -1)))))
     return float(f"{largest:.2g}") or 1.0  # a scale: more digits would differ between machines

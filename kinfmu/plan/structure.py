@@ -6,6 +6,7 @@ rows -> constants -> matching and strongly connected components -> blocks in ord
 from __future__ import annotations
 
 import heapq
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -98,7 +99,7 @@ def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Ma
     coefficient = linear_coefficient(row(index, known), tracer.symbols[name])
     if coefficient is None:
         return None
-    rest = row(index, {**known, name: tracer.graph.constant(0.0)})
+    rest = row(index, ChainMap({name: tracer.graph.constant(0.0)}, known))  # type: ignore[arg-type]  # only read
     return -rest if coefficient == 1.0 else rest if coefficient == -1.0 else rest / -coefficient
 
 
