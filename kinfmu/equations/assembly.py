@@ -175,12 +175,16 @@ def in_order(system: System) -> Ordered:
     meets: list[list[int]] = []
     for member in system.members:
         for gradient in system.gradients(member, q):
-            meets.append([column for column, slope in zip(member.columns, gradient, strict=True) if slope != 0.0])
+            seen = [column for column, slope in zip(member.columns, gradient, strict=True) if slope != 0.0]
+            meets.append(seen)
     return ordered_blocks(meets, len(system.coordinates))
 
 
 def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] | tuple[None, str]:
-    """The start pose closed block by block, or None and what stands in the way; never a pose that is nearly singular."""
+    """The start pose closed block by block, or None and what stands in the way.
+
+    Never a pose that is nearly singular.
+    """
     order = in_order(system)
     if order.unmatched_columns:
         return None, f"nothing determines {listed(system.coordinates[k] for k in order.unmatched_columns[:5])}"

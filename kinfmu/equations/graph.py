@@ -152,6 +152,10 @@ class Graph:
         """A node of this graph for a node or a number."""
         return x if isinstance(x, Node) else self.constant(x)
 
+    def copy(self, node: Node, *args: Node) -> Node:
+        """An operation of another graph on nodes of this one, as it stands: nothing is simplified."""
+        return self._intern(node.op, args, node.value)
+
     def _intern(self, op: str, args: tuple[Node, ...], value: Content) -> Node:
         key = (op, value, *(arg.id for arg in args))
         if key not in self._nodes:

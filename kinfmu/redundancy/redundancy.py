@@ -90,8 +90,8 @@ def find_redundancy(system: System) -> Redundancy:
 def _suspects(system: System, closed: FloatArray | None) -> list[int]:
     """Joint rows that may be dependent: those with a part in a combination of gradients that vanishes.
 
-    Where all rows hold together, what is dependent all along the motion is dependent there too. Where they do not close,
-    all rows are suspects.
+    Where all rows hold together, what is dependent all along the motion is dependent there too. Where they do not
+    close, all rows are suspects.
     """
     joint_rows = list(range(system.joint_row_count))
     if closed is None or not joint_rows:
@@ -115,7 +115,7 @@ def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others:
 def _combination(
     system: System, pose: FloatArray, index: int, others: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weights of the other rows whose sum comes nearest to a row's gradient, the gradient, and what they leave of it."""
+    """Weights of the other rows whose sum comes nearest to a row's gradient, that gradient, and what they leave."""
     jacobian = Part(system, [*others, index]).jacobian(pose)
     weights = np.asarray(np.linalg.lstsq(jacobian[:-1].T, jacobian[-1], rcond=1e-9)[0])
     return weights, jacobian[-1], jacobian[-1] - jacobian[:-1].T @ weights

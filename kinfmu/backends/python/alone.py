@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 
+from kinfmu.backends.python.writer import identifier
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
 
@@ -18,17 +19,17 @@ _OPERATIONS: dict[str, Callable[..., Node]] = {
 
 
 class Alone:
-    """Right sides and definitions of a plan whose only driver has speed 1 and acceleration 0.
+    """Right sides and formulas of a plan whose only driver has speed 1 and acceleration 0.
 
-    definitions: rates and accelerations of assigned coordinates by name, in the order of evaluation.
+    formulas: rates and accelerations of assigned coordinates by name, in the order of evaluation.
     """
 
-    def __init__(self, speed: str, acceleration: str, definitions: Mapping[str, Node]) -> None:
+    def __init__(self, speed: str, acceleration: str, formulas: Mapping[str, Node]) -> None:
         self._given = {speed: 1.0, acceleration: 0.0}
-        self.definitions: dict[str, Node] = {}
-        for name, node in definitions.items():
+        self.formulas: dict[str, Node] = {}
+        for name, node in formulas.items():
             (folded,) = self._folded([node])
-            self.definitions[name] = folded
+            self.formulas[name] = folded
             if folded.constant is not None:
                 self._given[name] = folded.constant
 
@@ -39,6 +40,10 @@ class Alone:
     def acceleration(self, block: Block) -> tuple[Node, ...]:
         """The block's right side for accelerations, folded."""
         return tuple(self._folded(block.acceleration))
+
+    def spoken(self, name: str) -> str:
+        """A rate as an argument: a number where it is one."""
+        return repr(self._given[name]) if name in self._given else identifier(name)
 
     def _folded(self, targets: Sequence[Node]) -> list[Node]:
         """The targets with numbers in place of the symbols that are given; the graph simplifies what it can."""

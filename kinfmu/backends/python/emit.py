@@ -25,17 +25,25 @@ part of the code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+from kinfmu.backends.python.alike import Calls, grouped
 from kinfmu.backends.python.alone import Alone
+from kinfmu.backends.python.block_code import (
+    assigned_lines,
+    indented,
+    kept_name,
+    matrix,
+    newton_lines,
+    solution_lines,
+    tupled,
+    unpacking,
+)
+from kinfmu.backends.python.definitions import Definitions, formula
 from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
-
-ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
-SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
-ITERATIONS = 12
 
 
 def emit(plan: SolvePlan) -> str:
@@ -47,24 +55,49 @@ class _Emitter:
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
         self.solved = [block for block in plan.blocks if block.unknowns]
-        self.number = {id(block): k for k, block in enumerate(self.solved)}
         curves = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
         self.curves = {data: f"CURVE_{k}" for k, data in enumerate(curves, start=1)}
+        self.unknowns = plan.unknowns
+        first = 0
+        self.places: list[tuple[int, int]] = []  # first and last + 1 of each solved block's unknowns
+        for block in self.solved:
+            self.places.append((first, first + len(block.unknowns)))
+            first += len(block.unknowns)
+        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
+        members = grouped(self.solved, self._rate_of)
+        self.calls = {k: Calls(k, self.solved[k], member, self._rate_of) for k, member in members.items()}
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
         self.position_nodes: list[Node] = []
-        for block in plan.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-            self.position_nodes += [motion[0] for _, motion in block.assigned]
-            self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
-        self.definitions = {
-            derivative_name(name, order): motion[order]
-            for block in plan.blocks
-            for name, motion in block.assigned
-            for order in (1, 2)
-        }  # rates and accelerations of assigned coordinates by name, in the order of evaluation
+        self.formulas: dict[str, Node] = {}  # of rates and accelerations of assigned coordinates
+        number = {id(block): k for k, block in enumerate(self.solved)}
+        self.order = [(number.get(id(block)), block) for block in plan.blocks]  # all blocks, the solved with numbers
+        for k, block in self.order:
+            if k not in self.calls:
+                for name, motion in block.assigned:
+                    self.names.assign(motion[0], name)
+                    self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
+                self.position_nodes += [motion[0] for _, motion in block.assigned]
+                self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+        self.definitions = self._defined_by(self.formulas, identifier)
         self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
         self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
+
+    def _rate_of(self, name: str, order: int) -> str:
+        """Name of a derivative of a coordinate or of a driver's value."""
+        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+
+    def _defined_by(self, formulas: Mapping[str, Node], spoken: Callable[[str], str]) -> Definitions:
+        """Rates and accelerations of assigned coordinates in the order of evaluation."""
+        ordered = []
+        for k, block in self.order:
+            if not block.assigned:
+                continue
+            if k in self.calls:
+                ordered += [self.calls[k].definition(order, spoken) for order in (1, 2)]
+            else:
+                names = [self._rate_of(name, order) for name, _ in block.assigned for order in (1, 2)]
+                ordered += [formula(name, formulas[name]) for name in names]
+        return Definitions(ordered)
 
     def module(self) -> str:
         later = [
@@ -79,7 +112,13 @@ class _Emitter:
             self._jacobians(),
         ]
         position = self._position()  # after the later stages, which say what it has to hand on
-        parts = [*self._header(), *self._drive(), *position]
+        kinds = {call.member.kind.label: call.member.kind for call in self.calls.values()}
+        parts = [
+            *self._header(),
+            *self._drive(),
+            *(line for kind in kinds.values() for line in kind.source(self.curves)),
+            *position,
+        ]
         for lines in later:
             parts += [line.replace(_VALUES, self._unpacked()) for line in lines]
         return "\n".join(parts) + "\n"
@@ -87,11 +126,6 @@ class _Emitter:
     def _header(self) -> list[str]:
         plan = self.plan
         anchor_u, anchor_z = plan.anchor_values
-        starts = []
-        count = 0
-        for block in self.solved:
-            starts.append((count, count + len(block.unknowns)))
-            count += len(block.unknowns)
         large = [
             block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)
         ]
@@ -122,7 +156,7 @@ class _Emitter:
             f"WATCHES = {plan.watch_names!r}",
             f"UNKNOWNS = {plan.unknowns!r}",
             f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
-            f"BLOCKS = {tuple(starts)!r}",
+            f"BLOCKS = {tuple(self.places)!r}",
             f"ANCHOR = {(anchor_u, anchor_z)!r}",
             *(f"{name} = {data!r}" for data, name in self.curves.items()),
             "",
@@ -134,13 +168,13 @@ class _Emitter:
         flat = [node for nodes in orders for node in nodes]
         body = writer.statements(flat)
         constants = [identifier(constant.name) for constant in self.plan.law_constants]
-        returned = ", ".join(_tuple(writer.expression(node) for node in nodes) for nodes in orders)
+        returned = ", ".join(tupled(writer.expression(node) for node in nodes) for nodes in orders)
         return [
             "",
             "def drive(time, constants):",
             '    """Driver values, speeds and accelerations at a time, by the laws."""',
-            *_unpack(constants, "constants"),
-            *_indented(body),
+            *unpacking(constants, "constants"),
+            *indented(body),
             f"    return {returned}",
             "",
         ]
@@ -152,20 +186,20 @@ class _Emitter:
             "",
             "def position(u, z, zd, zdd, s, held=0):",
             '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
-            *_unpack(map(identifier, self.inputs[0]), "u"),
+            *unpacking(map(identifier, self.inputs[0]), "u"),
         ]
         if self.solved:
             lines += ["    half = 0.5 * s"]
             if len(self.solved) > 1:
                 lines += ["    largest, iterations = 0.0, 0"]
             for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
-                lines += _unpack([f"{letter}{k}" for k in range(len(self.plan.unknowns))], source)
-            for k, name in enumerate(self.plan.unknowns):
+                lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
+            for k, name in enumerate(self.unknowns):
                 lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
-        for block in self.plan.blocks:
-            lines += self._newton(writer, block) if block.unknowns else self._assigned(writer, block, "    ")
-        z = _tuple(identifier(name) for name in self.plan.unknowns)
-        values = _tuple(self.exports)
+        for k, block in self.order:
+            lines += indented(assigned_lines(writer, block) if k is None else self._solved(writer, k, block))
+        z = tupled(identifier(name) for name in self.unknowns)
+        values = tupled(self.exports)
         margin = "1.0"
         if self.solved:
             lines += [
@@ -173,13 +207,13 @@ class _Emitter:
             ]
             sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
             margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
-        determinants = _tuple(f"m{k}" for k in range(1, len(self.solved) + 1))
+        determinants = tupled(f"m{k}" for k in range(1, len(self.solved) + 1))
         summary = "1.0, 0.0, 0, 0.0"
         if self.solved:
             error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
             summary = f"{margin}, sqrt({error}), {count}, {self._moved()} if {count} else 0.0"
         rows = [node for _, node in self.plan.watches]
-        lines += _indented(writer.statements(rows))
+        lines += indented(writer.statements(rows))
         watched = [f"abs({writer.expression(node)})" for node in rows]
         summary += ", " + (f"max({', '.join(watched)})" if len(watched) > 1 else "".join(watched) or "0.0")
         return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
@@ -187,56 +221,22 @@ class _Emitter:
     def _moved(self) -> str:
         """The largest correction of a prediction, in radians and sizes."""
         moves = []
-        for k, name in enumerate(self.plan.unknowns):
+        for k, name in enumerate(self.unknowns):
             move = f"abs({identifier(name)} - p{k})"
             moves.append(move if name.endswith(".phi") else f"{move} / {self.plan.size!r}")
         return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
 
-    def _assigned(self, writer: Writer, block: Block, indent: str) -> list[str]:
-        lines = []
-        for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
-            new = writer.statements([motion[0]])
-            given = writer.expression(motion[0])
-            if given != identifier(name):
-                new.append(f"{identifier(name)} = {given}")
-            lines += [f"{indent}{line}" for line in new[:-1]]
-            lines += [f"{indent}{line}  # {row}" for line in new[-1:]]
-        return lines
-
-    def _newton(self, writer: Writer, block: Block) -> list[str]:
-        k = self.number[id(block)] + 1
-        entries = [entry for row in block.jacobian for entry in row]
-        unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
-        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
-        before = writer.statements(writer.independent(looped, unknowns))
-        inside = self._assigned(writer, block, "")
-        inside += writer.statements([*block.residuals, *entries])
-        r = [f"r{i}" for i in range(len(block.residuals))]
-        inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
-        inside.append(f"error = {_square(r, block.row_scales)}")
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-        z = [identifier(name) for name in block.unknowns]
-        inside += _determinant(k, jacobian)
-        # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
-        starts = [f"z{self.plan.unknowns.index(name)}" for name in block.unknowns]
-        angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
-        settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
-        done = f"error <= {ROUND_OFF**2} or held & {1 << (k - 1)} or ({settled})"
-        lines = [
-            f"    # block {k}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}",
-            *_indented(before),
-            "    last = inf",
-            f"    for iteration in range({ITERATIONS}):",
-            *_indented(inside, 8),
-            f"        if {done}:",
-            "            break",
-            "        last = error",
-            *_indented(_correction(k, jacobian, r, z), 8),
-            "    else:",
-            f"        raise ArithmeticError({k - 1}, sqrt(error))",
-        ]
+    def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
+        """Statements of a block that needs Newton: its own, or a call of what alike blocks share."""
+        starts = [f"z{place}" for place in range(*self.places[k])]
+        if k in self.calls:
+            lines = [self.calls[k].position(starts, map(identifier, block.unknowns))]
+        else:
+            held = f"held & {1 << k}"
+            lines = [f"# block {k + 1}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}"]
+            lines += newton_lines(writer, block, str(k + 1), starts, held, str(k))
         if len(self.solved) > 1:
-            lines += ["    iterations += iteration", "    if error > largest:", "        largest = error"]
+            lines += ["iterations += iteration", "if error > largest:", "    largest = error"]
         return lines
 
     def _velocity(self) -> list[str]:
@@ -245,7 +245,7 @@ class _Emitter:
             "def velocity(values, ud, given=(), held=0):",
             '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""',
         ]
-        lines += [_VALUES, *_unpack(map(identifier, self.inputs[1]), "ud")]
+        lines += [_VALUES, *unpacking(map(identifier, self.inputs[1]), "ud")]
         return lines + self._linear(1, lambda block: block.velocity)
 
     def _acceleration(self) -> list[str]:
@@ -256,23 +256,22 @@ class _Emitter:
         ]
         lines += [
             _VALUES,
-            *_unpack(map(identifier, self.inputs[1]), "ud"),
-            *_unpack(map(identifier, self.inputs[2]), "udd"),
+            *unpacking(map(identifier, self.inputs[1]), "ud"),
+            *unpacking(map(identifier, self.inputs[2]), "udd"),
         ]
-        lines += _unpack([identifier(derivative_name(name, 1)) for name in self.plan.unknowns], "zd")
+        lines += unpacking([identifier(derivative_name(name, 1)) for name in self.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
     def _alone(self) -> list[list[str]]:
         """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
         writer = Writer(self.names, reachable(self.position_nodes))
-        alone = Alone(self.inputs[1][0], self.inputs[2][0], self.definitions)
-        lines = []
+        alone = Alone(self.inputs[1][0], self.inputs[2][0], self.formulas)
+        definitions = self._defined_by(alone.formulas, alone.spoken)
+        lines, done = [], set[int]()
         for order, right in ((1, alone.velocity), (2, alone.acceleration)):
-            lines += _indented(self._linear_lines(writer, order, right, alone.definitions, held=False))
+            lines += indented(self._linear_lines(writer, order, right, definitions, done, alone.spoken))
         self._import(writer)
-        first, second = (
-            _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns) for order in (1, 2)
-        )
+        first, second = (tupled(identifier(derivative_name(name, order)) for name in self.unknowns) for order in (1, 2))
         told = "First and second derivative of the unknowns with respect to the driver."
         tangent = [
             "",
@@ -301,35 +300,47 @@ class _Emitter:
     def _linear(self, order: int, right: _Right) -> list[str]:
         """Linear solves of one order as a function's body."""
         writer = Writer(self.names, reachable(self.position_nodes))
-        lines = self._linear_lines(writer, order, right, self.definitions, held=True)
+        lines = self._linear_lines(writer, order, right, self.definitions, set(), identifier, held=True)
         self._import(writer)
-        result = _tuple(identifier(derivative_name(name, order)) for name in self.plan.unknowns)
-        return [*_indented(lines), f"    return {result}", ""]
+        result = tupled(identifier(derivative_name(name, order)) for name in self.unknowns)
+        return [*indented(lines), f"    return {result}", ""]
 
     def _linear_lines(
-        self, writer: Writer, order: int, right: _Right, definitions: Mapping[str, Node], *, held: bool
+        self,
+        writer: Writer,
+        order: int,
+        right: _Right,
+        definitions: Definitions,
+        done: set[int],
+        spoken: Callable[[str], str],
+        *,
+        held: bool = False,
     ) -> list[str]:
         """Linear solves of one order, block after block, with the definitions that they need on the way."""
-        lines, count = [], 0
-        done: set[str] = set()
-        for block in self.solved:
-            lines += _defined(writer, right(block), definitions, done)
-            k = self.number[id(block)] + 1
-            entries = [entry for row in block.jacobian for entry in row]
-            lines += writer.statements([*right(block), *entries])
-            b = [f"b{i}" for i in range(len(right(block)))]
-            lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, right(block), strict=True)]
+        lines = []
+        for k, block in enumerate(self.solved):
             z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-            self.exports.setdefault(f"det{k}" if _is_small(block) else f"factors{k}", None)
-            solution = _solution(k, jacobian, b, z)
+            if k in self.calls:
+                call = self.calls[k]
+                lines += definitions.lines(writer, call.needs(order), done)
+                self.exports.setdefault(call.hold, None)
+                solution = [call.linear(order, spoken)]
+            else:
+                vector, entries = right(block), [entry for row in block.jacobian for entry in row]
+                lines += definitions.lines(writer, _names(vector), done)
+                lines += writer.statements([*vector, *entries])
+                b = [f"b{i}" for i in range(len(vector))]
+                lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
+                jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+                self.exports.setdefault(kept_name(block, str(k + 1)), None)
+                solution = solution_lines(str(k + 1), jacobian, b, z)
             if held:
-                lines.append(f"if held & {1 << (k - 1)}:")
-                lines.append(f"    {_tuple(z)} = given[{count}:{count + len(z)}]")
-                lines += ["else:", *_indented(solution, 4)]
+                first, last = self.places[k]
+                lines.append(f"if held & {1 << k}:")
+                lines.append(f"    {tupled(z)} = given[{first}:{last}]")
+                lines += ["else:", *indented(solution)]
             else:
                 lines += solution
-            count += len(z)
         return lines
 
     def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
@@ -340,31 +351,29 @@ class _Emitter:
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
         for argument, names in (("ud", self.inputs[1]), ("udd", self.inputs[2])):
             if argument in arguments:
-                lines += _unpack(map(identifier, names), argument)
+                lines += unpacking(map(identifier, names), argument)
         if highest:
             lines += self._chained(highest)
         writer = Writer(self.names, reachable(self.position_nodes))
-        body = _defined(writer, targets, self.definitions, set()) + writer.statements(targets)
-        returned = _tuple(writer.expression(node) for node in targets)
+        body = self.definitions.lines(writer, _names(targets), set()) + writer.statements(targets)
+        returned = tupled(writer.expression(node) for node in targets)
         self._import(writer)
-        return [*lines, *_indented(body), f"    return {returned}", ""]
+        return [*lines, *indented(body), f"    return {returned}", ""]
 
     def _chained(self, order: int) -> list[str]:
         """Rates (and accelerations, of order 2) of the unknowns from `first` (and `second`).
 
         With one driver by the chain rule: zd = z' ud, zdd = z'' ud^2 + z' udd.
         """
-        rates, accelerations = (
-            [identifier(derivative_name(unknown, k)) for unknown in self.plan.unknowns] for k in (1, 2)
-        )
+        rates, accelerations = ([identifier(derivative_name(unknown, k)) for unknown in self.unknowns] for k in (1, 2))
         if len(self.plan.drivers) != 1:
-            lines = _unpack(rates, "first")
-            return lines if order == 1 else lines + _unpack(accelerations, "second")
+            lines = unpacking(rates, "first")
+            return lines if order == 1 else lines + unpacking(accelerations, "second")
         speed, more = identifier(self.inputs[1][0]), identifier(self.inputs[2][0])
-        lines = _unpack([f"d{k}" for k in range(len(rates))], "first")
+        lines = unpacking([f"d{k}" for k in range(len(rates))], "first")
         lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
         if order == 2:
-            lines += _unpack([f"a{k}" for k in range(len(rates))], "second")
+            lines += unpacking([f"a{k}" for k in range(len(rates))], "second")
             lines += [f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)]
         return lines
 
@@ -372,14 +381,14 @@ class _Emitter:
         writer = Writer(self.names, reachable(self.position_nodes))
         targets = [node for _, node in self.plan.watches]
         body = writer.statements(targets)
-        returned = _tuple(writer.expression(node) for node in targets)
+        returned = tupled(writer.expression(node) for node in targets)
         self._import(writer)
         return [
             "",
             "def watches(values):",
             '    """Rows set aside as redundant, relative to the size: zero as long as they hold."""',
             _VALUES,
-            *_indented(body),
+            *indented(body),
             f"    return {returned}",
             "",
         ]
@@ -388,18 +397,21 @@ class _Emitter:
         writer = Writer(self.names, reachable(self.position_nodes))
         matrices = []
         body: list[str] = []
-        for block in self.solved:
-            body += writer.statements([entry for row in block.jacobian for entry in row])
-            rows = ", ".join("[" + ", ".join(writer.expression(entry) for entry in row) + "]" for row in block.jacobian)
-            matrices.append(f"[{rows}]")
+        for k, block in enumerate(self.solved):
+            if k in self.calls:
+                self.exports.setdefault(self.calls[k].hold, None)
+                matrices.append(self.calls[k].jacobian())
+            else:
+                body += writer.statements([entry for row in block.jacobian for entry in row])
+                matrices.append(matrix([[writer.expression(entry) for entry in row] for row in block.jacobian]))
         self._import(writer)
         return [
             "",
             "def jacobians(values):",
             '    """Jacobian of each block."""',
             _VALUES,
-            *_indented(body),
-            f"    return {_tuple(matrices)}",
+            *indented(body),
+            f"    return {tupled(matrices)}",
             "",
         ]
 
@@ -413,111 +425,16 @@ class _Emitter:
                 self.exports.setdefault(identifier(node.name), None)
 
     def _unpacked(self) -> str:
-        return "\n".join(_unpack(self.exports, "values")) or "    # nothing is handed on"
+        return "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
 
 
 _VALUES = "    <values>"
 _Right = Callable[[Block], tuple[Node, ...]]
 
 
-def _needed(targets: Sequence[Node], definitions: Mapping[str, Node]) -> list[str]:
-    """Those of the definitions that the targets are made of, in the order of evaluation."""
-    needed: set[str] = set()
-    stack = [symbol.name for symbol in symbols(targets)]
-    while stack:
-        name = stack.pop()
-        if name in definitions and name not in needed:
-            needed.add(name)
-            stack += [symbol.name for symbol in symbols([definitions[name]])]
-    return [name for name in definitions if name in needed]
-
-
-def _defined(writer: Writer, targets: Sequence[Node], definitions: Mapping[str, Node], done: set[str]) -> list[str]:
-    """Statements for the definitions that the targets need and that are not done yet."""
-    lines = []
-    for name in _needed(targets, definitions):
-        if name not in done:
-            done.add(name)
-            lines += writer.statements([definitions[name]])
-            lines.append(f"{identifier(name)} = {writer.expression(definitions[name])}")
-    return lines
-
-
-def _is_small(block: Block) -> bool:
-    return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
-
-
-def _determinant(k: int, jacobian: Sequence[Sequence[str]]) -> list[str]:
-    m, n = len(jacobian), len(jacobian[0])
-    if m == n == 1:
-        return [f"det{k} = {jacobian[0][0]}"]
-    if m == n == 2:
-        (a, b), (c, d) = jacobian
-        return [f"det{k} = {_product(a, d)} - {_product(b, c)}"]
-    factor = "factor" if m == n else "qr_factor"
-    return [f"factors{k} = {factor}({_matrix(jacobian)})", f"det{k} = factors{k}.determinant"]
-
-
-def _correction(k: int, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
-    """z -= J^-1 r."""
-    m, n = len(jacobian), len(z)
-    if m == n == 1:
-        return [f"{z[0]} -= {r[0]} / det{k}"]
-    if m == n == 2:
-        (a, b), (c, d) = jacobian
-        return [
-            f"{z[0]} -= ({_product(d, r[0])} - {_product(b, r[1])}) / det{k}",
-            f"{z[1]} -= ({_product(a, r[1])} - {_product(c, r[0])}) / det{k}",
-        ]
-    solve = "lu_solve" if m == n else "qr_solve"
-    steps = [f"d{i}" for i in range(n)]
-    lines = [f"{_tuple(steps)} = {solve}(factors{k}, [{', '.join(r)}])"]
-    return lines + [f"{name} -= {step}" for name, step in zip(z, steps, strict=True)]
-
-
-def _solution(k: int, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]) -> list[str]:
-    """Z = -J^-1 b."""
-    m, n = len(jacobian), len(z)
-    if m == n == 1:
-        return [f"{z[0]} = -{b[0]} / det{k}"]
-    if m == n == 2:
-        (a, c), (d, e) = jacobian
-        return [
-            f"{z[0]} = ({_product(c, b[1])} - {_product(e, b[0])}) / det{k}",
-            f"{z[1]} = ({_product(d, b[0])} - {_product(a, b[1])}) / det{k}",
-        ]
-    solve = "lu_solve" if m == n else "qr_solve"
-    return [f"{_tuple(z)} = {solve}(factors{k}, [{', '.join(f'-{name}' for name in b)}])"]
-
-
-def _product(a: str, b: str) -> str:
-    return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
-
-
-def _matrix(rows: Sequence[Sequence[str]]) -> str:
-    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
-
-
-def _square(r: Sequence[str], scales: Sequence[float]) -> str:
-    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
-    if len(set(scales)) == 1:
-        total = " + ".join(f"{name} * {name}" for name in r)
-        return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
-    return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
-
-
-def _tuple(items: Iterable[str]) -> str:
-    items = list(items)
-    return f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
-
-
-def _unpack(names: Iterable[str], source: str) -> list[str]:
-    names = list(names)
-    return [f"    {_tuple(names)} = {source}"] if names else []
-
-
-def _indented(lines: Iterable[str], spaces: int = 4) -> list[str]:
-    return [f"{' ' * spaces}{line}" for line in lines]
+def _names(targets: Sequence[Node]) -> list[str]:
+    """Names of the symbols that the targets are made of."""
+    return [symbol.name for symbol in symbols(targets)]
 
 
 __all__ = ["emit"]

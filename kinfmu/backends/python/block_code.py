@@ -1,0 +1,149 @@
+"""The statements of one block: Newton's loop and the linear solves, unrolled for one and two unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from kinfmu.backends.python.writer import Writer, identifier
+from kinfmu.equations.graph import symbols
+from kinfmu.plan import Block
+
+ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
+SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
+ITERATIONS = 12
+
+
+def assigned_lines(writer: Writer, block: Block) -> list[str]:
+    """Statements for the coordinates that a block gives outright, each with the row that gives it."""
+    lines = []
+    for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
+        new = writer.statements([motion[0]])
+        given = writer.expression(motion[0])
+        if given != identifier(name):
+            new.append(f"{identifier(name)} = {given}")
+        lines += new[:-1]
+        lines += [f"{line}  # {row}" for line in new[-1:]]
+    return lines
+
+
+def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str], held: str, number: str) -> list[str]:
+    """Newton's loop of a block from predictions that stand in its unknowns.
+
+    label: ends the names that outlive the loop (det, factors); starts: names of the unknowns before the prediction;
+    held: an expression that is true where the unknowns are not to be solved for; number: of the block, for the error.
+    """
+    entries = [entry for row in block.jacobian for entry in row]
+    unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
+    looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
+    before = writer.statements(writer.independent(looped, unknowns))
+    inside = assigned_lines(writer, block)
+    inside += writer.statements([*block.residuals, *entries])
+    r = [f"r{i}" for i in range(len(block.residuals))]
+    inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
+    inside.append(f"error = {_square(r, block.row_scales)}")
+    jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+    z = [identifier(name) for name in block.unknowns]
+    inside += _determinant(label, jacobian)
+    # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
+    angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
+    settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
+    done = f"error <= {ROUND_OFF**2} or {held} or ({settled})"
+    return [
+        *before,
+        "last = inf",
+        f"for iteration in range({ITERATIONS}):",
+        *indented(inside),
+        f"    if {done}:",
+        "        break",
+        "    last = error",
+        *indented(_correction(label, jacobian, r, z)),
+        "else:",
+        f"    raise ArithmeticError({number}, sqrt(error))",
+    ]
+
+
+def is_small(block: Block) -> bool:
+    """True for a square block of one or two unknowns, whose solves are unrolled."""
+    return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
+
+
+def kept_name(block: Block, label: str) -> str:
+    """What a block hands on for its linear solves: its determinant, or its factors."""
+    return f"det{label}" if is_small(block) else f"factors{label}"
+
+
+def _determinant(label: str, jacobian: Sequence[Sequence[str]]) -> list[str]:
+    m, n = len(jacobian), len(jacobian[0])
+    if m == n == 1:
+        return [f"det{label} = {jacobian[0][0]}"]
+    if m == n == 2:
+        (a, b), (c, d) = jacobian
+        return [f"det{label} = {_product(a, d)} - {_product(b, c)}"]
+    factor = "factor" if m == n else "qr_factor"
+    return [f"factors{label} = {factor}({matrix(jacobian)})", f"det{label} = factors{label}.determinant"]
+
+
+def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
+    """z -= J^-1 r."""
+    m, n = len(jacobian), len(z)
+    if m == n == 1:
+        return [f"{z[0]} -= {r[0]} / det{label}"]
+    if m == n == 2:
+        (a, b), (c, d) = jacobian
+        return [
+            f"{z[0]} -= ({_product(d, r[0])} - {_product(b, r[1])}) / det{label}",
+            f"{z[1]} -= ({_product(a, r[1])} - {_product(c, r[0])}) / det{label}",
+        ]
+    solve = "lu_solve" if m == n else "qr_solve"
+    steps = [f"d{i}" for i in range(n)]
+    lines = [f"{tupled(steps)} = {solve}(factors{label}, [{', '.join(r)}])"]
+    return lines + [f"{name} -= {step}" for name, step in zip(z, steps, strict=True)]
+
+
+def solution_lines(label: str, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]) -> list[str]:
+    """Z = -J^-1 b."""
+    m, n = len(jacobian), len(z)
+    if m == n == 1:
+        return [f"{z[0]} = -{b[0]} / det{label}"]
+    if m == n == 2:
+        (a, c), (d, e) = jacobian
+        return [
+            f"{z[0]} = ({_product(c, b[1])} - {_product(e, b[0])}) / det{label}",
+            f"{z[1]} = ({_product(d, b[0])} - {_product(a, b[1])}) / det{label}",
+        ]
+    solve = "lu_solve" if m == n else "qr_solve"
+    return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
+
+
+def _product(a: str, b: str) -> str:
+    return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
+
+
+def _square(r: Sequence[str], scales: Sequence[float]) -> str:
+    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
+    if len(set(scales)) == 1:
+        total = " + ".join(f"{name} * {name}" for name in r)
+        return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
+    return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
+
+
+def matrix(rows: Sequence[Sequence[str]]) -> str:
+    """'[[a, b], [c, d]]'."""
+    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
+
+
+def tupled(items: Iterable[str]) -> str:
+    """'(a, b)', '(a,)', '()'."""
+    items = list(items)
+    return f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+
+
+def unpacking(names: Iterable[str], source: str) -> list[str]:
+    """Assignment of a tuple's items to names, indented as in a function; nothing for no names."""
+    names = list(names)
+    return [f"    {tupled(names)} = {source}"] if names else []
+
+
+def indented(lines: Iterable[str], spaces: int = 4) -> list[str]:
+    """The lines, further to the right."""
+    return [f"{' ' * spaces}{line}" for line in lines]
