@@ -119,8 +119,9 @@ class _Emitter:
             *(line for kind in kinds.values() for line in kind.source(self.curves)),
             *position,
         ]
+        unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
         for lines in later:
-            parts += [line.replace(_VALUES, self._unpacked()) for line in lines]
+            parts += [unpacked if line is _VALUES else line for line in lines]
         return "\n".join(parts) + "\n"
 
     def _header(self) -> list[str]:
@@ -423,9 +424,6 @@ class _Emitter:
                 self.exports.setdefault(self.names.of(node), node)
             elif node.name in coordinates:
                 self.exports.setdefault(identifier(node.name), None)
-
-    def _unpacked(self) -> str:
-        return "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
 
 
 _VALUES = "    <values>"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 from kinfmu.equations.graph import FUNCTIONS, Node
 from kinfmu.solver.curve import CurveData
@@ -14,6 +15,7 @@ _ATOM = 4
 _LONGEST_INLINE = 72  # characters; longer expressions get a name
 
 
+@lru_cache(maxsize=1 << 16)
 def identifier(name: str) -> str:
     """'coupler_phi' of 'coupler.phi'."""
     return re.sub(r"\W", "_", name)
