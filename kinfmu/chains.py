@@ -8,7 +8,7 @@ from collections.abc import Callable
 from kinfmu.drivers import AngleDriver, ConstantSpeed
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Joint, RelativeAngle, Revolute
-from kinfmu.mechanism import Body, Mechanism, RunSettings
+from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 
 LONGEST_CHAIN = 10_000  # loops or links
 
@@ -22,20 +22,22 @@ def fourbar_chain(count: int) -> Mechanism:
     """
     start = math.radians(60.0)
     c, s = math.cos(start), math.sin(start)
-    bodies = [Body("ground", {f"O_{k}": (float(k), 0.0) for k in range(count + 1)})]
+    bodies = [Body("ground", {f"O_{k}": Point(float(k), 0.0) for k in range(count + 1)})]
     joints: list[Joint] = []
     for k in range(count + 1):
-        bodies.append(Body(f"bar_{k}", {"O": (0.0, 0.0), "P": (1.0, 0.0)}, (float(k), 0.0, start)))
+        bodies.append(Body(f"bar_{k}", {"O": Point(0.0, 0.0), "P": Point(1.0, 0.0)}, Start(float(k), 0.0, start)))
         joints.append(Revolute(f"O_{k}", (f"ground.O_{k}", f"bar_{k}.O")))
         if k:
-            bodies.append(Body(f"coupler_{k}", {"P": (0.0, 0.0), "Q": (1.0, 0.0)}, (k - 1.0 + c, s, 0.0)))
+            bodies.append(
+                Body(f"coupler_{k}", {"P": Point(0.0, 0.0), "Q": Point(1.0, 0.0)}, Start(k - 1.0 + c, s, 0.0))
+            )
             joints.append(Revolute(f"P_{k}", (f"bar_{k - 1}.P", f"coupler_{k}.P")))
             joints.append(Revolute(f"Q_{k}", (f"coupler_{k}.Q", f"bar_{k}.P")))
     return Mechanism(
         "fourbar_chain",
-        bodies,
-        joints,
-        [AngleDriver("crank", "bar_0", ConstantSpeed(start, 1.0))],
+        tuple(bodies),
+        tuple(joints),
+        (AngleDriver("crank", "bar_0", ConstantSpeed(start, 1.0)),),
         title=f"Chain of {count} parallelogram four-bars",
         points={"end": f"bar_{count}.P"},
         run=RunSettings(0.0, 1.5, 0.01),
@@ -48,18 +50,19 @@ def open_chain(count: int) -> Mechanism:
     Every coordinate follows from the one before it, so nothing is left to iterate: phi_k = phi_1 + (k - 1) bend.
     """
     bend = 0.5 * math.pi / count
-    bodies, joints = [Body("ground", {"O": (0.0, 0.0)})], []
+    bodies = [Body("ground", {"O": Point(0.0, 0.0)})]
+    joints: list[Joint] = []
     for k in range(1, count + 1):
         before = f"link_{k - 1}.end" if k > 1 else "ground.O"
-        bodies.append(Body(f"link_{k}", {"base": (0.0, 0.0), "end": (1.0, 0.0)}))
+        bodies.append(Body(f"link_{k}", {"base": Point(0.0, 0.0), "end": Point(1.0, 0.0)}))
         joints.append(Revolute(f"pin_{k}", (before, f"link_{k}.base")))
         if k > 1:
             joints.append(RelativeAngle(f"bend_{k}", (f"link_{k - 1}", f"link_{k}"), bend))
     return Mechanism(
         "open_chain",
-        bodies,
-        joints,
-        [AngleDriver("crank", "link_1", ConstantSpeed(0.0, 1.0))],
+        tuple(bodies),
+        tuple(joints),
+        (AngleDriver("crank", "link_1", ConstantSpeed(0.0, 1.0)),),
         title=f"Open chain of {count} links",
         points={"end": f"link_{count}.end"},
         run=RunSettings(0.0, 6.0, 0.05),

@@ -32,7 +32,7 @@ class _MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         known = gallery.names()
-        if value in known or (str(value).endswith(".toml") and _exists(Path(value))):
+        if gallery.has(str(value)) or (str(value).endswith(".toml") and _exists(Path(value))):
             return str(value)
         if str(value).endswith(".toml"):
             self.fail(f"{value}: there is no such file", param, ctx)
@@ -182,7 +182,10 @@ def new(mechanism: str, file: Path) -> None:
     name = MECHANISM.convert(mechanism, None, None)
     source = gallery.folder() / name / "mechanism.toml" if name in gallery.names() else Path(name)
     try:
-        file.write_bytes(source.read_bytes())
+        if ":" in name and gallery.has(name):  # a chain, which no file holds
+            gallery.save(gallery.load(name), file)
+        else:
+            file.write_bytes(source.read_bytes())
     except OSError as error:
         raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
     click.echo(f"{file}: written; next: kinfmu check {file}")

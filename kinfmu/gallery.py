@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from kinfmu.chains import CHAINS, chain
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read, text
@@ -22,9 +23,17 @@ def names() -> list[str]:
     return sorted(path.parent.name for path in folder().glob("*/mechanism.toml"))
 
 
+def has(name: str) -> bool:
+    """True for a name that `load` knows: one of the gallery, or a chain of any length such as 'fourbar_chain:1000'."""
+    return name in names() or (name.partition(":")[0] in CHAINS and ":" in name)
+
+
 def load(mechanism: str | Path) -> Mechanism:
-    """A mechanism by its gallery name or from a .toml file."""
+    """A mechanism by its gallery name or from a .toml file; chains also as 'fourbar_chain:1000', of any length."""
     if isinstance(mechanism, str) and not mechanism.endswith(".toml") and "/" not in mechanism:
+        name, colon, count = mechanism.partition(":")
+        if colon and name in CHAINS:
+            return chain(name, count)
         known = names()
         if mechanism not in known:
             raise MechanismError(

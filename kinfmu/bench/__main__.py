@@ -1,4 +1,4 @@
-"""python -m kinfmu.bench [sample] [step] [import]: measurements on this machine, side by side with their baselines."""
+"""python -m kinfmu.bench [sample] [step] [import] [chains]: measurements on this machine, with their baselines."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from kinfmu.gallery import load
 
 
 @click.command()
-@click.argument("what", nargs=-1, type=click.Choice(["sample", "step", "import"]))
+@click.argument("what", nargs=-1, type=click.Choice(["sample", "step", "import", "chains"]))
 def main(what: tuple[str, ...]) -> None:
-    """Time a sample of solve (sample), a step of the FMU (step), the import (import); all if nothing is said."""
-    wanted = what or ("sample", "step", "import")
+    """Time a sample of solve (sample), a step of the FMU (step), the import (import), long chains (chains).
+
+    All if nothing is said.
+    """
+    wanted = what or ("sample", "step", "import", "chains")
     click.echo(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
     if "sample" in wanted:
         from kinfmu.bench import solve_sample
@@ -28,6 +31,10 @@ def main(what: tuple[str, ...]) -> None:
         from kinfmu.bench import import_time
 
         click.echo(f"\n{import_time.run()}")
+    if "chains" in wanted:
+        from kinfmu.bench import chains
+
+        click.echo(f"\n{chains.run()}")
 
 
 if __name__ == "__main__":

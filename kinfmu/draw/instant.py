@@ -10,6 +10,7 @@ import numpy as np
 
 from kinfmu.draw.view import clearest
 from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, start_targets
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
 from kinfmu.joints import Placement, Pose
@@ -113,7 +114,7 @@ def _standing(mechanism: Mechanism, problem: KinfmuError) -> Instant:
     if assembled is not None:
         q = assembled.q
     else:
-        q, gap = close(system, rough_start(system), start_targets(system), range(system.joint_row_count))
+        q, gap = close(Part(system, range(system.joint_row_count)), rough_start(system), start_targets(system))
         if gap > CLOSED:
             raise problem
     return Instant(mechanism, _by_body(mechanism, q, origin), {driver.name: 1.0 for driver in mechanism.drivers})

@@ -96,7 +96,8 @@ class System:
         """Joints, then drivers."""
         number = {body.name: k for k, body in enumerate(self.mechanism.moving_bodies)}
         members, first = [], 0
-        for owner in (*self.mechanism.joints, *self.mechanism.drivers):
+        owners: tuple[Joint | Driver, ...] = (*self.mechanism.joints, *self.mechanism.drivers)
+        for owner in owners:
             bodies = tuple(dict.fromkeys(name for name in owner.bodies() if name in number))
             columns = tuple(3 * number[name] + k for name in bodies for k in range(3))
             count = len(owner.labels) if isinstance(owner, Joint) else 1

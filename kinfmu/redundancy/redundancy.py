@@ -71,7 +71,8 @@ def find_redundancy(system: System) -> Redundancy:
         return Redundancy(free - len(joint_rows), tuple(joint_rows), ())  # regular with its drivers: all independent
     start = rough_start(system) if assembled is None else assembled.q
     suspects = _suspects(system, None if assembled is None else assembled.q)
-    kept, dependent = list(joint_rows), []
+    kept = list(joint_rows)
+    dependent: list[DependentRow] = []
     u = np.zeros(len(system.mechanism.drivers))
     for index in reversed(suspects):
         others = [k for k in kept if k != index]

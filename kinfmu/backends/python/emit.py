@@ -197,8 +197,8 @@ class _Emitter:
                 lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
             for k, name in enumerate(self.unknowns):
                 lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
-        for k, block in self.order:
-            lines += indented(assigned_lines(writer, block) if k is None else self._solved(writer, k, block))
+        for number, block in self.order:
+            lines += indented(assigned_lines(writer, block) if number is None else self._solved(writer, number, block))
         z = tupled(identifier(name) for name in self.unknowns)
         values = tupled(self.exports)
         margin = "1.0"

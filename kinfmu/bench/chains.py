@@ -1,0 +1,79 @@
+"""Time a sample and the compiling of long chains: both should grow with the number of loops, and no faster."""
+
+from __future__ import annotations
+
+import gc
+import math
+import statistics
+import time
+from collections.abc import Callable, Sequence
+
+from kinfmu.backends.python import load_model
+from kinfmu.chains import fourbar_chain, open_chain
+from kinfmu.mechanism import Mechanism
+from kinfmu.plan import compile_plan
+from kinfmu.solver import Solver
+
+LOOPS = (1, 10, 100, 1000)
+ROUNDS = 9
+STEP = 0.01  # [rad]
+FIRST_LOOP = ("bar_1.phi",)
+
+
+def run() -> str:
+    """A table: seconds to compile and microseconds a sample, for all outputs and for one output of the first loop."""
+    lines = [f"chain of four-bars, q, qd, qdd of all bodies, {ROUNDS} rounds in turn; processor time"]
+    lines.append(f"{'loops':>6}{'compile, s':>12}{'us a sample':>13}{'min':>9}{'max':>9}{'us, first loop only':>21}")
+    whole, compiled = zip(*(_ready(fourbar_chain(n)) for n in LOOPS), strict=True)
+    first, _ = zip(*(_ready(fourbar_chain(n), FIRST_LOOP) for n in LOOPS), strict=True)
+    times = _in_turn([*whole, *first])
+    for k, n in enumerate(LOOPS):
+        of_all, of_first = times[k], times[k + len(LOOPS)]
+        lines.append(
+            f"{n:6}{compiled[k]:12.2f}{statistics.median(of_all):13.2f}{min(of_all):9.2f}{max(of_all):9.2f}"
+            f"{statistics.median(of_first):21.2f}"
+        )
+    grown = statistics.median(times[3]) / statistics.median(times[1])
+    lines.append(f"exponent from {LOOPS[1]} to {LOOPS[3]} loops: {math.log(grown) / math.log(LOOPS[3] / LOOPS[1]):.3f}")
+    pruned = statistics.median(times[-1]) / statistics.median(times[len(LOOPS)])
+    lines.append(f"one output of the first loop: {pruned:.2f} times the cost that it has in a chain of one")
+    links, seconds = _ready(open_chain(LOOPS[-1]))
+    (samples,) = _in_turn([links])
+    lines.append(
+        f"open chain of {LOOPS[-1]} links: compile {seconds:.2f} s, {statistics.median(samples):.2f} us a sample"
+    )
+    return "\n".join(lines)
+
+
+def _ready(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> tuple[Callable[[int], None], float]:
+    """A function that takes some samples, each a step further, and the seconds it took to compile."""
+    start = time.process_time()
+    model = load_model(compile_plan(mechanism, outputs))
+    seconds = time.process_time() - start
+    solver = Solver(model)
+
+    def samples(count: int) -> None:
+        pose = solver.anchor
+        for k in range(count):
+            pose = solver.solve(pose, (solver.anchor.u[0] + (k + 1) * STEP,))
+            solver.motion(pose, (1.0,), (0.0,))
+
+    return samples, seconds
+
+
+def _in_turn(ways: Sequence[Callable[[int], None]]) -> list[list[float]]:
+    """Microseconds a sample of each, round by round."""
+    gc.freeze()  # the plans stay alive; what they hold is no part of a sample
+    counts = [1] * len(ways)
+    times: list[list[float]] = [[] for _ in ways]
+    for k, way in enumerate(ways):
+        start = time.process_time()
+        way(1)
+        counts[k] = max(5, min(100, int(0.02 / max(time.process_time() - start, 1e-6))))  # 20 ms, and inside the range
+    for _ in range(ROUNDS):
+        for way, count, measured in zip(ways, counts, times, strict=True):
+            start = time.process_time()
+            way(count)
+            measured.append((time.process_time() - start) / count * 1e6)
+    gc.unfreeze()
+    return times
