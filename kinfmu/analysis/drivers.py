@@ -10,6 +10,7 @@ import numpy as np
 
 from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
 from kinfmu.equations.assembly import motion_samples, null_space, rough_start
+from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import KinfmuError, MobilityError, listed
 from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
@@ -71,7 +72,7 @@ def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None
     """
     if len(system.coordinates) > _LARGE:
         return None
-    poses = motion_samples(system, rough_start(system), redundancy.kept, _SAMPLES)
+    poses = motion_samples(Part(system, redundancy.kept), rough_start(system), _SAMPLES)
     if not poses:
         return None
     gradients = [system.scaled_jacobian(pose) for pose in poses]
