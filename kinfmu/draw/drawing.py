@@ -16,13 +16,15 @@ from kinfmu.draw.names import place
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.slides import rails, rods, slides, slots_and_blocks
-from kinfmu.draw.wheels import racks, wheels
+from kinfmu.draw.wheels import MeshName, racks, wheels
 from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 
 SUFFIXES = (".svg", ".png")
 DOTS_PER_INCH = 150  # of a PNG
 MOST_NAMES = 90  # more would cover the drawing
+_SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture
 
 
 def figure(mechanism: Mechanism, path: str | Path) -> None:
@@ -69,11 +71,22 @@ def sheet_of(shown: Instant) -> Sheet:
     size = float(np.ptp(extent, axis=0).max())
     sheet = Sheet(extent, shortest(marks, size), mechanism.length_unit, mechanism.title or mechanism.name)
     names = [name for mark in marks for name in mark.draw(sheet)]
+    notes = []
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:
-        sheet.note(f"{len(names)} names left out")
+        notes.append(f"{len(names)} names left out")
+    unseen = _unseen(mechanism, marks)
+    if unseen:
+        notes.append(f"not drawn: {listed(unseen)}")
+    sheet.note("; ".join(notes))
     return sheet
+
+
+def _unseen(mechanism: Mechanism, marks: list[Mark]) -> list[str]:
+    """Names of joints that have no picture, such as a held angle, or wheels that no pins hold."""
+    meshing = {mark.name for mark in marks if isinstance(mark, MeshName)}
+    return [joint.name for joint in mechanism.joints if not isinstance(joint, _SEEN) and joint.name not in meshing]
 
 
 def _marks(shown: Instant) -> list[Mark]:

@@ -179,8 +179,12 @@ class Sheet:
         )
 
     def note(self, text: str) -> None:
-        """A sentence at the right end of the title's line."""
-        self.axes.set_title(text, fontsize=8.0, loc="right", color=ink(GREY))
+        """A sentence below the right end of the title's line."""
+        if not text:
+            return
+        self.axes.text(
+            1.0, 1.0, text, fontsize=8.0, ha="right", va="top", transform=self.axes.transAxes, color=ink(GREY)
+        )
 
     def _next(self) -> float:
         """What is drawn later covers what is drawn earlier."""

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
+from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
 from kinfmu.draw import figure
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError
 from tests.mechanisms import fourbar, reference_fourbar
@@ -142,6 +142,26 @@ def test_many_names_are_left_out_and_that_is_said(tmp_path: Path, monkeypatch: p
     figure(kinfmu.load("fourbar"), path)
     assert "11 names left out" in texts_in(path)
     assert "coupler" not in texts_in(path)
+
+
+def test_a_joint_that_has_no_picture_is_named(tmp_path: Path) -> None:
+    level = Mechanism(
+        "level",
+        [
+            Body("ground", {"O": (0, 0)}),
+            Body("arm", {"O": (0, 0), "L": (2, 0)}, (0, 0, 1.0)),
+            Body("basket", {"L": (0, 0), "rim": (1, 0)}, (1, 1.7, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "arm.O")),
+            Revolute("L", ("arm.L", "basket.L")),
+            Angle("upright", "basket"),
+        ],
+        [AngleDriver("arm", "arm")],
+    )
+    path = tmp_path / "figure.svg"
+    figure(level, path)
+    assert "not drawn: upright" in texts_in(path)
 
 
 def test_check_draws_the_figure_asked_for(run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
