@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.draw.sheet import FONT, INK, PAPER, Sheet
+from kinfmu.draw.sheet import FONT, INK, Sheet
 from kinfmu.run import FloatArray
 from kinfmu.shapes.palette import Colour
 
@@ -103,5 +103,4 @@ def _lead(sheet: Sheet, home: FloatArray, spot: FloatArray, half: FloatArray, cl
     if distance - clearance > _LEADER_FROM:
         start = home + (nearest - home) * (clearance / distance)
         ends = sheet.low + np.array([start, nearest]) * sheet.point
-        sheet.line(ends, 2.0, PAPER, matters=0.0)
         sheet.line(ends, 0.5, (120, 120, 120), matters=0.0)
