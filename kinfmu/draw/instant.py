@@ -11,7 +11,6 @@ import numpy as np
 from kinfmu.draw.view import clearest
 from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, start_targets
 from kinfmu.equations.part import Part
-from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
 from kinfmu.joints import Placement, Pose
