@@ -24,19 +24,12 @@ def test_a_mechanism_of_the_gallery_has_its_folders_name_a_title_and_a_comment(n
     assert (gallery.folder() / name / "mechanism.toml").read_text(encoding="utf-8").startswith("# ")
 
 
-@pytest.mark.parametrize("name", gallery.names())
-def test_a_mechanism_of_the_gallery_can_be_solved_over_its_run(name: str) -> None:
-    mechanism = gallery.load(name)
-    assert kinfmu.check(mechanism).problem is None
-    run = kinfmu.solve(mechanism, [mechanism.run.start, mechanism.run.stop])
-    assert run.good.all()
-
-
 def test_a_name_that_is_not_there_suggests_one_that_is() -> None:
     with pytest.raises(MechanismError) as caught:
         kinfmu.load("forbar")
     assert str(caught.value) == (
-        "'forbar' is not in the gallery; did you mean 'fourbar'?; gallery: double_pendulum, fourbar; files end in .toml"
+        "'forbar' is not in the gallery; did you mean 'fourbar'?; "
+        f"gallery: {', '.join(gallery.names())}; files end in .toml"
     )
     with pytest.raises(MechanismError, match=r"^'' is not in the gallery; gallery: "):
         kinfmu.load("")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinfmu import gallery
 from tests.cli.conftest import Command
 
 
@@ -127,7 +128,7 @@ def test_a_mistake_in_the_file_is_told_with_its_place(
 def test_a_name_that_is_nowhere_is_wrong_usage(refuses: Callable[..., str]) -> None:
     assert refuses("check", "forbar") == (
         "Invalid value for 'MECH': 'forbar' is not in the gallery; did you mean 'fourbar'?; "
-        "gallery: double_pendulum, fourbar; files end in .toml"
+        f"gallery: {', '.join(gallery.names())}; files end in .toml"
     )
     assert refuses("check", "none.toml").endswith("none.toml: there is no such file")
     assert refuses("check", "n" * 5000 + ".toml").endswith(": there is no such file")

@@ -269,11 +269,11 @@ def peaucellier(u: Series) -> Coordinates:
 
 @reference(crank_angle=turning(0, 360))
 def jansen_leg(u: Series) -> Coordinates:
-    """Theo Jansen's eleven numbers a to k, and l and m for the axle above the fixed pin and the crank."""
-    a, b, c, d, e, f, g, h, i, j, k, l, m = (
+    """Theo Jansen's eleven numbers a to k; his l is the fixed pin's drop below the axle, his m the crank."""
+    a, b, c, d, e, f, g, h, i, j, k, drop, m = (
         decimal(length) for length in (38, 41.5, 39.3, 40.1, 55.8, 39.4, 36.7, 65.7, 49, 50, 61.9, 7.8, 15)
     )  # fmt: skip
-    pin = Vector(-a, -l)
+    pin = Vector(-a, -drop)
     x = turned(u, m)
     top, bottom = meet(x, j, pin, b, RIGHT), meet(x, k, pin, c, LEFT)
     left = meet(top, e, pin, d, RIGHT)
@@ -311,23 +311,15 @@ def pantograph(x: Series, y: Series) -> Coordinates:
 @reference(piston_position=moving(-44, 3))
 def parallel_jaw(y: Series) -> Coordinates:
     """Bell cranks of 60 and 20 about (35, 0), moved by rods of 40 from (10, y); jaws on parallelograms; mirrored."""
-    pivot, follower = Vector(35, 0), Vector(60, 0)
-    pin = Vector(10, y)
+    pivot, pin = Vector(35, 0), Vector(10, y)
     r = meet(pivot, 20, pin, 40, RIGHT)
     right = heading(r - pivot, 3) - mp.pi / 2
-    rod = heading(r - pin, 1.5)
     jaw, mirrored = pivot + turned(right, 60), mp.pi - right
     return {
         "piston.y": y,
-        "right_rod.y": y,
-        "right_rod.phi": rod,
         "right_crank.phi": right,
-        "right_follower.phi": right,
         **body("right_jaw", jaw, 0),
-        "left_rod.y": y,
-        "left_rod.phi": mp.pi - rod,
         "left_crank.phi": mirrored,
-        "left_follower.phi": mirrored,
         **body("left_jaw", Vector(-jaw.x, jaw.y), 0),
         **point("right_pad", jaw + Vector(-20, 40)),
         **point("left_pad", Vector(20 - jaw.x, jaw.y + 40)),
@@ -369,12 +361,12 @@ def geared_five_bar(u: Series) -> Coordinates:
 
 
 @reference(
-    boom_cylinder_length=moving(2.45, 0.025),
-    stick_cylinder_length=moving(2.5, 0.075),
-    bucket_cylinder_length=moving(1.9, 0.075),
+    boom_cylinder_length=moving(2.25, 0.08),
+    stick_cylinder_length=moving(2.45, 0.09),
+    bucket_cylinder_length=moving(1.85, 0.1),
 )
 def excavator(boom_length: Series, stick_length: Series, bucket_length: Series) -> Coordinates:
-    """Boom, stick and bucket, each by the triangle that its cylinder spans; the bucket behind a linkage of four bars."""
+    """Boom, stick and bucket, each by the triangle that its cylinder spans; the bucket behind a four-bar linkage."""
     eye, stick_foot, p = Vector(2.4, 0.9), Vector(2.9, 1.3), Vector(5.6, 0)
     boom = meet(ORIGIN, _length(eye), Vector(0.5, -0.4), boom_length, LEFT)
     boom_phi = heading(boom, 0.5) - _angle(eye)
@@ -415,7 +407,7 @@ def _angle(way: Vector) -> Quantity:
 
 @reference(steering_angle=turning(-300, 60))
 def rack_steering(u: Series) -> Coordinates:
-    """A pinion of radius 8 moves the rack; tie rods of 270 turn steering arms (30, -100) about (-650, 0) and (650, 0)."""
+    """A pinion of radius 8 moves the rack; tie rods of 270 turn arms (30, -100) about (-650, 0) and (650, 0)."""
     way = u * 8
     left_pin, right_pin = Vector(-650, 0), Vector(650, 0)
     a, b = Vector(way - 350, -100), Vector(way + 350, -100)

@@ -1,0 +1,168 @@
+"""Every mechanism of the gallery: its folder is complete, and every way to its motion leads to the reference."""
+
+from __future__ import annotations
+
+import csv
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Distance, Mechanism, Revolute, Run, gallery
+from kinfmu.joints import Joint, Placement, Pose
+from kinfmu.joints.placement import GROUND
+from tests.gallery.conftest import Member
+from tests.gallery.reference_file import row, samples
+from tests.gallery.references import REFERENCES
+from tests.oracle import mp
+
+AGREEMENT = 1e-11  # of a column's largest magnitude
+CLOSURE = 1e-12  # of the size
+
+every_member = pytest.mark.parametrize("name", gallery.names())
+
+
+def test_every_mechanism_has_a_reference_and_every_reference_a_mechanism() -> None:
+    assert sorted(REFERENCES) == gallery.names()
+    assert len(gallery.names()) >= 16
+
+
+@every_member
+def test_the_folder_tells_what_the_mechanism_is(name: str) -> None:
+    page = (gallery.folder() / name / "README.md").read_text(encoding="utf-8")
+    assert page.startswith(f"# {gallery.load(name).title}\n\n")
+    assert len(page) > 300
+    assert (gallery.folder() / name / "figure.svg").is_file(), "scripts/pictures draws it"
+
+
+@every_member
+def test_the_reference_holds_samples_of_the_run_and_every_output(name: str, member: Callable[[str], Member]) -> None:
+    asked = member(name)
+    run = kinfmu.solve(asked.plan, asked.times[:1])
+    columns = [column.name for column in run.columns()]
+    first = 1 + len(run.input_names)
+    assert list(asked.reference[0]) == ["time", *columns[first : first + 3 * len(run.outputs)]]
+    assert 15 <= len(asked.reference) <= 25
+    grid = kinfmu.sweep.run_times(asked.mechanism.run)
+    assert set(asked.times) <= set(grid.tolist())
+
+
+@every_member
+def test_a_row_computed_anew_is_the_row_of_the_file(name: str, member: Callable[[str], Member]) -> None:
+    drawn = random.Random(name).choice(member(name).reference)  # noqa: S311
+    assert row(name, float(drawn["time"])) == drawn
+
+
+@every_member
+def test_check_finds_nothing_wrong_and_a_driver_for_every_freedom(name: str, member: Callable[[str], Member]) -> None:
+    report = kinfmu.check(member(name).mechanism)
+    assert report.problem is None
+    assert report.mobility == len(report.mechanism.drivers)
+    assert not report.inconsistent
+
+
+@every_member
+def test_solved_it_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
+    asked = member(name)
+    assert _largest_disagreement(kinfmu.solve(asked.plan, asked.times), asked) <= AGREEMENT
+
+
+@every_member
+def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
+    asked, (times, step) = member(name), samples(name)
+    run = kinfmu.simulate(asked.fmu("time"), start=times[0], stop=times[-1], step=step)
+    assert _largest_disagreement(run, asked) <= AGREEMENT
+
+
+@every_member
+def test_its_fmu_driven_from_a_csv_equals_the_reference(
+    name: str, member: Callable[[str], Member], tmp_path: Path
+) -> None:
+    asked, (times, step) = member(name), samples(name)
+    table = _inputs(asked, tmp_path / "inputs.csv")
+    run = kinfmu.simulate(asked.fmu("inputs"), start=times[0], stop=times[-1], step=step, inputs=table)
+    assert _largest_disagreement(run, asked) <= AGREEMENT
+
+
+@every_member
+def test_no_link_stretches_and_no_joint_opens_over_its_run(name: str, member: Callable[[str], Member]) -> None:
+    mechanism, run = member(name).mechanism, kinfmu.solve(member(name).plan)
+    assert run.good.all()
+    for joint in mechanism.joints:
+        assert _largest_gap(joint, mechanism, run) <= CLOSURE * _size(mechanism), joint.name
+
+
+def _largest_disagreement(run: Run, asked: Member) -> float:
+    """The largest |ours - reference| of all columns, each relative to its largest magnitude.
+
+    Where a column is zero all along the largest of its kind stands in, and 1 where all of that kind are.
+    """
+    np.testing.assert_allclose(run.t, asked.times, rtol=1e-12, atol=1e-12)
+    assert run.good.all()
+    exact = {
+        name: [mp.mpf(sample[name]) for sample in asked.reference] for name in asked.reference[0] if name != "time"
+    }
+    largest = {name: max(map(abs, column)) for name, column in exact.items()}
+
+    def scale(name: str) -> object:
+        alike = (value for other, value in largest.items() if _kind(other) == _kind(name))
+        return largest[name] or max(alike) or 1
+
+    return max(
+        float(abs(mp.mpf(float(ours)) - value) / scale(name))
+        for name, column in exact.items()
+        for ours, value in zip(run[name], column, strict=True)
+    )
+
+
+def _kind(name: str) -> str:
+    """Letter of a column, x for both axes: 'ax' of 'crank.ay'."""
+    return name.rpartition(".")[2].replace("y", "x")
+
+
+def _inputs(asked: Member, path: Path) -> Path:
+    """A CSV of the drivers' values, speeds and accelerations as the reference has them."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        names = [name for driver in asked.mechanism.drivers for name in driver.inputs()]
+        assert [driver.inputs()[0] for driver in asked.mechanism.drivers] == list(REFERENCES[asked.name].laws)
+        writer.writerow(["time", *names])
+        for t in asked.times:
+            driven = REFERENCES[asked.name].inputs(t).values()
+            writer.writerow([repr(t), *(repr(float(mp.factorial(k) * u.c[k])) for u in driven for k in range(3))])
+    return path
+
+
+def _largest_gap(joint: Joint, mechanism: Mechanism, run: Run) -> float:
+    """By how much a joint opens over a run; for pins and bars measured between the joined points themselves."""
+    if isinstance(joint, Revolute | Distance):
+        (a_x, a_y), (b_x, b_y) = (_point(end, mechanism, run) for end in joint.between)
+        length = joint.length if isinstance(joint, Distance) else 0.0
+        return float(np.abs(np.hypot(b_x - a_x, b_y - a_y) - length).max())
+    return max(abs(gap) for k in range(len(run)) for gap in joint.gaps(joint.residual(_placement(mechanism, run, k))))
+
+
+def _point(name: str, mechanism: Mechanism, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """World coordinates of 'body.point', (n,) each."""
+    owner = name.partition(".")[0]
+    s_x, s_y = mechanism.body_points[name]
+    if owner == "ground":
+        return np.full(len(run), s_x), np.full(len(run), s_y)
+    x, y, phi = (run[f"{owner}.{letter}"] for letter in ("x", "y", "phi"))
+    return x + np.cos(phi) * s_x - np.sin(phi) * s_y, y + np.sin(phi) * s_x + np.cos(phi) * s_y
+
+
+def _placement(mechanism: Mechanism, run: Run, k: int) -> Placement:
+    poses = {
+        body.name: Pose.of(*(float(run[f"{body.name}.{c}"][k]) for c in ("x", "y", "phi")))
+        for body in mechanism.moving_bodies
+    }
+    return Placement({"ground": GROUND, **poses}, mechanism.body_points)
+
+
+def _size(mechanism: Mechanism) -> float:
+    """The farthest that a point lies from its body's frame."""
+    return max(float(np.hypot(*point)) for point in mechanism.body_points.values())
