@@ -114,10 +114,10 @@ def crank_rocker(u: Series) -> Coordinates:
 
 @reference(crank_angle=turning(0, 360))
 def double_crank(u: Series) -> Coordinates:
-    """A drag link: 60, 70, 80 on a ground of 30."""
-    c = Vector(30, 0)
+    """A drag link: 60, 55, 60 on a ground of 20."""
+    c = Vector(20, 0)
     p = turned(u, 60)
-    q = meet(p, 70, c, 80, RIGHT)
+    q = meet(p, 55, c, 60, RIGHT)
     return {"crank.phi": u, **body("coupler", p, heading(q - p, u + 1)), "follower.phi": heading(q - c, u)}
 
 
