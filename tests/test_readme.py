@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import gallery
 from kinfmu.mechanism.toml_file import parse
 
 ROOT = Path(__file__).parent.parent
@@ -48,6 +49,11 @@ def test_every_room_of_the_house_is_on_the_map_and_every_room_on_the_map_exists(
     rooms = {path.name for path in (ROOT / "kinfmu").iterdir() if (path / "__init__.py").is_file()}
     mapped = set(re.findall(r"`kinfmu/(\w+)/", README))
     assert mapped == rooms
+
+
+def test_the_readme_lists_the_gallery_by_name_and_title() -> None:
+    listed = re.findall(r"^\| \[`(\w+)`\]\(fmus/(\w+)/README\.md\) \| (.+?) \| .+ \|$", README, re.MULTILINE)
+    assert listed == [(name, name, kinfmu.load(name).title) for name in gallery.names()]
 
 
 def test_the_commands_of_the_readme_exist() -> None:
