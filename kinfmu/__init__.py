@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from kinfmu.analysis import Report as Report
     from kinfmu.analysis import check as check
     from kinfmu.drivers import AngleDriver as AngleDriver
-    from kinfmu.drivers import ConstantSpeed as ConstantSpeed
     from kinfmu.drivers import CoordinateDriver as CoordinateDriver
     from kinfmu.drivers import DistanceDriver as DistanceDriver
     from kinfmu.drivers import RelativeAngleDriver as RelativeAngleDriver
@@ -40,6 +39,19 @@ if TYPE_CHECKING:
     from kinfmu.joints import RelativeAngle as RelativeAngle
     from kinfmu.joints import Revolute as Revolute
     from kinfmu.joints import Translational as Translational
+    from kinfmu.joints.laws import ConstantSpeed as ConstantSpeed
+    from kinfmu.joints.laws import Cycloidal as Cycloidal
+    from kinfmu.joints.laws import External as External
+    from kinfmu.joints.laws import Harmonic as Harmonic
+    from kinfmu.joints.laws import ModifiedSine as ModifiedSine
+    from kinfmu.joints.laws import ModifiedTrapezoid as ModifiedTrapezoid
+    from kinfmu.joints.laws import MotionSequence as MotionSequence
+    from kinfmu.joints.laws import Polynomial as Polynomial
+    from kinfmu.joints.laws import Polynomial345 as Polynomial345
+    from kinfmu.joints.laws import Polynomial4567 as Polynomial4567
+    from kinfmu.joints.laws import Segment as Segment
+    from kinfmu.joints.laws import SimpleHarmonic as SimpleHarmonic
+    from kinfmu.joints.laws import Spline as Spline
     from kinfmu.mechanism import Body as Body
     from kinfmu.mechanism import Mechanism as Mechanism
     from kinfmu.mechanism import Parameter as Parameter
@@ -57,18 +69,27 @@ _HOME = {
     "Angle": "kinfmu.joints",
     "AngleDriver": "kinfmu.drivers",
     "Body": "kinfmu.mechanism",
-    "ConstantSpeed": "kinfmu.drivers",
+    "ConstantSpeed": "kinfmu.joints.laws",
     "Coordinate": "kinfmu.joints",
     "CoordinateDriver": "kinfmu.drivers",
+    "Cycloidal": "kinfmu.joints.laws",
     "Distance": "kinfmu.joints",
     "DistanceDriver": "kinfmu.drivers",
+    "External": "kinfmu.joints.laws",
     "Fixed": "kinfmu.joints",
     "Gear": "kinfmu.joints",
+    "Harmonic": "kinfmu.joints.laws",
     "KinfmuError": "kinfmu.errors",
     "Mechanism": "kinfmu.mechanism",
+    "ModifiedSine": "kinfmu.joints.laws",
+    "ModifiedTrapezoid": "kinfmu.joints.laws",
+    "MotionSequence": "kinfmu.joints.laws",
     "Parameter": "kinfmu.mechanism",
     "Point": "kinfmu.mechanism",
     "PointOnLine": "kinfmu.joints",
+    "Polynomial": "kinfmu.joints.laws",
+    "Polynomial345": "kinfmu.joints.laws",
+    "Polynomial4567": "kinfmu.joints.laws",
     "RackAndPinion": "kinfmu.joints",
     "RelativeAngle": "kinfmu.joints",
     "RelativeAngleDriver": "kinfmu.drivers",
@@ -76,7 +97,10 @@ _HOME = {
     "Revolute": "kinfmu.joints",
     "Run": "kinfmu.run",
     "RunSettings": "kinfmu.mechanism",
+    "Segment": "kinfmu.joints.laws",
+    "SimpleHarmonic": "kinfmu.joints.laws",
     "SlideDriver": "kinfmu.drivers",
+    "Spline": "kinfmu.joints.laws",
     "Start": "kinfmu.mechanism",
     "Status": "kinfmu.solver.status",
     "Translational": "kinfmu.joints",
@@ -98,15 +122,24 @@ __all__ = [
     "ConstantSpeed",
     "Coordinate",
     "CoordinateDriver",
+    "Cycloidal",
     "Distance",
     "DistanceDriver",
+    "External",
     "Fixed",
     "Gear",
+    "Harmonic",
     "KinfmuError",
     "Mechanism",
+    "ModifiedSine",
+    "ModifiedTrapezoid",
+    "MotionSequence",
     "Parameter",
     "Point",
     "PointOnLine",
+    "Polynomial",
+    "Polynomial345",
+    "Polynomial4567",
     "RackAndPinion",
     "RelativeAngle",
     "RelativeAngleDriver",
@@ -114,7 +147,10 @@ __all__ = [
     "Revolute",
     "Run",
     "RunSettings",
+    "Segment",
+    "SimpleHarmonic",
     "SlideDriver",
+    "Spline",
     "Start",
     "Status",
     "Translational",

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from kinfmu.drivers import AngleDriver, ConstantSpeed
+from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Joint, RelativeAngle, Revolute
+from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 
 LONGEST_CHAIN = 10_000  # loops or links

@@ -297,16 +297,16 @@ def solve(
 @click.option(
     "--drive",
     type=click.Choice(["time", "inputs"]),
-    default="time",
-    show_default=True,
-    help="What drives at first: the file's law or the inputs.",
+    help="What drives at first: the file's laws or the inputs; time, unless a law is external.",
 )
 @click.option("--outputs", help="Coordinates that the FMU shall have, with commas; all if nothing is said.")
 def build(mechanism: str, output: Path | None, flavour: str, drive: Any, outputs: str | None) -> None:
     """Build the FMU of a mechanism."""
     from kinfmu.fmu import build as built
+    from kinfmu.fmu.build import default_drive
 
     mech = gallery.load(mechanism)
+    drive = drive or default_drive(mech)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
     with _about(mechanism):
         path = built(mech, output or _own_folder(mech), flavour=flavour, drive=drive, outputs=wanted)

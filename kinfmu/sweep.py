@@ -72,6 +72,7 @@ def run_times(run: RunSettings) -> FloatArray:
 def law_constants(plan: SolvePlan, given: Mapping[str, float]) -> dict[str, float]:
     """Law constants by name, with those given in place of the file's."""
     constants = {constant.name: constant.value for constant in plan.law_constants}
+    positive = {constant.name for constant in plan.law_constants if constant.is_positive}
     for name, value in given.items():
         if name not in constants:
             raise KinfmuError(
@@ -79,6 +80,8 @@ def law_constants(plan: SolvePlan, given: Mapping[str, float]) -> dict[str, floa
             )
         if not np.isfinite(value):
             raise KinfmuError(f"parameter '{name}' = {value!r} must be a finite number")
+        if name in positive and not value > 0.0:
+            raise KinfmuError(f"parameter '{name}' = {value!r} must be positive")
         constants[name] = float(value)
     return constants
 

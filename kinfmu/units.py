@@ -11,10 +11,11 @@ from typing import Annotated, NamedTuple
 
 
 class Quantity(NamedTuple):
-    """The kind of a number: what it measures and which derivative with respect to time it is."""
+    """The kind of a number: what it measures and which derivative it is, with respect to time if nothing is said."""
 
     kind: str  # "length", "angle", "time" or "number"
     order: int = 0  # 0 position, 1 speed, 2 acceleration
+    per: str = "time"  # or "angle", "length": what the derivative is taken to
 
 
 Length = Annotated[float, Quantity("length")]
@@ -24,31 +25,45 @@ Number = Annotated[float, Quantity("number")]
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
-_PER_TIME = ("", "/s", "/s2")
+HIGHEST_ORDER = 7  # of a derivative that units are written for
 
 
 def unit_of(quantity: Quantity, length_unit: str) -> str:
     """The unit a variable of this quantity declares, such as `rad/s` or `mm/s2`."""
-    base = {"length": length_unit, "angle": "rad", "time": "s", "number": "1"}[quantity.kind]
-    return base + _PER_TIME[quantity.order]
+    units = {"length": length_unit, "angle": "rad", "time": "s", "number": "1"}
+    per = f"/{_power(units[quantity.per], quantity.order)}" if quantity.order else ""
+    return units[quantity.kind] + per
+
+
+def _power(unit: str, order: int) -> str:
+    """'s' and 's2'."""
+    return unit if order == 1 else f"{unit}{order}"
+
+
+def _bases(kind: str, length_unit: str) -> dict[str, float]:
+    """Units of a length, an angle or a time with their factors into the unit used inside."""
+    if kind != "length":
+        return ANGLES if kind == "angle" else SECONDS
+    return {unit: metres / METRES[length_unit] for unit, metres in METRES.items()} | {length_unit: 1.0}
 
 
 def factors(quantity: Quantity, length_unit: str) -> dict[str, float]:
     """Every unit that may be written for `quantity`, with its factor into the unit used inside."""
-    if quantity.kind == "number":
+    if quantity.kind == "number" or quantity.order > HIGHEST_ORDER:
         return {}
-    base: dict[str, float]
-    if quantity.kind == "length":
-        base = {unit: metres / METRES[length_unit] for unit, metres in METRES.items()}
-        base[length_unit] = 1.0
-    else:
-        base = ANGLES if quantity.kind == "angle" else SECONDS
+    base = _bases(quantity.kind, length_unit)
     if quantity.order == 0:
         return dict(base)
-    suffixes = {"s": 1.0, "min": 60.0} if quantity.order == 1 else {"s2": 1.0}
-    written = {f"{unit}/{per}": factor / seconds for unit, factor in base.items() for per, seconds in suffixes.items()}
+    below = _bases(quantity.per, length_unit)
+    if quantity.per == "time":
+        below = {"s": 1.0, "min": 60.0} if quantity.order == 1 else {"s": 1.0}
+    written = {
+        f"{unit}/{_power(per, quantity.order)}": factor / size**quantity.order
+        for unit, factor in base.items()
+        for per, size in below.items()
+    }
     if quantity == Quantity("angle", 1):
-        written["rpm"] = 2.0 * math.pi / 60.0
+        written |= {"rpm": 2.0 * math.pi / 60.0, "Hz": 2.0 * math.pi}
     return written
 
 
@@ -65,9 +80,10 @@ def display_units(unit: str) -> dict[str, float]:
 @cache
 def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
     """Every unit that may be written for any quantity, with that quantity and its factor into the unit used inside."""
-    quantities = [Quantity(kind, order) for kind in ("length", "angle") for order in (0, 1, 2)]
+    pairs = (("length", "time"), ("angle", "time"), ("length", "angle"), ("angle", "length"))
+    rates = [Quantity(kind, order, per) for kind, per in pairs for order in range(1, HIGHEST_ORDER + 1)]
     return {
         unit: (quantity, factor)
-        for quantity in (*quantities, Quantity("time"))
+        for quantity in (Quantity("length"), Quantity("angle"), Quantity("time"), *rates)
         for unit, factor in factors(quantity, length_unit).items()
     }

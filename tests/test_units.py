@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.units import METRES, Quantity, display_units, factors, unit_of
+from kinfmu.units import METRES, Quantity, display_units, every_unit, factors, unit_of
 
 EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
 
@@ -32,8 +32,9 @@ def test_times_may_be_written_in_other_units() -> None:
 
 def test_speeds_may_be_written_per_second_and_per_minute() -> None:
     speeds = factors(Quantity("angle", 1), "m")
-    assert list(speeds) == ["rad/s", "rad/min", "deg/s", "deg/min", "rev/s", "rev/min", "rpm"]
+    assert list(speeds) == ["rad/s", "rad/min", "deg/s", "deg/min", "rev/s", "rev/min", "rpm", "Hz"]
     assert speeds["rpm"] == speeds["rev/min"] == 2.0 * math.pi / 60.0
+    assert speeds["Hz"] == speeds["rev/s"] == 2.0 * math.pi
     assert factors(Quantity("length", 1), "mm")["m/min"] == pytest.approx(1000.0 / 60.0)
     assert "rpm" not in factors(Quantity("length", 1), "m")
 
@@ -41,6 +42,18 @@ def test_speeds_may_be_written_per_second_and_per_minute() -> None:
 def test_accelerations_may_be_written_per_second_squared_only() -> None:
     assert list(factors(Quantity("angle", 2), "m")) == ["rad/s2", "deg/s2", "rev/s2"]
     assert factors(Quantity("length", 2), "mm")["m/s2"] == 1000.0
+
+
+def test_derivatives_to_an_angle_or_a_length_and_of_higher_order_have_units_too() -> None:
+    lift = factors(Quantity("length", 1, "angle"), "mm")
+    assert lift["mm/rad"] == 1.0
+    assert lift["m/rev"] == pytest.approx(1000.0 / (2.0 * math.pi))
+    assert factors(Quantity("angle", 2, "length"), "m")["deg/mm2"] == pytest.approx(math.radians(1.0) * 1e6)
+    assert factors(Quantity("angle", 3), "m")["deg/s3"] == math.radians(1.0)
+    assert factors(Quantity("angle", 8), "m") == {}
+    every = every_unit("mm")
+    assert every["mm/rad"] == (Quantity("length", 1, "angle"), 1.0)
+    assert every["rad/s7"] == (Quantity("angle", 7), 1.0)
 
 
 def test_plain_numbers_take_no_unit() -> None:
@@ -57,6 +70,9 @@ def test_plain_numbers_take_no_unit() -> None:
         (Quantity("angle", 2), "rad/s2"),
         (Quantity("time"), "s"),
         (Quantity("number"), "1"),
+        (Quantity("length", 3), "mm/s3"),
+        (Quantity("angle", 1, "length"), "rad/mm"),
+        (Quantity("number", 2, "angle"), "1/rad2"),
     ],
 )
 def test_a_variable_declares_the_unit_used_inside(quantity: Quantity, unit: str) -> None:

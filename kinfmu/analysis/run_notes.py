@@ -22,8 +22,7 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
     times = np.linspace(mechanism.run.start, mechanism.run.stop, _LOOKS)
     if len(mechanism.drivers) == 1 and ranges:
         (driver,) = mechanism.drivers
-        constants = {key: getattr(driver.law, key) for key in driver.law.orders}
-        values = [float(driver.law.target(t, **constants)) for t in times.tolist()]
+        values = [float(driver.law.at(t)) for t in times.tolist()]
         low, high = (
             end if limit is None else limit for end, limit in ((-math.inf, ranges[0].low), (math.inf, ranges[0].high))
         )

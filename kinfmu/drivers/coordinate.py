@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from kinfmu.drivers.constant_speed import ConstantSpeed
 from kinfmu.drivers.driver import Driver
-from kinfmu.drivers.law import Law
+from kinfmu.joints.laws import ConstantSpeed, Law
 from kinfmu.joints.measures import CoordinateOf
 from kinfmu.joints.placement import Axis, PointName
 from kinfmu.units import Quantity

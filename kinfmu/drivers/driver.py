@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from kinfmu.drivers.law import Law
 from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.laws import Law
 from kinfmu.joints.measures import Measure
 from kinfmu.joints.placement import Placement
 from kinfmu.units import Quantity
@@ -38,6 +38,15 @@ class Driver(ABC):
     def residual(self, at: Placement, target: Value) -> Value:
         """Phi of the driving row for a target u."""
         return self.measured().row(at, target)
+
+    @property
+    def law_kinds(self) -> tuple[str, str]:
+        """What the law leads and what it follows."""
+        return self.quantity.kind, "time"
+
+    def check(self) -> None:
+        """Raise a MechanismError for values that cannot be meant; numbers are finite and references valid by then."""
+        self.law.check(f"[drivers.{self.name}]")
 
     def inputs(self) -> tuple[str, str, str]:
         """Names of the inputs for value, speed and acceleration."""

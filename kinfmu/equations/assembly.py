@@ -121,8 +121,7 @@ def start_targets(system: System) -> FloatArray:
         member = system.members[len(system.mechanism.joints) + k]
         (seen,) = system.gradients(member, q) != 0.0
         is_given = all(given[column] for column, used in zip(member.columns, seen, strict=True) if used)
-        law = {name: getattr(driver.law, name) for name in driver.law.orders}
-        targets.append(measured[k] if is_given else driver.law.target(system.mechanism.run.start, **law))
+        targets.append(measured[k] if is_given else driver.law.at(system.mechanism.run.start))
     return np.array(targets, dtype=float)
 
 

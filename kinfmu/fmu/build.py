@@ -8,6 +8,7 @@ from pathlib import Path
 
 from kinfmu.errors import FmuError, listed, suggestion
 from kinfmu.fmu.interface import DRIVES, Drive
+from kinfmu.joints.laws import External
 from kinfmu.mechanism import Mechanism
 
 FLAVOURS = ("python",)
@@ -18,17 +19,19 @@ def build(
     path: str | Path | None = None,
     *,
     flavour: str = "python",
-    drive: Drive = "time",
+    drive: Drive | None = None,
     outputs: Sequence[str] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
     path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. drive: what drives at first,
-    'time' (the law in the file) or 'inputs'. outputs: coordinates such as 'coupler.x' that the FMU shall have, all if
-    nothing is said; what no output needs is not solved. The same mechanism gives the same bytes.
+    'time' (the law in the file) or 'inputs'; if nothing is said time, unless a driver's law is external. outputs:
+    coordinates such as 'coupler.x' that the FMU shall have, all if nothing is said; what no output needs is not solved.
+    The same mechanism gives the same bytes.
     """
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}")
+    drive = default_drive(mechanism) if drive is None else drive
     if drive not in DRIVES:
         raise FmuError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
     from kinfmu import VERSION
@@ -46,6 +49,11 @@ def build(
         unfinished.unlink(missing_ok=True)
         raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
     return path
+
+
+def default_drive(mechanism: Mechanism) -> Drive:
+    """'inputs' if a driver's law is external, else 'time'."""
+    return "inputs" if any(isinstance(driver.law, External) for driver in mechanism.drivers) else "time"
 
 
 def _file(path: str | Path | None, name: str) -> Path:

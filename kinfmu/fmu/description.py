@@ -93,7 +93,7 @@ def _units(root: Element, interface: Interface) -> None:
 def _base_unit(name: str) -> dict[str, str]:
     """Exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
     base, _, per = name.partition("/")
-    exponents = {"s": {"": 0, "s": -1, "s2": -2}[per]}
+    exponents = {"s": -int(per[1:] or 1) if per else 0}
     factor = 1.0
     if base == "rad":
         exponents = {"rad": 1, **exponents}

@@ -174,9 +174,8 @@ def start_values(mechanism: Mechanism) -> dict[str, float]:
     """
     starts = {}
     for driver in mechanism.drivers:
-        constants = {key: getattr(driver.law, key) for key in driver.law.orders}
         value, speed, acceleration = driver.inputs()
-        starts[value] = float(driver.law.target(mechanism.run.start, **constants))
+        starts[value] = float(driver.law.at(mechanism.run.start))
         starts[speed] = starts[acceleration] = 0.0
     return starts
 
@@ -230,7 +229,7 @@ def _initial_names(
     if not drivers:
         return ()
     prefixes = tuple(f"{plan.drivers[k].name}." for k in drivers)
-    constants = tuple(name for name, _, _ in plan.law_constants if name.startswith(prefixes))
+    constants = tuple(name for name, *_ in plan.law_constants if name.startswith(prefixes))
     extra = (_TOLERANCE.name,) if tolerance else ()
     return (*_input_names(plan, drivers, order), *constants, *extra, "driven_by_time")
 
@@ -299,7 +298,7 @@ def _driven(plan: SolvePlan) -> Iterator[Variable]:
 
 
 def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
-    for name, value, quantity in plan.law_constants:
+    for name, value, quantity, is_positive in plan.law_constants:
         driver, _, key = name.rpartition(".")
         yield Variable(
             name,
@@ -310,6 +309,7 @@ def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
             initial="exact",
             unit=unit_of(quantity, plan.mechanism.length_unit),
             start=value,
+            minimum=0.0 if is_positive else None,
         )
 
 

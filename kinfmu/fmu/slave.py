@@ -394,6 +394,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if not math.isfinite(value):
             self._refuse(name, f"= {value!r} is not a finite number; {self.get_real([vr])[0]!r} stays")
             return
+        if kind == "constants" and place in self.model.POSITIVE and not value > 0.0:
+            self._refuse(name, f"= {value!r} must be positive; {self._constants[place]!r} stays")
+            return
         if kind == "constants":
             self._constants = (*self._constants[:place], float(value), *self._constants[place + 1 :])
         elif value > 0.0:

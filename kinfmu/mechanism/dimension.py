@@ -33,8 +33,10 @@ class Dimension:
     @classmethod
     def of(cls, quantity: Quantity) -> Dimension:
         """The dimension of a quantity."""
-        length, time = {"length": (1, 0), "time": (0, 1)}.get(quantity.kind, (0, 0))
-        return cls(Fraction(length), Fraction(time - quantity.order), is_angle=quantity.kind == "angle")
+        powers = {"length": 0, "angle": 0, "number": 0, "time": 0}
+        powers[quantity.kind] += 1
+        powers[quantity.per] -= quantity.order
+        return cls(Fraction(powers["length"]), Fraction(powers["time"]), is_angle=quantity.kind == "angle")
 
     @property
     def quantity(self) -> Quantity | None:

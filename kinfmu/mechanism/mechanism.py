@@ -209,8 +209,7 @@ def _check(mechanism: Mechanism) -> None:
     constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
     for member in constraining:
         _check_references(bodies, member)
-    for joint in mechanism.joints:
-        _check_values(mechanism, joint)
+        _check_values(mechanism, member)
     for driver in mechanism.drivers:
         for name in driver.inputs():
             if name in mechanism.parameters:
@@ -268,16 +267,17 @@ def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
-def _check_values(mechanism: Mechanism, joint: Joint) -> None:
-    """What the joint says of its values; expressions in them are told with the parameters that they hold."""
+def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
+    """What the member says of its values; expressions in them are told with the parameters that they hold."""
+    table = "joints" if isinstance(member, Joint) else "drivers"
     try:
-        joint.check()
+        member.check()
     except MechanismError as error:
-        at_fault = {k[-1]: e for k, e in mechanism.expressions.items() if k[:2] == ("joints", joint.name)}
+        at_fault = {place: e for place, e in mechanism.expressions.items() if place[:2] == (table, member.name)}
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
-        said = [f"{key} = {quoted(expression.text)}" for key, expression in at_fault.items()]
+        said = [f"{told(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
         said += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
         raise type(error)(f"{error} ({listed(said)})", **error.data) from None
 

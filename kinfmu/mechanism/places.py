@@ -8,9 +8,11 @@ from functools import cache
 from operator import is_
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from kinfmu.drivers import Driver, Law
+from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
 from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.laws import Law
+from kinfmu.joints.measures import Measure
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.units import Quantity
 
@@ -19,7 +21,8 @@ if TYPE_CHECKING:
 
 Place = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
-("joints", joint, key), ("drivers", driver, key), ("joints" | "drivers", name, "law", constant), ("run", key)."""
+("joints", joint, key), ("drivers", driver, key), ("joints", joint, measure, key), ("run", key), and of a law
+("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1)."""
 
 Change = Callable[[Place, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
@@ -92,14 +95,19 @@ def _member(member: Any, place: Place, change: Change) -> Any:
     cls: object = type(member)  # object: mypy holds that type[Any] has no hash
     numbers = quantities_of(cls).items()
     values = {key: change((*place, key), getattr(member, key), quantity) for key, quantity in numbers}
-    law = getattr(member, "law", None)
-    if isinstance(law, Law):
-        constants = {
-            key: change((*place, "law", key), getattr(law, key), Quantity(member.quantity.kind, order))
-            for key, order in law.orders.items()
-        }
-        values["law"] = _replaced(law, constants)
+    for key in fields(member):
+        part = getattr(member, key.name)
+        if isinstance(part, Law):
+            values[key.name] = _law(part, member.law_kinds, (*place, key.name), change)
+        elif isinstance(part, Measure):
+            values[key.name] = _member(part, (*place, key.name), change)
     return _replaced(member, values)
+
+
+def _law(law: Law, kinds: tuple[str, str], place: Place, change: Change) -> Law:
+    old = law.numbers()
+    new = {path: change((*place, *path), value, said.quantity(*kinds)) for path, (value, said) in old.items()}
+    return law if all(new[path] is old[path].value for path in old) else law.with_numbers(new)
 
 
 def _replaced(member: Any, values: Mapping[str, Any]) -> Any:

@@ -8,11 +8,13 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from kinfmu.drivers import DRIVERS, LAWS, Driver
+from kinfmu.drivers import DRIVERS, Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
+from kinfmu.joints.laws import LAWS, External, Law
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.expression import Computed
+from kinfmu.mechanism.law_table import law_keys, law_lines, read_law
 from kinfmu.mechanism.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import written
 from kinfmu.mechanism.parameters import Parameter
@@ -36,13 +38,16 @@ def read(path: str | Path) -> Mechanism:
     if len(content) > LARGEST_FILE:
         raise MechanismError(f"{path}: too large for a mechanism file (largest: {LARGEST_FILE} bytes)")
     try:
-        return parse(content.decode("utf-8-sig"), str(path))
+        return parse(content.decode("utf-8-sig"), str(path), path.parent)
     except UnicodeDecodeError as error:
         raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
 
 
-def parse(text: str, where: str = "mechanism") -> Mechanism:
-    """The mechanism that TOML text describes; `where` names the text in messages."""
+def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mechanism:
+    """The mechanism that TOML text describes.
+
+    where: names the text in messages; folder: where files that it names are looked for.
+    """
     try:
         document = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
@@ -52,12 +57,12 @@ def parse(text: str, where: str = "mechanism") -> Mechanism:
     except ValueError:  # Python refuses whole numbers of thousands of digits
         raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
     try:
-        return _mechanism(document)
+        return _mechanism(document, Path(folder))
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
 
 
-def _mechanism(document: dict[str, Any]) -> Mechanism:
+def _mechanism(document: dict[str, Any], folder: Path) -> Mechanism:
     _known_keys("", document, _TABLES)
     units = _table(document, "units")
     _known_keys("[units]", units, ("length",))
@@ -73,7 +78,7 @@ def _mechanism(document: dict[str, Any]) -> Mechanism:
         )
     if "name" not in document:
         raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
-    reader = _Reader(_checked_unit(unit))
+    reader = _Reader(_checked_unit(unit), folder)
     return Mechanism(
         name=_text("name", document["name"]),
         title=_text("title", document.get("title", "")),
@@ -101,8 +106,9 @@ def _checked_unit(unit: str) -> str:
 class _Reader:
     """Reads tables whose numbers may carry units."""
 
-    def __init__(self, length_unit: str) -> None:
+    def __init__(self, length_unit: str, folder: Path) -> None:
         self.length_unit = length_unit
+        self.folder = folder
 
     def number(self, where: str, value: object, quantity: Quantity) -> Any:
         """A number, from text such as '60 deg' too, or the expression of parameters that the mechanism resolves."""
@@ -125,25 +131,28 @@ class _Reader:
         )
 
     def joint(self, name: str, table: Mapping[str, Any]) -> Joint:
-        where = f"[joints.{name}]"
-        cls = _chosen(where, table, "type", JOINTS)
-        _known_keys(where, table, ("type", *_keys(cls)))
-        joint: Joint = cls(name=name, **self.values(where, cls, table))
+        laws = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
+        joint: Joint = self.member(f"[joints.{name}]", name, table, JOINTS, laws)
         return joint
 
     def driver(self, name: str, table: Mapping[str, Any]) -> Driver:
-        where = f"[drivers.{name}]"
-        cls = _chosen(where, table, "type", DRIVERS)
-        law = _chosen(where, table, "law", LAWS)
-        own = [key for key in _keys(cls) if key != "law"]
-        _known_keys(where, table, ("type", "law", *own, *_keys(law)))
-        constants = {
-            key: self.number(f"{where} {key}", table[key], Quantity(cls.quantity.kind, order))
-            for key, order in law.orders.items()
-            if key in table
-        }
-        driver: Driver = cls(name=name, law=law(**constants), **self.values(where, cls, table, skip=("law",)))
+        driver: Driver = self.member(f"[drivers.{name}]", name, table, DRIVERS, LAWS)
         return driver
+
+    def member(
+        self, where: str, name: str, table: Mapping[str, Any], classes: Iterable[Any], laws: Iterable[type[Law]]
+    ) -> Any:
+        """A joint or driver; one that has a law finds the law's keys in its own table."""
+        cls = _chosen(where, table, "type", classes)
+        keys = _keys(cls)
+        values: dict[str, Any] = {}
+        if "law" in keys:
+            law = _chosen(where, table, "law", laws)
+            _known_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *law_keys(law)))
+            values["law"] = read_law(where, table, law, self.folder)
+        else:
+            _known_keys(where, table, ("type", *keys))
+        return cls(name=name, **values, **self.values(where, cls, table, skip=("law",)))
 
     def run(self, table: Mapping[str, Any]) -> RunSettings:
         _known_keys("[run]", table, ("start", "stop", "step"))
@@ -267,8 +276,7 @@ def text(mechanism: Mechanism) -> str:
             for key in _keys(type(member)):
                 value = getattr(member, key)
                 if key == "law":
-                    lines.append(f"law = {_toml(value.type)}")
-                    lines += [f"{constant} = {_toml(getattr(value, constant))}" for constant in _keys(type(value))]
+                    lines += law_lines(value, _toml)
                 else:
                     lines.append(f"{key} = {_toml(value)}")
     if mechanism.points:
@@ -295,4 +303,6 @@ def _toml(value: object) -> str:
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return repr(float(value))  # type: ignore[arg-type]  # all else is a number; numpy's print their type

@@ -36,6 +36,7 @@ class LawConstant(NamedTuple):
     name: str
     value: float
     quantity: Quantity
+    is_positive: bool = False  # other values are refused
 
 
 class Motion(NamedTuple):
@@ -322,9 +323,9 @@ def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
 
 def _law_constants(mechanism: Mechanism) -> tuple[LawConstant, ...]:
     return tuple(
-        LawConstant(f"{driver.name}.{key}", float(getattr(driver.law, key)), Quantity(driver.quantity.kind, order))
+        LawConstant(f"{driver.name}.{key}", float(value), said.quantity(*driver.law_kinds), said.is_positive)
         for driver in mechanism.drivers
-        for key, order in driver.law.orders.items()
+        for key, (value, said) in driver.law.constants().items()
     )
 
 
@@ -333,7 +334,7 @@ def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
     time, one = graph.symbol("time"), graph.constant(1.0)
     laws = []
     for driver in mechanism.drivers:
-        constants = {key: graph.symbol(f"{driver.name}.{key}") for key in driver.law.orders}
+        constants = {key: graph.symbol(f"{driver.name}.{key}") for key in driver.law.constants()}
         target = graph.lift(driver.law.target(time, **constants))
         (rate,) = graph.derivative([target], {time: one})
         (acceleration,) = graph.derivative([rate], {time: one})

@@ -1,4 +1,4 @@
-"""What every driver and every law promises, over all members of DRIVERS and LAWS."""
+"""What every driver promises, over all members of DRIVERS."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kinfmu.drivers
-from kinfmu.drivers import DRIVERS, LAWS, Driver, Law
-from kinfmu.equations.graph import Graph, evaluate
+from kinfmu.drivers import DRIVERS, Driver
+from kinfmu.equations.graph import evaluate
 from kinfmu.mechanism.toml_file import parse, text
 from kinfmu.plan.trace import Tracer
 from tests.joints.drawn import (
     coordinates,
     jacobian_by_complex_step,
-    laws,
     poses,
     second_derivative,
     size,
@@ -26,21 +25,19 @@ from tests.joints.drawn import (
 from tests.power_series import Series
 
 every_driver = pytest.mark.parametrize("cls", DRIVERS, ids=lambda cls: cls.type)
-every_law = pytest.mark.parametrize("cls", LAWS, ids=lambda cls: cls.type)
 ROUNDING = 1e-14
 
 
 def test_types_are_all_different() -> None:
     assert len({cls.type for cls in DRIVERS}) == len(DRIVERS)
-    assert len({cls.type for cls in LAWS}) == len(LAWS)
 
 
-@pytest.mark.parametrize("cls", [*DRIVERS, *LAWS], ids=lambda cls: cls.type)
-def test_a_driver_or_law_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type) -> None:
+@every_driver
+def test_a_driver_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Driver]) -> None:
     assert dataclasses.is_dataclass(cls)
-    assert cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    assert cls.__dataclass_params__.frozen
     assert cls.__name__ in kinfmu.drivers.__all__
-    assert ("Phi = " if issubclass(cls, Driver) else "u = ") in (cls.__doc__ or "")
+    assert "Phi = " in (cls.__doc__ or "")
 
 
 @every_driver
@@ -106,27 +103,3 @@ def test_inputs_are_named_after_the_driver_and_what_it_drives(cls: type[Driver],
 def test_a_driver_is_the_same_after_writing_and_reading(cls: type[Driver], data: st.DataObject) -> None:
     mechanism = data.draw(systems(cls)).mechanism
     assert parse(text(mechanism)) == mechanism
-
-
-@every_law
-def test_the_constants_of_a_law_are_its_fields_with_their_orders(cls: type[Law]) -> None:
-    assert [field.name for field in dataclasses.fields(cls)] == list(cls.orders)  # type: ignore[arg-type]
-    assert set(cls.orders.values()) <= {0, 1, 2}
-
-
-@every_law
-@given(data=st.data(), t=coordinates)
-def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
-    cls: type[Law], data: st.DataObject, t: float
-) -> None:
-    law = data.draw(laws(cls))
-    constants = {name: getattr(law, name) for name in cls.orders}
-    graph = Graph()
-    time = graph.symbol("time")
-    target = graph.lift(law.target(time, **{name: graph.symbol(name) for name in cls.orders}))
-    (rate,) = graph.derivative([target], {time: graph.constant(1.0)})
-    (acceleration,) = graph.derivative([rate], {time: graph.constant(1.0)})
-    traced = evaluate([target, rate, acceleration], {"time": t, **constants})
-    exact = law.target(Series([t, 1, 0]), **constants)
-    assert traced[0] == law.target(t, **constants)
-    assert traced == pytest.approx([float(exact.c[0]), float(exact.c[1]), float(2 * exact.c[2])], rel=1e-13, abs=1e-13)

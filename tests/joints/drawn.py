@@ -13,9 +13,12 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from kinfmu.drivers import LAWS, Driver, Law
+from kinfmu.drivers import Driver
 from kinfmu.equations.system import System
 from kinfmu.joints import Joint
+from kinfmu.joints.laws import LAWS, RISES, Law, MotionSequence, Polynomial, Segment, Spline
+from kinfmu.joints.laws.law import number_fields
+from kinfmu.joints.laws.spline import ENDS, PERIODIC
 from kinfmu.joints.placement import Reference
 from kinfmu.mechanism import Body, Mechanism, Point, Start
 from kinfmu.units import Quantity
@@ -62,7 +65,29 @@ def _references(reference: Reference, *, is_pair: bool, beside: bool) -> st.Sear
 
 def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
     """Laws of a class with drawn constants."""
-    return st.builds(cls, **dict.fromkeys(cls.orders, coordinates))
+    numbers = {key: lengths if said.is_positive else coordinates for key, said in number_fields(cls).items()}
+    if cls is Polynomial:
+        return st.builds(cls, st.lists(coordinates, min_size=1, max_size=5).map(tuple))
+    if cls is MotionSequence:
+        rises = st.builds(Segment, st.sampled_from([rise.type for rise in RISES]), lengths, coordinates)
+        segments = st.lists(rises | lengths.map(lambda duration: Segment("dwell", duration)), min_size=1, max_size=3)
+        return st.builds(cls, segments.map(tuple), repeat=st.booleans(), **numbers)
+    if cls is Spline:
+        return st.sampled_from(ENDS).flatmap(splines)
+    return st.builds(cls, **numbers)
+
+
+@st.composite
+def splines(draw: st.DrawFn, ends: str) -> Spline:
+    """Tables of points at uneven distances."""
+    widths = draw(st.lists(st.floats(0.5, 2.0), min_size=3, max_size=6))
+    x = [draw(coordinates)]
+    for width in widths:
+        x.append(x[-1] + width)
+    u = [draw(coordinates) for _ in x]
+    if ends == PERIODIC:
+        u[-1] = u[0]
+    return Spline(tuple(zip(x, u, strict=True)), ends)
 
 
 @st.composite

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from kinfmu import gallery
-from kinfmu.drivers import AngleDriver, ConstantSpeed
+from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Joint, Revolute
+from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 from kinfmu.mechanism.quoted import LONGEST, quoted
 

@@ -35,6 +35,10 @@ def changed(old: str, new: str) -> str:
 TYPES = (
     "revolute, translational, fixed, distance, point_on_line, coordinate, angle, relative_angle, gear, rack_and_pinion"
 )
+LAWS = (
+    "constant_speed, polynomial, harmonic, simple_harmonic, cycloidal, modified_sine, modified_trapezoid, 3-4-5, "
+    "4-5-6-7, spline, sequence, external"
+)
 LENGTHS = "m, mm, cm, um, km, in, ft"
 NAME_RULE = "must be letters, digits and underscores, no digit first, at most 100 in all"
 
@@ -105,12 +109,12 @@ CHANGES = {
     "a law that is missing": (
         'law = "constant_speed"',
         "",
-        "[drivers.crank] needs the key 'law', one of constant_speed",
+        f"[drivers.crank] needs the key 'law', one of {LAWS}",
     ),
     "a law that is not known": (
         'law = "constant_speed"',
         'law = "constant"',
-        "[drivers.crank] law = 'constant' is not known; did you mean 'constant_speed'?; known: constant_speed",
+        f"[drivers.crank] law = 'constant' is not known; did you mean 'constant_speed'?; known: {LAWS}",
     ),
     "points of a joint that are missing": (
         'between = ["ground.O", "crank.O"]',
@@ -236,7 +240,7 @@ CHANGES = {
         '"1 deg/s"',
         '"1 deg"',
         "[drivers.crank] speed = '1 deg': unit 'deg' must be one of "
-        "rad/s, rad/min, deg/s, deg/min, rev/s, rev/min, rpm",
+        "rad/s, rad/min, deg/s, deg/min, rev/s, rev/min, rpm, Hz",
     ),
     "an angle with the unit of a length": (
         'phi = "60 deg"',

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from kinfmu.drivers import AngleDriver, ConstantSpeed
+from kinfmu.drivers import AngleDriver
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute
+from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.toml_file import parse, text
@@ -286,7 +287,7 @@ def told(changes: dict[str, Any] | None = None, joint: Any = None) -> str:
         ),
         ({"b": "1 s", "c": "a + b"}, "[parameters] c = 'a + b', character 3: '+': a length and a time do not add up"),
         ({"a": "30 deg"}, "[bodies.bar] points.P = 'a' is an angle and must be a length"),
-        ({"a": "1 deg/mm"}, "[parameters] a = '1 deg/mm', character 7: no parameter 'mm'; parameters: a"),
+        ({"a": "1 deg/kg"}, "[parameters] a = '1 deg/kg', character 7: no parameter 'kg'; parameters: a"),
         (
             {"a": Parameter(1.0, description="two\nlines")},
             r"[parameters] a description = 'two\nlines' must be one line of text without control characters",

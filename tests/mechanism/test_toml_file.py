@@ -15,9 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinfmu import gallery
-from kinfmu.drivers import AngleDriver, ConstantSpeed
+from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Revolute
+from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 from kinfmu.mechanism.toml_file import parse, text
 from kinfmu.units import METRES

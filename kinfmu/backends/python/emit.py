@@ -154,6 +154,7 @@ class _Emitter:
             f"COORDINATE_COUNT = {plan.coordinate_count!r}",
             f"FIXED = {dict(plan.fixed)!r}",
             f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
+            f"POSITIVE = {tuple(k for k, constant in enumerate(plan.law_constants) if constant.is_positive)!r}",
             f"WATCHES = {plan.watch_names!r}",
             f"UNKNOWNS = {plan.unknowns!r}",
             f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",

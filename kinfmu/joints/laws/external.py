@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.laws.law import Law, Led
+
+
+@dataclass(frozen=True)
+class External(Law):
+    """No law: the value comes from outside, by the FMU's inputs; until then the driver stands still.
+
+    u = start
+    """
+
+    type: ClassVar[str] = "external"
+
+    start: Led = 0.0
+
+    def target(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it stands still
+        return constants["start"]

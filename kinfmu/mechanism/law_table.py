@@ -1,0 +1,104 @@
+"""Laws in mechanism files: from the keys of a table to a Law, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.joints.laws import RISES, Law, MotionSequence, Polynomial, Segment, Spline
+from kinfmu.joints.laws.law import number_fields
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.table_file import read_table
+
+_SEGMENT_KEYS = ("law", "rise", "duration")
+
+
+def law_keys(law: type[Law]) -> list[str]:
+    """Keys of a law besides `law` itself."""
+    keys = [key.name for key in fields(law)]  # type: ignore[arg-type]  # every leaf is a dataclass
+    return [*keys, "file"] if law is Spline else keys
+
+
+def read_law(where: str, table: Mapping[str, Any], law: type[Law], folder: Path) -> Law:
+    """The law of a class from the table of its driver or joint; numbers stay as written, the mechanism reads them.
+
+    folder: where a file named in the table is looked for, unless its path is absolute. Raises a MechanismError.
+    """
+    values: dict[str, Any] = {}
+    for key in fields(law):  # type: ignore[arg-type]
+        if key.name in table:
+            values[key.name] = _read(f"{where} {key.name}", table[key.name], law, key.name)
+    if law is Spline and "file" in table:
+        if "points" in values:
+            raise MechanismError(f"{where} has both 'points' and 'file'; the table is one or the other")
+        values["points"] = read_table(f"{where} file", table["file"], folder)
+    for key in fields(law):  # type: ignore[arg-type]
+        if key.name not in values and key.default is MISSING:
+            or_file = " or 'file'" if key.name == "points" else ""
+            raise MechanismError(f"{where} needs the key '{key.name}'{or_file}; keys: {listed(law_keys(law))}")
+    return law(**values)
+
+
+def _read(where: str, value: Any, law: type[Law], key: str) -> Any:
+    """One key of a law."""
+    if key in number_fields(law):
+        return value
+    if law is Polynomial:
+        if not isinstance(value, list):
+            raise MechanismError(f"{where} = {quoted(value)} must be a list of numbers [c0, c1, ...]")
+        return tuple(value)
+    if law is MotionSequence:
+        return _truth(where, value) if key == "repeat" else _segments(where, value)
+    if key == "ends":
+        if not isinstance(value, str):
+            raise MechanismError(f"{where} = {quoted(value)} must be text")
+        return value
+    if not isinstance(value, list) or any(not isinstance(point, list) or len(point) != 2 for point in value):
+        raise MechanismError(f"{where} = {quoted(value)} must be a list of points [[x, u], [x, u], ...]")
+    return tuple(tuple(point) for point in value)
+
+
+def _truth(where: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise MechanismError(f"{where} = {quoted(value)} must be true or false")
+    return value
+
+
+def _segments(where: str, value: Any) -> tuple[Segment, ...]:
+    example = '{ law = "cycloidal", rise = 1, duration = 2 }'
+    if not isinstance(value, list) or any(not isinstance(segment, dict) for segment in value):
+        raise MechanismError(f"{where} = {quoted(value)} must be a list of tables such as {example}")
+    return tuple(_segment(f"{where}, segment {k}:", table) for k, table in enumerate(value, start=1))
+
+
+def _segment(where: str, table: Mapping[str, Any]) -> Segment:
+    for key in table:
+        if key not in _SEGMENT_KEYS:
+            near = suggestion(key, _SEGMENT_KEYS)
+            raise MechanismError(f"{where} {quoted(key)} is no key{near}; keys: {listed(_SEGMENT_KEYS)}")
+    if not isinstance(table.get("law", ""), str):
+        raise MechanismError(f"{where} law = {quoted(table['law'])} must be text")
+    words = [rise.type for rise in RISES]
+    needed = ("law", "duration") if table.get("law") not in words else _SEGMENT_KEYS
+    for key in needed:
+        if key not in table:
+            raise MechanismError(f"{where} needs the key '{key}'; keys: {listed(_SEGMENT_KEYS)}")
+    return Segment(table["law"], table["duration"], table.get("rise", 0.0))
+
+
+def law_lines(law: Law, written: Callable[[Any], str]) -> Iterable[str]:
+    """The lines of a law in a mechanism file; written: turns a number, a truth, a text or a tuple of them into TOML."""
+    yield f"law = {written(law.type)}"
+    for key in fields(law):  # type: ignore[arg-type]
+        value = getattr(law, key.name)
+        if key.name == "segments":
+            yield "segments = ["
+            for segment in value:
+                rise = f"rise = {written(segment.rise)}, " if segment.law != "dwell" else ""
+                yield f"    {{ law = {written(segment.law)}, {rise}duration = {written(segment.duration)} }},"
+            yield "]"
+        else:
+            yield f"{key.name} = {written(value)}"

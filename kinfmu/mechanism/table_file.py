@@ -1,0 +1,72 @@
+"""Tables of two columns in CSV files: the points of a spline."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.quoted import quoted
+
+LARGEST_TABLE = 4_000_000  # [bytes]
+_UNIT = re.compile(r"\[([^\]]*)\]\s*\Z")
+
+
+def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ...]:
+    """The rows of a CSV file of two columns, x and u, as numbers, or as text where the header gives a unit.
+
+    The first line may be a header; units in it stand in brackets: `angle [deg], lift [mm]`. Columns are parted by
+    commas, semicolons or tabs; empty lines and lines that begin with # are left out. Raises a MechanismError that names
+    file and line.
+    """
+    if not isinstance(name, str):
+        raise MechanismError(f"{where} = {quoted(name)} must be the name of a CSV file")
+    where = f"{where} = {quoted(name)}"
+    try:
+        with (folder / name).open("rb") as file:
+            content = file.read(LARGEST_TABLE + 1)
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        raise MechanismError(f"{where} cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    if len(content) > LARGEST_TABLE:
+        raise MechanismError(f"{where} is too large for a table (largest: {LARGEST_TABLE} bytes)")
+    try:
+        lines = content.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise MechanismError(f"{where} is no text file (byte {error.start} is not UTF-8)") from None
+    numbered = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    units, rows = ("", ""), []
+    for place, (k, line) in enumerate(numbered):
+        delimiter = next((mark for mark in ("\t", ";") if mark in line), ",")
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+        if len(cells) != 2:
+            raise MechanismError(f"{where}, line {k}: {len(cells)} columns; there must be two, x and u")
+        if place == 0 and not any(map(_is_number, cells)):
+            units = (_unit(cells[0]), _unit(cells[1]))
+        else:
+            rows.append((_number(where, k, cells[0], units[0]), _number(where, k, cells[1], units[1])))
+    return tuple(rows)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _unit(title: str) -> str:
+    """'deg' of 'angle [deg]'."""
+    match = _UNIT.search(title)
+    return match[1].strip() if match else ""
+
+
+def _number(where: str, line: int, cell: str, unit: str) -> float | str:
+    if not _is_number(cell):
+        raise MechanismError(f"{where}, line {line}: {quoted(cell)} must be a number")
+    if not math.isfinite(float(cell)):
+        raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
+    return f"{float(cell)!r} {unit}" if unit else float(cell)

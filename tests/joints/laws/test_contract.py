@@ -1,0 +1,113 @@
+"""What every law promises, over all members of LAWS."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kinfmu
+import kinfmu.joints.laws
+from kinfmu import AngleDriver, Body, Mechanism, Revolute
+from kinfmu.drivers import DRIVERS
+from kinfmu.equations.graph import Graph, evaluate
+from kinfmu.errors import MechanismError
+from kinfmu.joints import JOINTS
+from kinfmu.joints.laws import LAWS, Law
+from kinfmu.mechanism.law_table import law_keys
+from kinfmu.mechanism.toml_file import parse, text
+from tests.joints.drawn import coordinates, laws
+from tests.power_series import Series
+
+every_law = pytest.mark.parametrize("cls", LAWS, ids=lambda cls: cls.type)
+
+
+def driven(law: Law) -> Mechanism:
+    """An arm that turns by a law."""
+    return Mechanism(
+        "arm",
+        (Body("ground", {"O": (0, 0)}), Body("arm", {"O": (0, 0)}, (0, 0, 0))),  # type: ignore[dict-item,arg-type]
+        (Revolute("O", ("ground.O", "arm.O")),),
+        (AngleDriver("arm", "arm", law),),
+    )
+
+
+def test_types_are_all_different() -> None:
+    assert len({cls.type for cls in LAWS}) == len(LAWS)
+
+
+@every_law
+def test_a_law_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls: type[Law]) -> None:
+    assert dataclasses.is_dataclass(cls)
+    assert cls.__dataclass_params__.frozen
+    assert cls.__name__ in kinfmu.joints.laws.__all__
+    assert cls.__name__ in kinfmu.__all__
+    assert "u = " in (cls.__doc__ or "")
+
+
+@every_law
+def test_no_key_of_a_law_is_a_key_of_a_joint_or_driver(cls: type[Law]) -> None:
+    theirs = {field.name for member in (*JOINTS, *DRIVERS) for field in dataclasses.fields(member)}  # type: ignore[arg-type]
+    assert not set(law_keys(cls)) & (theirs | {"type", "law"})
+
+
+@every_law
+@given(data=st.data(), x=coordinates)
+def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
+    cls: type[Law], data: st.DataObject, x: float
+) -> None:
+    law = data.draw(laws(cls))
+    constants = {name: constant.value for name, constant in law.constants().items()}
+    graph = Graph()
+    argument = graph.symbol("x")
+    target = graph.lift(law.target(argument, **{name: graph.symbol(name) for name in constants}))
+    (rate,) = graph.derivative([target], {argument: graph.constant(1.0)})
+    (acceleration,) = graph.derivative([rate], {argument: graph.constant(1.0)})
+    traced = evaluate([target, rate, acceleration], {"x": x, **constants})
+    assert traced[0] == law.at(x)
+    series = law.target(Series([x, 1, 0]), **constants)
+    terms = series.c if isinstance(series, Series) else [series, 0.0, 0.0]
+    exact = [float(c * math.factorial(k)) for k, c in enumerate(terms)]
+    size = 1.0 + max(map(abs, exact))
+    assert traced == pytest.approx(exact, rel=1e-12, abs=1e-13 * size)
+
+
+@every_law
+@given(data=st.data(), x=coordinates)
+def test_a_law_with_its_own_numbers_is_itself(cls: type[Law], data: st.DataObject, x: float) -> None:
+    law = data.draw(laws(cls))
+    again = law.with_numbers({path: constant.value for path, constant in law.numbers().items()})
+    assert again == law
+    assert hash(again) == hash(law)
+    law.check("[drivers.arm]")
+    assert again.at(x) == law.at(x)
+
+
+@every_law
+@given(data=st.data())
+def test_a_law_is_the_same_after_writing_and_reading(cls: type[Law], data: st.DataObject) -> None:
+    mechanism = driven(data.draw(laws(cls)))
+    assert parse(text(mechanism)) == mechanism
+
+
+@every_law
+@given(data=st.data())
+def test_numbers_that_must_be_positive_are_told(cls: type[Law], data: st.DataObject) -> None:
+    law = data.draw(laws(cls))
+    for path, (_, measures) in law.numbers().items():
+        wrong = law.with_numbers({**{p: c.value for p, c in law.numbers().items()}, path: 0.0})
+        if measures.is_positive:
+            with pytest.raises(MechanismError, match=rf"^\[drivers.arm\] {path[0]} = 0.0 must be positive$"):
+                driven(wrong)
+
+
+@every_law
+@given(data=st.data(), x=coordinates)
+def test_a_law_that_says_it_repeats_does(cls: type[Law], data: st.DataObject, x: float) -> None:
+    law = data.draw(laws(cls))
+    period = data.draw(st.sampled_from([2.0 * math.pi, 1.0]))
+    if not law.why_not_periodic(period, "a turn"):
+        assert law.at(x + period) == pytest.approx(law.at(x), abs=1e-7)
