@@ -18,6 +18,8 @@ ENOUGH = 0.04  # part of all links that may be covered without another pose bein
 _CANDIDATES = 24  # poses of a run that are looked at
 _DOTS = np.linspace(0.12, 0.88, 9)  # along each link, away from its pins
 _NEAR = 0.025  # part of the size; a dot nearer than that to another link is covered
+_SAME = 1e-6  # part of the size; points nearer than that are one pin
+_PIN = 0.05  # what a pin on a link that it does not hold counts
 _MOST_LINKS = 60  # beyond, the start pose is as good as any
 
 
@@ -66,13 +68,22 @@ def _links(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> tuple[list[
 
 
 def _covered(owners: list[str], ends: FloatArray) -> float:
-    """Part of the dots on all links that lie on a link of another body; ends: (links, 2, 2)."""
+    """How much lies on links of other bodies: part of the dots on all links, and pins; ends: (links, 2, 2)."""
+    names = np.array(owners)
     size = float(np.ptp(ends.reshape(-1, 2), axis=0).max())
+    dots = (ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _DOTS[:, None]).reshape(-1, 2)  # (links * dots, 2)
+    is_own = np.repeat(names, len(_DOTS))[:, None] == names[None, :]
+    hidden = np.where(is_own, np.inf, _distances(dots, ends)).min(axis=1) < _NEAR * size
+    pins = ends.reshape(-1, 2)
+    apart = np.hypot(*(pins[:, None] - pins[None]).transpose(2, 0, 1)) > _SAME * size  # (pins, pins)
+    is_held = np.array([[not apart[k][np.repeat(names, 2) == name].all() for name in owners] for k in range(len(pins))])
+    lies_on = np.where(is_held, np.inf, _distances(pins, ends)).min(axis=1) < _NEAR * size
+    return float(hidden.mean() + _PIN * lies_on.sum())
+
+
+def _distances(dots: FloatArray, ends: FloatArray) -> FloatArray:
+    """Distances (k, links) of dots (k, 2) from straight links."""
     a, d = ends[:, 0], ends[:, 1] - ends[:, 0]
-    dots = (a[:, None] + d[:, None] * _DOTS[None, :, None]).reshape(-1, 2)  # (links * dots, 2)
-    owner = np.repeat(np.array(owners), len(_DOTS))
     part = ((dots[:, None] - a[None]) * d[None]).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30)
     nearest = a[None] + np.clip(part, 0.0, 1.0)[:, :, None] * d[None]
-    distance = np.hypot(*(dots[:, None] - nearest).transpose(2, 0, 1))  # (links * dots, links)
-    distance[owner[:, None] == np.array(owners)[None, :]] = np.inf
-    return float((distance.min(axis=1) < _NEAR * size).mean())
+    return np.asarray(np.hypot(*(dots[:, None] - nearest).transpose(2, 0, 1)))

@@ -249,3 +249,10 @@ def test_a_rough_start_pose_away_from_the_run_gives_way_to_the_run() -> None:
     shown = instant(Mechanism("late", mechanism.bodies, mechanism.joints, [law], run=RunSettings(0.0, 0.5)))
     assert shown.angle("crank") == pytest.approx(2.0, abs=1e-12)
     np.testing.assert_array_equal(shown.track("coupler.Q")[0], shown.track("coupler.Q")[1])
+
+
+def test_a_pin_that_lies_on_a_link_it_does_not_hold_is_looked_past() -> None:
+    shown = instant(load("double_crank"))  # at 0 its crank lies on the pivot of its follower
+    assert shown.angle("crank") > 0.1
+    pivot, tip = shown.point("follower.C"), shown.point("crank.P")
+    assert abs(tip[0] * pivot[1] - tip[1] * pivot[0]) / np.hypot(*tip) > 2.0  # [mm]
