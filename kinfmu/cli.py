@@ -201,13 +201,16 @@ def new(mechanism: str, file: Path) -> None:
     type=click.Path(dir_okay=False, path_type=Path),
     help="Draw the mechanism with names: .svg or .png.",
 )
-def check(mechanism: str, as_json: bool, matrices: bool, picture: Path | None) -> None:
+@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank=40mm.")
+def check(
+    mechanism: str, as_json: bool, matrices: bool, picture: Path | None, settings: tuple[tuple[str, str], ...]
+) -> None:
     """Mobility, redundant and contradicting constraints, plan, singular points and range."""
     from kinfmu.analysis import check as checked
 
     if picture is not None and picture.suffix.lower() not in FIGURES:
         raise click.UsageError(f"--figure {picture}: a figure ends in one of {listed(FIGURES)}")
-    mech = gallery.load(mechanism)
+    mech = _with_parameters(mechanism, settings)
     with _about(mechanism):
         report = checked(mech)
     if as_json:
@@ -300,12 +303,20 @@ def solve(
     help="What drives at first: the file's laws or the inputs; time, unless a law is external.",
 )
 @click.option("--outputs", help="Coordinates that the FMU shall have, with commas; all if nothing is said.")
-def build(mechanism: str, output: Path | None, flavour: str, drive: Any, outputs: str | None) -> None:
+@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank=40mm.")
+def build(
+    mechanism: str,
+    output: Path | None,
+    flavour: str,
+    drive: Any,
+    outputs: str | None,
+    settings: tuple[tuple[str, str], ...],
+) -> None:
     """Build the FMU of a mechanism."""
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive
 
-    mech = gallery.load(mechanism)
+    mech = _with_parameters(mechanism, settings)
     drive = drive or default_drive(mech)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
     with _about(mechanism):
@@ -464,6 +475,28 @@ def _parameters(settings: tuple[tuple[str, str], ...]) -> dict[str, float | bool
         except ValueError:
             raise click.UsageError(f"--set {name}={text}: '{text}' is not a number") from None
     return parameters
+
+
+def _with_parameters(name: str, settings: tuple[tuple[str, str], ...]) -> Mechanism:
+    """The mechanism of this name with parameters as set on the command line."""
+    mechanism = gallery.load(name)
+    for parameter, text in settings:
+        if parameter not in mechanism.parameters:
+            known = mechanism.parameters
+            raise click.UsageError(
+                f"--set {parameter}={text}: {name} has no parameter '{parameter}'{suggestion(parameter, known)}; "
+                f"parameters: {listed(known)}"
+            )
+    with _about(name):
+        return mechanism.with_parameters({parameter: _value(text) for parameter, text in settings})
+
+
+def _value(text: str) -> float | str:
+    """A number, or text that says its unit or its expression."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _own_folder(mechanism: Mechanism) -> Path:

@@ -179,3 +179,48 @@ def test_the_program_tells_wrong_usage_with_status_two(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.endswith("Error: Missing option '-o'.\n")
+
+
+@pytest.fixture
+def slider(tmp_path: Path) -> Path:
+    """A slider-crank of two parameters."""
+    path = tmp_path / "slider.toml"
+    path.write_text(
+        """
+        name = "slider"
+        parameters = { crank = 1.0, rod = "3*crank" }
+        bodies.ground = { points = { O = [0, 0] } }
+        bodies.crank = { points = { O = [0, 0], P = ["crank", 0] }, start = { phi = "50 deg" } }
+        bodies.rod = { points = { P = [0, 0], S = ["rod", 0] }, start = { x = 0.6, y = 0.8 } }
+        joints.O = { type = "revolute", between = ["ground.O", "crank.O"] }
+        joints.P = { type = "revolute", between = ["crank.P", "rod.P"] }
+        joints.guide = { type = "coordinate", of = "rod.S", axis = "y" }
+        drivers.crank = { type = "angle", of = "crank", law = "constant_speed", start = "50 deg" }
+        """
+    )
+    return path
+
+
+def test_parameters_are_set_for_a_check_and_a_build(command: Command, slider: Path, tmp_path: Path) -> None:
+    whole, part = command("check", slider), command("check", slider, "--set", "rod=90cm")
+    assert "crank turns all the way round" in whole.stdout
+    assert "crank turns all the way round" not in part.stdout
+    assert command("check", slider, "--set", "crank=100cm", "--set", "rod=crank + 2 m").stdout == whole.stdout
+    assert command("build", slider, "-o", "one.fmu", "--set", "crank=50cm").exit_code == 0
+    half = slider.read_text().replace("crank = 1.0", 'crank = "50 cm"')
+    (tmp_path / "half.toml").write_text(half)
+    assert command("build", "half.toml", "-o", "two.fmu").exit_code == 0
+    assert (tmp_path / "one.fmu").read_bytes() == (tmp_path / "two.fmu").read_bytes()
+
+
+def test_parameters_that_cannot_be_set_are_told(
+    slider: Path, fails: Callable[..., str], refuses: Callable[..., str]
+) -> None:
+    assert refuses("check", slider, "--set", "crnk=2") == (
+        f"--set crnk=2: {slider} has no parameter 'crnk'; did you mean 'crank'?; parameters: crank, rod"
+    )
+    assert refuses("build", "fourbar", "--set", "a=2").endswith("fourbar has no parameter 'a'; parameters: none")
+    assert refuses("check", slider, "--set", "crank").endswith("must be NAME=VALUE, such as crank.speed=2.0")
+    assert fails("check", slider, "--set", "crank=2 deg").startswith(f"{slider}: [parameters] crank = '2 deg': unit")
+    assert fails("check", slider, "--set", "crank=rod").endswith("needs itself: crank -> rod -> crank")
+    assert fails("check", slider, "--set", "crank=nan").endswith("[parameters] crank = nan must be a finite number")
