@@ -131,6 +131,9 @@ class _Group(click.Group):
         except KinfmuError as error:
             click.echo("kinfmu: " + " ".join(str(error).splitlines()), err=True)
             ctx.exit(1)
+        except MemoryError:
+            click.echo("kinfmu: there is not enough memory for so large a mechanism", err=True)
+            ctx.exit(1)
 
 
 @contextmanager

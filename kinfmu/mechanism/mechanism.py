@@ -22,6 +22,8 @@ from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number
 from kinfmu.units import METRES, Quantity
 
+MOST_BODIES = 20_000  # what an ordinary machine holds
+MOST_PARAMETERS = 10_000
 COORDINATES = ("x", "y", "phi")
 
 
@@ -140,6 +142,8 @@ class Mechanism:
 def _resolve(mechanism: Mechanism) -> None:
     """Put numbers in the place of texts with units and of expressions, and remember the expressions."""
     unit = mechanism.length_unit
+    if len(mechanism.parameters) > MOST_PARAMETERS:
+        raise MechanismError(f"[parameters] holds {len(mechanism.parameters)} parameters; {MOST_PARAMETERS} at most")
     said = {name: read(name, parameter, unit) for name, parameter in mechanism.parameters.items()}
     expressions: dict[Place, Expression] = {}
     alone: dict[str, set[Quantity]] = {}
@@ -185,6 +189,8 @@ def _check_names_and_unit(mechanism: Mechanism) -> None:
             f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length; known: {listed(METRES)}"
         )
     check_name("name =", mechanism.name)
+    if len(mechanism.bodies) > MOST_BODIES:
+        raise MechanismError(f"[bodies] holds {len(mechanism.bodies)} bodies; {MOST_BODIES} at most")
     check_line("title", mechanism.title)
     tables: dict[str, Iterable[Body | Joint | Driver]] = {
         "bodies": mechanism.bodies,

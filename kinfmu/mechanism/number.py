@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from kinfmu.errors import MechanismError, listed
+import re
+from collections.abc import Collection
+
+from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_number, is_number
 from kinfmu.units import Quantity, every_unit, factors
 
+_PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*)\s*")  # a number and one word
 _EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
 
 
@@ -22,19 +26,21 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
     if isinstance(value, Expression):
         return value if value.length_unit == length_unit else Expression(value.text, length_unit)
     if isinstance(value, str):
+        known = factors(quantity, length_unit) if quantity else every_unit(length_unit)
         try:
             expression = Expression(value, length_unit)
         except MechanismError as error:
+            plain = _PLAIN.fullmatch(value)
+            if plain and quantity and known:  # no expression was meant: what fits this place is enough to tell
+                raise _wrong_unit(where, value, plain[1], known) from None
             raise MechanismError(f"{where} = {error}") from None
         literal = expression.literal
         if literal is None:
             return expression
-        known = factors(quantity, length_unit) if quantity else every_unit(length_unit)
         if quantity and known and not literal.unit:
             raise MechanismError(f"{where} = {quoted(value)}: text needs a unit, one of {listed(known)}")
         if literal.unit and literal.unit not in known:
-            valid = f"must be one of {listed(known)}" if known else "does not belong to a pure number"
-            raise MechanismError(f"{where} = {quoted(value)}: unit '{literal.unit}' {valid}")
+            raise _wrong_unit(where, value, literal.unit, known)
         check_number(where, literal.value, value)
         return float(literal.value)
     if not is_number(value):
@@ -42,6 +48,12 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
     return float(value)  # type: ignore[arg-type]  # is_number said so
+
+
+def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> MechanismError:
+    near = suggestion(unit, known)
+    valid = f"must be one of {listed(known)}{near}" if known else "does not belong to a pure number"
+    return MechanismError(f"{where} = {quoted(value)}: unit {quoted(unit)} {valid}")
 
 
 def _example(quantity: Quantity | None) -> str:

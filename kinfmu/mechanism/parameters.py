@@ -145,7 +145,7 @@ def evaluated(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) 
 
 def _in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
     """The names, each after those that its expression needs."""
-    names = list(names)
+    names = dict.fromkeys(names)
     for name, expression in expressions.items():
         try:
             expression.refuse_unknown(names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+from datetime import date, time
 
 LONGEST = 120
 _LARGEST_WHOLE = 10**40  # whole numbers beyond are told by their size; Python refuses to print very long ones
@@ -18,6 +19,11 @@ class _Quoter(reprlib.Repr):
 
     def repr_bool(self, x: bool, level: int) -> str:  # noqa: ARG002  the signature is reprlib's
         return "true" if x else "false"
+
+    def repr_date(self, x: date | time, level: int) -> str:  # noqa: ARG002
+        return x.isoformat()
+
+    repr_datetime = repr_time = repr_date
 
     def repr_int(self, x: int, level: int) -> str:  # noqa: ARG002
         return repr(x) if abs(x) < _LARGEST_WHOLE else f"a whole number of {x.bit_length()} bits"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
@@ -23,6 +24,8 @@ from kinfmu.mechanism.valid import check_name
 from kinfmu.units import METRES, Quantity, unit_of
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
+DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
+_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}""")
 _TABLES = ("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "points", "outputs")
 _ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
 
@@ -48,6 +51,10 @@ def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mecha
 
     where: names the text in messages; folder: where files that it names are looked for.
     """
+    deep = _DEEP_KEY.search(text)
+    if deep:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise MechanismError(f"{where}: not valid: a key of more than {DEEPEST_KEY} parts (at line {line})")
     try:
         document = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
@@ -221,6 +228,8 @@ def _known_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> N
 
 def _table(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     table = document.get(name, {})
+    if isinstance(table, list) and table and all(isinstance(one, dict) for one in table):
+        raise MechanismError(f"[[{name}]] must be tables with names of their own, such as [{name}.A]")
     if not isinstance(table, dict):
         raise MechanismError(f"{name} = {quoted(table)} must be a table [{name}]")
     return table

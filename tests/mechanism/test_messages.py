@@ -240,7 +240,7 @@ CHANGES = {
         '"1 deg/s"',
         '"1 deg"',
         "[drivers.crank] speed = '1 deg': unit 'deg' must be one of "
-        "rad/s, rad/min, deg/s, deg/min, rev/s, rev/min, rpm, Hz",
+        "rad/s, rad/min, deg/s, deg/min, rev/s, rev/min, rpm, Hz; did you mean 'deg/s'?",
     ),
     "an angle with the unit of a length": (
         'phi = "60 deg"',
@@ -356,7 +356,10 @@ def test_a_mechanism_of_the_ground_only_is_told() -> None:
 def test_a_table_that_is_something_else_is_told() -> None:
     assert message('name = "a"\njoints = 1') == "joints = 1 must be a table [joints]"
     assert message('name = "a"\nbodies = "crank"') == "bodies = 'crank' must be a table [bodies]"
-    assert message('name = "a"\n[[joints]]\nx = 1') == "joints = [{'x': 1}] must be a table [joints]"
+    assert message('name = "a"\n[[joints]]\nx = 1') == (
+        "[[joints]] must be tables with names of their own, such as [joints.A]"
+    )
+    assert message('name = "a"\njoints = [1]') == "joints = [1] must be a table [joints]"
     assert message('name = "a"\n[bodies]\ncrank = 1') == "[bodies] crank = 1 must be a table [bodies.crank]"
 
 
@@ -374,7 +377,8 @@ def test_what_is_not_toml_is_told_with_its_place() -> None:
 
 def test_deep_nesting_is_told_and_does_not_overflow() -> None:
     assert message("a = " + "[" * 100_000) == "not valid TOML: nested too deeply"
-    assert message("name" + ".a" * 2000 + " = 1").endswith("must be text")
+    assert message("name" + ".a" * 20 + " = 1").endswith("must be text")
+    assert message("\nname" + ".a" * 1_000_000 + " = 1") == "not valid: a key of more than 50 parts (at line 2)"
 
 
 def test_a_number_of_thousands_of_digits_is_told() -> None:

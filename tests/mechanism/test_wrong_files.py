@@ -1,0 +1,281 @@
+"""Wrong mechanism files through the command line: one line that names the place, exit status 1 or 2, no traceback."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from kinfmu import gallery
+from kinfmu.cli import main
+
+ROOT = Path(__file__).parents[2]
+
+CRANK_ROCKER = """\
+name = "crank_rocker"
+[parameters]
+crank = 1.0
+[bodies.ground]
+points = { O = [0, 0], C = [4, 0] }
+[bodies.crank]
+points = { O = [0, 0], P = ["crank", 0] }
+start = { phi = "60 deg" }
+[bodies.coupler]
+points = { P = [0, 0], Q = [3.5, 0], tip = [2, 1.5] }
+start = { x = 0.5, y = 0.9, phi = "40 deg" }
+[bodies.rocker]
+points = { C = [0, 0], Q = [3, 0] }
+start = { x = 4, phi = "100 deg" }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+[drivers]
+crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "1 rad/s" }
+[points]
+tip = "coupler.tip"
+[run]
+stop = 6.3
+step = 0.01
+"""
+PIN_Q = 'Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }\n'
+DRIVER = 'crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "1 rad/s" }\n'
+POINT = '["crank", 0]'  # of the crank, by its parameter
+
+# what is changed, into what, and what the one line holds
+CHANGES = {
+    "a body that is missing": (
+        '[bodies.rocker]\npoints = { C = [0, 0], Q = [3, 0] }\nstart = { x = 4, phi = "100 deg" }\n',
+        "",
+        "[joints.Q] between: body 'rocker' is not in the mechanism; bodies: ground, crank, coupler",
+    ),
+    "a body that is misspelt": ('"crank.O"]', '"krank.O"]', "[joints.O] between: body 'krank' is not in the mechanism"),
+    "a point that is missing": ('"crank.P"', '"crank.R"', "[joints.P] between: body 'crank' has no point 'R'"),
+    "a point of interest of an unknown body": (
+        '"coupler.tip"',
+        '"copler.tip"',
+        "[points] tip: body 'copler' is not in the mechanism; did you mean 'coupler'?",
+    ),
+    "a key that is misspelt": ("stop =", "stopp =", "[run] stopp: unknown key; did you mean 'stop'?"),
+    "a table that is misspelt": ("[drivers]", "[driver]", "[driver]: unknown key; did you mean 'drivers'?"),
+    "a table that is there twice": ("[run]", "[bodies.crank]\n[run]", "Cannot declare ('bodies', 'crank') twice (at"),
+    "a key that is there twice": ("stop = 6.3", "stop = 6.3\nstop = 7", "Cannot overwrite a value (at line"),
+    "a table that is a list": ("[joints]", "[[joints]]", "[[joints]] must be tables with names of their own"),
+    "a unit of another kind": ('phi = "60 deg"', 'phi = "60 mm"', "start.phi = '60 mm': unit 'mm' must be one of rad"),
+    "a unit that is unknown": ('phi = "60 deg"', 'phi = "60 grad"', "unit 'grad' must be one of rad, deg, rev"),
+    "a unit of length that is unknown": (
+        "[parameters]",
+        'units = { length = "inch" }\n[parameters]',
+        "[units] length = 'inch' is not a unit of length; known: m, mm",
+    ),
+    "a parameter of another kind": (
+        "crank = 1.0",
+        'crank = "1 s"',
+        "[bodies.crank] points.P = 'crank' is a time and must be a length",
+    ),
+    "parameters in a circle": (
+        "crank = 1.0",
+        'crank = "a"\na = "2*crank"',
+        "[parameters] crank needs itself: crank -> a -> crank",
+    ),
+    "a parameter that is a word": (
+        "crank = 1.0",
+        'crank = "long"',
+        "[parameters] crank = 'long', character 1: no par",
+    ),
+    "an expression with an unknown name": (
+        POINT,
+        '["crnk/2", 0]',
+        "[bodies.crank] points.P = 'crnk/2', character 1: no parameter 'crnk'; did you mean 'crank'?",
+    ),
+    "an expression that breaks off": (
+        POINT,
+        '["2*(crank +", 0]',
+        "points.P = '2*(crank +', character 11: the end",
+    ),
+    "an expression that is Python": (POINT, "[\"__import__('os')\", 0]", "character 1: no function '__import__'"),
+    "a division by zero": (POINT, '["1/(crank - 1)", 0]', "'1/(crank - 1)', character 2: division by zero"),
+    "a root of a negative number": (POINT, '["sqrt(-crank)", 0]', "character 1: sqrt of -1.0, which has none"),
+    "an expression of deep parentheses": (POINT, f'["{"(" * 500}", 0]', "parentheses more than 40 deep"),
+    "an expression without an end": (POINT, f'["{"1 + " * 100_000}1", 0]', "is too long for an expression"),
+    "two drivers of one freedom": (
+        "[points]",
+        'again = { type = "angle", of = "crank", law = "constant_speed" }\n[points]',
+        "[drivers] mobility is 1 but there are 2 drivers (crank, again)",
+    ),
+    "no driver": (DRIVER, "", "[drivers] mobility is 1 but there is no driver"),
+    "a joint that is missing": (PIN_Q, "", "[drivers] mobility is 3 but there is 1 driver (crank)"),
+    "joints that leave no motion": (
+        "[drivers]",
+        'L = { type = "distance", between = ["ground.O", "rocker.Q"], length = 3.5 }\n[drivers]',
+        "[drivers] mobility is 0: the joints leave no motion",
+    ),
+    "lengths that contradict each other": (
+        "[drivers]",
+        'L = { type = "distance", between = ["ground.O", "crank.P"], length = 1.5 }\n[drivers]',
+        "[joints.L] contradicts the other joints: O leave its row 'length' open by 0.5 m",
+    ),
+    "lengths that do not close": ("Q = [3.5, 0]", "Q = [13.5, 0]", "does not close near its start pose"),
+    "a length that is negative": (
+        PIN_Q,
+        'Q = { type = "distance", between = ["coupler.Q", "rocker.Q"], length = -1 }\n',
+        "[joints.Q] length = -1.0 must be a positive number",
+    ),
+    "a length that a parameter makes negative": (
+        PIN_Q,
+        'Q = { type = "distance", between = ["coupler.Q", "rocker.Q"], length = "crank - 3 m" }\n',
+        "[joints.Q] length = -2.0 must be a positive number, 1e-30 or more (length = 'crank - 3 m', crank = 1.0)",
+    ),
+    "a number that is none": ("C = [4, 0]", "C = [nan, 0]", "[bodies.ground] points.C = nan must be a finite number"),
+    "a number too large": ("C = [4, 0]", "C = [1e300, 0]", "[bodies.ground] points.C = 1e+300 is too large"),
+    "a number of too many digits": ("C = [4, 0]", f"C = [{'9' * 5000}, 0]", "a number has too many digits"),
+    "a truth in place of a number": ("C = [4, 0]", "C = [true, 0]", "[bodies.ground] points.C = true must be a number"),
+    "a date in place of a number": ("stop = 6.3", "stop = 1979-05-27", "[run] stop = 1979-05-27 must be a number"),
+    "a point in space": ("C = [4, 0]", "C = [4, 0, 0]", "points.C = [4, 0, 0] must be two numbers [x, y]"),
+    "text where a list belongs": (
+        '["ground.O", "crank.O"]',
+        '"ground.O"',
+        "[joints.O] between = 'ground.O' must be two points",
+    ),
+    "a list where text belongs": ('of = "crank"', 'of = ["crank"]', "[drivers.crank] of = ['crank'] must be text"),
+    "a number where a table belongs": (
+        "start = { x = 4, phi",
+        "start = 4 # phi",
+        "[bodies.rocker] start = 4 must be",
+    ),
+    "a body joined to itself": ('"rocker.Q"]', '"coupler.P"]', "[joints.Q] joins body 'coupler' to itself"),
+    "a driver of the ground": ('of = "crank"', 'of = "ground"', "[drivers.crank] acts on the ground only"),
+    "a law that is unknown": ("constant_speed", "constant", "law = 'constant' is not known; did you mean 'constant_sp"),
+    "a joint that is unknown": ('"revolute"', '"revolve"', "type = 'revolve' is not known; did you mean 'revolute'?"),
+    "a joint without a type": ('type = "revolute", ', "", "[joints.O] needs the key 'type', one of revolute"),
+    "a joint without points": (', between = ["ground.O", "crank.O"]', "", "[joints.O] needs the key 'between'"),
+    "a run that ends before it starts": ("stop = 6.3", "stop = -1", "[run] stop = -1.0 lies before start = 0.0"),
+    "a step of nothing": ("step = 0.01", "step = 0", "[run] step = 0.0 must be positive"),
+    "a name that no variable can have": (
+        "[bodies.crank]",
+        '[bodies."my crank"]',
+        "[bodies] 'my crank' must be let",
+    ),
+    "no name": ('name = "crank_rocker"', "", "name is missing; the first line should be such as name = 'fourbar'"),
+    "a line that is no TOML": (
+        "[run]",
+        "run:",
+        "not valid TOML: Expected '=' after a key in a key/value pair",
+    ),
+    "text without an end": (
+        '"crank_rocker"',
+        '"crank_rocker',
+        "not valid TOML: Illegal character '\\n' (at line 1",
+    ),
+}
+
+FILES = {
+    "an empty file": (b"", "name is missing; the first line should be such as name = 'fourbar'"),
+    "binary rubbish": (bytes(range(256)) * 100, "not a text file (byte 128 is not UTF-8)"),
+    "nothing but zeros": (bytes(10_000), "not valid TOML: Invalid statement (at line 1, column 1)"),
+    "a file of 10 MB": (b"# " + b"x" * 10_000_000, "too large for a mechanism file (largest: 4000000 bytes)"),
+    "another text format": (CRANK_ROCKER.encode("utf-16"), "not a text file (byte 0 is not UTF-8)"),
+    "deep nesting": (b"name = " + b"[" * 1_000_000, "not valid TOML: nested too deeply"),
+    "a key of a million parts": (b"name" + b".a" * 1_000_000 + b" = 1", "a key of more than 50 parts (at line 1)"),
+    "the ground alone": (b'name = "a"\n[bodies.ground]\n', "[bodies] has only the ground"),
+    "no bodies": (b'name = "a"\n', "[bodies] has only the ground; a mechanism needs a body that can move"),
+    "JSON": (b'{"name": "a"}', "not valid TOML: Invalid statement (at line 1, column 1)"),
+    "thousands of parameters": (
+        "\n".join(['name = "a"', "[bodies.b]", "[parameters]", *(f"p{k} = {k}" for k in range(10_001))]).encode(),
+        "[parameters] holds 10001 parameters; 10000 at most",
+    ),
+    "a crowd of bodies": (
+        "\n".join(['name = "a"', *(f"[bodies.b{k}]" for k in range(20_000))]).encode(),
+        "[bodies] holds 20001 bodies; 20000 at most",
+    ),
+}
+
+
+def content(case: str) -> tuple[bytes, str]:
+    """What the file of a case holds, and what is told of it."""
+    if case in FILES:
+        return FILES[case]
+    old, new, told = CHANGES[case]
+    assert CRANK_ROCKER.count(old) >= 1
+    return CRANK_ROCKER.replace(old, new, 1).encode(), told
+
+
+def test_the_file_that_is_changed_is_right(tmp_path: Path) -> None:
+    path = tmp_path / "right.toml"
+    path.write_text(CRANK_ROCKER)
+    assert CliRunner().invoke(main, ["check", str(path)]).exit_code == 0
+
+
+def test_there_are_more_than_thirty() -> None:
+    assert len({**CHANGES, **FILES}) == len(CHANGES) + len(FILES) > 30
+
+
+@pytest.mark.parametrize("case", [*CHANGES, *FILES])
+def test_a_wrong_file_is_told_in_one_line_that_names_the_place(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.toml"
+    written, told = content(case)
+    path.write_bytes(written)
+    result = CliRunner().invoke(main, ["check", str(path)])
+    assert isinstance(result.exception, SystemExit)
+    assert result.exit_code == 1
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"kinfmu: {path}: ")
+    assert told in line
+    assert len(line) < 500 + len(str(path))
+
+
+@pytest.mark.parametrize("command", [["solve", "-o", "run.csv"], ["build"], ["simulate"]])
+@pytest.mark.parametrize("case", ["a body that is missing", "two drivers of one freedom", "lengths that do not close"])
+def test_every_command_tells_it_the_same_way(
+    command: list[str], case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    written, told = content(case)
+    Path("wrong.toml").write_bytes(written)
+    result = CliRunner().invoke(main, [command[0], "wrong.toml", *command[1:]])
+    assert result.exit_code == 1
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("kinfmu: wrong.toml: ")
+    assert told in line
+    assert [path.name for path in tmp_path.iterdir()] == ["wrong.toml"]
+
+
+@pytest.mark.parametrize("case", ["binary rubbish", "deep nesting", "a division by zero", "no driver"])
+def test_a_process_of_its_own_tells_it_too(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.toml"
+    written, told = content(case)
+    path.write_bytes(written)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "kinfmu.cli", "check", str(path)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [done.stderr.rstrip("\n")]
+    assert told in done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["none.toml"], ["forbar"], ["."], ["fourbar.tml"]])
+def test_a_file_that_is_not_there_is_wrong_usage(arguments: list[str]) -> None:
+    result = CliRunner().invoke(main, ["check", *arguments])
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith("Error: Invalid value for 'MECH': ")
+
+
+def test_memory_that_does_not_suffice_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load(_: str) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(gallery, "load", load)
+    result = CliRunner().invoke(main, ["check", "fourbar"])
+    assert result.exit_code == 1
+    assert result.stderr == "kinfmu: there is not enough memory for so large a mechanism\n"
