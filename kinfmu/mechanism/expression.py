@@ -18,7 +18,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.arithmetic import Value, cos, sin, sqrt
+from kinfmu.joints.arithmetic import Value, atan2, cos, sin, sqrt
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.quoted import quoted
@@ -51,6 +51,14 @@ def _tan(x: Value) -> Value:
     return sin(x) / cos(x)
 
 
+def _asin(x: Value) -> Value:
+    return atan2(x, sqrt((1.0 - x) * (1.0 + x)))
+
+
+def _acos(x: Value) -> Value:
+    return atan2(sqrt((1.0 - x) * (1.0 + x)), x)
+
+
 OPERATORS = {
     "+": Operation(2, lambda a, b: a + b, dimension.sum_of),
     "-": Operation(2, lambda a, b: a - b, dimension.sum_of),
@@ -64,6 +72,9 @@ FUNCTIONS = {
     "cos": Operation(1, cos, dimension.ratio_of_angle),
     "tan": Operation(1, _tan, dimension.ratio_of_angle),
     "sqrt": Operation(1, sqrt, lambda a: dimension.power_of(a, Fraction(1, 2))),
+    "asin": Operation(1, _asin, dimension.angle_of_ratio),
+    "acos": Operation(1, _acos, dimension.angle_of_ratio),
+    "atan2": Operation(2, atan2, dimension.angle_of_pair),
 }
 OPERATIONS = {**OPERATORS, **CONSTANTS, **FUNCTIONS}
 WORDS = (*FUNCTIONS, *CONSTANTS)  # names that no parameter can have

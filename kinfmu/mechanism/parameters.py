@@ -14,7 +14,7 @@ from kinfmu.mechanism.expression import WORDS, Computed, Expression
 from kinfmu.mechanism.number import written
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number
-from kinfmu.units import Quantity
+from kinfmu.units import Quantity, every_unit
 
 NUMBER = Quantity("number")
 _MOST_TOLD = 8  # names of a circle that a message lists
@@ -63,7 +63,9 @@ def read(name: str, parameter: Parameter | float | str, length_unit: str) -> Sai
     value = written(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
     quantity = parameter.quantity
     if quantity is None and isinstance(parameter.value, str) and not isinstance(value, Expression):
-        quantity = Expression(parameter.value, length_unit).dimension({}).quantity
+        literal = Expression(parameter.value, length_unit).literal
+        if literal and literal.unit:
+            quantity, _ = every_unit(length_unit)[literal.unit]
     return Said(value, quantity, parameter.description)
 
 

@@ -18,7 +18,7 @@ from kinfmu.mechanism.expression import DEEPEST, LARGEST_POWER, LONGEST, Express
 from kinfmu.units import Quantity
 
 VALUES = {"a": 2.0, "b": -0.75, "long_name_2": 1e3}
-FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "sqrt")}
+FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "asin", "acos", "atan2")}
 
 
 def told(text: str, values: dict[str, float] | None = None) -> str:
@@ -55,6 +55,9 @@ def by_python(text: str) -> float:
         "sin(a*b) + cos(pi/3)",
         "sqrt(a**2 + b**2)/long_name_2",
         "2e3*(a)",
+        "tan(b) + atan2(b, -a)",
+        "asin(b) + acos(b)*asin(1) - acos(-1)",
+        "atan2(sin(a), cos(a))",
         "((((a))))",
     ],
 )
@@ -69,7 +72,11 @@ def expressions(draw: st.DrawFn, depth: int = 3) -> str:
         return draw(st.sampled_from(["a", "b", "long_name_2", "pi", "0.5", "3", "1e-2"]))
     one, other = draw(expressions(depth=depth - 1)), draw(expressions(depth=depth - 1))
     operator = draw(st.sampled_from(["+", " - ", "*", " / "]))
-    shape = draw(st.sampled_from(["{0}{2}{1}", "({0}{2}{1})", "-{0}{2}{1}", "sin({0}){2}cos({1})", "({0}){2}({1})**2"]))
+    shape = draw(
+        st.sampled_from(
+            ["{0}{2}{1}", "({0}{2}{1})", "-{0}{2}{1}", "sin({0}){2}cos({1})", "atan2({0}, {1})", "({0}){2}({1})**2"]
+        )
+    )
     return shape.format(one, other, operator)
 
 
@@ -111,6 +118,7 @@ def test_numbers_with_units_are_turned_into_those_used_inside() -> None:
     assert Expression("2*a + 5 mm", "m").value({"a": 1.0}) == 2.005
     assert Expression("5mm + 1 cm", "mm").value({}) == 15.0
     assert Expression("sin(30 deg)").value({}) == pytest.approx(0.5, rel=1e-15)
+    assert Expression("acos(0.5) - 60 deg").value({}) == pytest.approx(0.0, abs=1e-15)
     assert Expression("90 deg + 1 rad").value({}) == math.pi / 2 + 1.0
     assert Expression("10 mm/s", "mm").value({}) == 10.0
     assert Expression("30 rpm").value({}) == pytest.approx(math.pi, rel=1e-15)
@@ -149,12 +157,14 @@ MESSAGES = {
         "'a + lng_name_2', character 5: no parameter 'lng_name_2'; did you mean 'long_name_2'?; "
         "parameters: a, b, long_name_2"
     ),
-    "sine(a)": "'sine(a)', character 1: no function 'sine'; did you mean 'sin'?; functions: sin, cos, tan, sqrt",
+    "sine(a)": "'sine(a)', character 1: no function 'sine'; did you mean 'sin'?; functions: sin, cos, tan, sqrt, asin, acos, atan2",
     "sin a": "'sin a', character 5: 'a' where '(' after sin must stand",
     "sin(a, b)": "'sin(a, b)', character 6: ',' where one of + - * / ** ) must stand",
     "a/(b + 0.75)": "'a/(b + 0.75)', character 2: division by zero",
     "(a - 2)**-1": "'(a - 2)**-1', character 8: division by zero",
     "sqrt(b)": "'sqrt(b)', character 1: sqrt of -0.75, which has none",
+    "acos(a)": "'acos(a)', character 1: acos of 2.0, which has none",
+    "atan2(a)": "'atan2(a)', character 8: ')' where one of + - * / ** , must stand",
     "1e300*1e300": "'1e300*1e300', character 6: the number is too large",
     "1e999": "'1e999', character 1: the number is too large",
     "2 parsec": (
@@ -168,7 +178,7 @@ MESSAGES = {
         "a product needs *"
     ),
     "nan": "'nan', character 1: no parameter 'nan'; did you mean 'tan'?; parameters: a, b, long_name_2",
-    "__import__('os')": "'__import__('os')', character 1: no function '__import__'; functions: sin, cos, tan, sqrt",
+    "__import__('os')": "'__import__('os')', character 1: no function '__import__'; functions: sin, cos, tan, sqrt, asin, acos, atan2",
     "a.real": "'a.real', character 2: '.' where one of + - * / ** must stand",
 }
 
@@ -214,6 +224,9 @@ DIMENSIONS = {"r": Dimension.of(LENGTH), "phi": Dimension.of(ANGLE), "w": Dimens
         ("r/2", LENGTH),
         ("phi/2 - pi", ANGLE),
         ("sin(phi)", NUMBER),
+        ("atan2(r, r)", ANGLE),
+        ("asin(r/r)", ANGLE),
+        ("asin(r/r)/2 + 30 deg", ANGLE),
         ("w", Quantity("angle", 1)),
         ("w*(2 s)", ANGLE),
         ("w*r", Quantity("length", 1)),
@@ -236,6 +249,8 @@ def test_what_an_expression_measures_follows_from_its_parameters(text: str, quan
         ("r*r - r", "character 5: '-': length^2 and a length do not add up"),
         ("w + phi", "character 3: '+': an angular speed and an angle do not add up"),
         ("sin(r)", "character 1: 'sin': an angle is needed, not a length"),
+        ("asin(r)", "character 1: 'asin': a number is needed, not a length"),
+        ("atan2(r, phi)", "character 1: 'atan2': two of a kind are needed, not a length and an angle"),
         ("5 mm + 3 s", "character 6: '+': a length and a time do not add up"),
         ("sqrt(r) + r", "character 9: '+': length^1/2 and a length do not add up"),
     ],

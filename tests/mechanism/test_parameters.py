@@ -100,6 +100,13 @@ def test_expressions_are_known_by_place() -> None:
     }
 
 
+def test_a_parameter_keeps_the_unit_of_a_rate_over_a_length() -> None:
+    mechanism = parse('name = "a"\nparameters = { slope = "2 deg/mm" }\n[bodies.bar]\n')
+    assert mechanism.parameters["slope"].quantity == Quantity("angle", 1, "length")
+    assert mechanism.parameters["slope"].value == pytest.approx(2000.0 * math.pi / 180.0, rel=1e-15)
+    assert parse(text(mechanism)) == mechanism
+
+
 def test_what_is_written_is_read_back_with_its_expressions() -> None:
     mechanism = parse(FOURBAR)
     again = parse(text(mechanism))
@@ -279,8 +286,14 @@ def told(changes: dict[str, Any] | None = None, joint: Any = None) -> str:
         ({"b": math.nan}, "[parameters] b = nan must be a finite number"),
         ({"b": [1]}, "[parameters] b = [1] must be a number or text such as '2*a'"),
         ({"b": True}, "[parameters] b = true must be a number or text such as '2*a'"),
-        ({"sin": 1.0}, "[parameters] sin: expressions mean something else by this name: sin, cos, tan, sqrt, pi"),
-        ({"pi": 3.0}, "[parameters] pi: expressions mean something else by this name: sin, cos, tan, sqrt, pi"),
+        (
+            {"sin": 1.0},
+            "[parameters] sin: expressions mean something else by this name: sin, cos, tan, sqrt, asin, acos, atan2, pi",
+        ),
+        (
+            {"pi": 3.0},
+            "[parameters] pi: expressions mean something else by this name: sin, cos, tan, sqrt, asin, acos, atan2, pi",
+        ),
         (
             {"2a": 1.0},
             "[parameters] '2a' must be letters, digits and underscores, no digit first, at most 100 in all",
