@@ -139,6 +139,7 @@ def test_an_expression_is_a_value() -> None:
     assert repr(Expression("a + 1")) == "Expression('a + 1')"
 
 
+ALL = "sin, cos, tan, sqrt, asin, acos, atan2"
 MESSAGES = {
     "": "'', character 1: the end where a number, a name or '(' must stand",
     "2 * (a + ": "'2 * (a +', character 9: the end where a number, a name or '(' must stand",
@@ -157,7 +158,7 @@ MESSAGES = {
         "'a + lng_name_2', character 5: no parameter 'lng_name_2'; did you mean 'long_name_2'?; "
         "parameters: a, b, long_name_2"
     ),
-    "sine(a)": "'sine(a)', character 1: no function 'sine'; did you mean 'sin'?; functions: sin, cos, tan, sqrt, asin, acos, atan2",
+    "sine(a)": f"'sine(a)', character 1: no function 'sine'; did you mean 'sin'?; functions: {ALL}",
     "sin a": "'sin a', character 5: 'a' where '(' after sin must stand",
     "sin(a, b)": "'sin(a, b)', character 6: ',' where one of + - * / ** ) must stand",
     "a/(b + 0.75)": "'a/(b + 0.75)', character 2: division by zero",
@@ -178,7 +179,7 @@ MESSAGES = {
         "a product needs *"
     ),
     "nan": "'nan', character 1: no parameter 'nan'; did you mean 'tan'?; parameters: a, b, long_name_2",
-    "__import__('os')": "'__import__('os')', character 1: no function '__import__'; functions: sin, cos, tan, sqrt, asin, acos, atan2",
+    "__import__('os')": f"'__import__('os')', character 1: no function '__import__'; functions: {ALL}",
     "a.real": "'a.real', character 2: '.' where one of + - * / ** must stand",
 }
 
