@@ -248,7 +248,9 @@ def check(
     type=_Range(Quantity("angle"), "N"),
     help="N values of the driver [rad], or such as 0deg:360deg:361; rates are for 1 rad/s, time counts the samples.",
 )
-@click.option("--set", "settings", type=SETTING, multiple=True, help="A law constant, such as crank.speed=2.0.")
+@click.option(
+    "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=2.0."
+)
 @click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
 @click.option("--engine", type=click.Choice(["auto", "python"]), default="auto", show_default=True)
 def solve(
@@ -274,21 +276,22 @@ def solve(
         raise click.UsageError("--times and --angle cannot both drive")
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    parameters = _parameters(settings)
-    for name, value in parameters.items():
+    geometry: dict[str, float | str] = {name: text for name, text in settings if name in mech.parameters}
+    laws = _parameters(tuple(setting for setting in settings if setting[0] not in geometry))
+    for name, value in laws.items():
         if isinstance(value, bool):
             raise click.UsageError(f"--set {name}: a law constant is a number")
     if angle:
         if len(mech.drivers) != 1:
             raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
         t = None
-        if settings:
-            raise click.UsageError("--set changes the law, which --angle does not use")
+        for name in laws:
+            raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
         samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
     else:
         t, samples = (run_times(RunSettings(*times)) if times else None), {}
     with _about(mechanism):
-        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, **samples)
+        run = solved(mech, t, parameters=geometry | laws, outputs=wanted, engine=engine, **samples)
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
     _fail_if_failed(run)
@@ -372,6 +375,11 @@ def simulate(
         if fmu.suffix != ".fmu":
             mech = gallery.load(MECHANISM.convert(model, None, None))
             with _about(model):
+                geometry = {name: text for name, text in settings if name in mech.parameters}
+                changed = mech.with_parameters(geometry).parameters  # reads units
+                settings = tuple(
+                    (name, repr(float(changed[name].value)) if name in geometry else text) for name, text in settings
+                )
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
         elif not _exists(fmu):
             raise click.UsageError(f"{fmu}: there is no such file")

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.backends.python import load_model
+from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
-from kinfmu.solver import Solver
+from kinfmu.solver import Solver, Stuck, with_parameters
 from kinfmu.solver.pose import Vector
 
 _GAP = float("nan")
@@ -24,7 +25,7 @@ def solve(
     mechanism: Mechanism | SolvePlan,
     t: ArrayLike | None = None,
     *,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float | str] | None = None,
     outputs: Sequence[str] | None = None,
     engine: str = "auto",
     tolerance: float = 1e-9,
@@ -36,9 +37,10 @@ def solve(
     t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
     the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
     and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
-    parameters: law constants by name, such as {'crank.speed': 2.0}. outputs: names to solve for, all if None; what they
-    do not need is not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take values, rates and
-    accelerations.
+    parameters: those of the mechanism and law constants by name, such as {'crank_length': 0.2, 'crank.speed': 2.0};
+    other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
+    if None; what they do not need is not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take
+    values, rates and accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
     last good sample.
@@ -46,8 +48,8 @@ def solve(
     if engine not in ("auto", "python"):
         raise KinfmuError(f"engine '{engine}' is not known; engines: auto, python")
     plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
-    constants = law_constants(plan, parameters or {})
-    solver = Solver(load_model(plan), tolerance)
+    constants, geometry = _settings(plan, parameters or {})
+    plan, solver = _with_geometry(plan, geometry, tolerance)
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
@@ -69,21 +71,45 @@ def run_times(run: RunSettings) -> FloatArray:
     return run.start + run.step * np.arange(count + 1, dtype=np.float64)
 
 
-def law_constants(plan: SolvePlan, given: Mapping[str, float]) -> dict[str, float]:
-    """Law constants by name, with those given in place of the file's."""
+def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[str, float], dict[str, float | str]]:
+    """Law constants by name, with those given in place of the file's; and the parameters of the mechanism given."""
     constants = {constant.name: constant.value for constant in plan.law_constants}
     positive = {constant.name for constant in plan.law_constants if constant.is_positive}
+    geometry: dict[str, float | str] = {}
     for name, value in given.items():
+        if name in plan.mechanism.parameters:
+            geometry[name] = value
+            continue
+        known = [*plan.mechanism.parameters, *constants]
         if name not in constants:
-            raise KinfmuError(
-                f"parameter '{name}' is not known{suggestion(name, constants)}; parameters: {listed(constants)}"
-            )
-        if not np.isfinite(value):
+            raise KinfmuError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
+        try:
+            constants[name] = float(value)
+        except (TypeError, ValueError):
+            raise KinfmuError(f"parameter '{name}' = {value!r} must be a number") from None
+        if not np.isfinite(constants[name]):
             raise KinfmuError(f"parameter '{name}' = {value!r} must be a finite number")
-        if name in positive and not value > 0.0:
+        if name in positive and not constants[name] > 0.0:
             raise KinfmuError(f"parameter '{name}' = {value!r} must be positive")
-        constants[name] = float(value)
-    return constants
+    return constants, geometry
+
+
+def _with_geometry(plan: SolvePlan, geometry: Mapping[str, float | str], tolerance: float) -> tuple[SolvePlan, Solver]:
+    """A solver for other values of parameters, followed from the plan's anchor, and the plan with them written.
+
+    What continuation does not reach is planned anew, as a file with these values would be: that assembles, or says
+    which joint stays open by how much.
+    """
+    if not geometry:
+        return plan, Solver(load_model(plan), tolerance)
+    mechanism = plan.mechanism.with_parameters(geometry)
+    if all(plan.mechanism.parameters[name].expression is None for name in geometry):
+        values = tuple(float(mechanism.parameters[parameter.name].value) for parameter in plan.parameters)
+        solver = with_parameters(load_module(plan), values, tolerance)
+        if not isinstance(solver, Stuck):
+            return replace(plan, mechanism=mechanism), solver
+    anew = compile_plan(mechanism, plan.outputs)
+    return anew, Solver(load_model(anew), tolerance)
 
 
 def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike]) -> tuple[FloatArray, ...]:
@@ -172,7 +198,7 @@ def _swept(
         values=tables[0],
         rates=tables[1],
         accelerations=tables[2],
-        fixed=plan.fixed,
+        fixed=solver.model.FIXED,
         input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
         inputs=inputs,
         status=told[:, 0].astype(np.int64),
@@ -188,6 +214,7 @@ def _swept(
             "name": plan.mechanism.name,
             "title": plan.mechanism.title,
             "engine": "python",
+            **{name: repr(float(parameter.value)) for name, parameter in plan.mechanism.parameters.items()},
             **{name: repr(value) for name, value in constants.items()},
         },
         events=tuple(events),

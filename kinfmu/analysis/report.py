@@ -89,7 +89,7 @@ class Report:
         if self.plan is None:
             return ()
         return tuple(
-            BlockReport(block.unknowns, block.row_names, determinant_formula(block))
+            BlockReport(block.unknowns, block.row_names, determinant_formula(block, self.plan.parameter_values))
             for block in self.plan.blocks
             if block.unknowns
         )

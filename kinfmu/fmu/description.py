@@ -158,12 +158,16 @@ def _whole(value: float | bool) -> int | bool:
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Outputs and InitialUnknowns, every output in both; an index is the place in the list, counted from 1."""
+    """Outputs, and InitialUnknowns: outputs and what follows from parameters.
+
+    An index is the place in the list, counted from 1.
+    """
     structure = SubElement(root, "ModelStructure")
-    for element in ("Outputs", "InitialUnknowns"):
+    listed = {"Outputs": ("output",), "InitialUnknowns": ("output", "calculatedParameter")}
+    for element, causalities in listed.items():
         parent = SubElement(structure, element)
         for variable in interface:
-            if variable.causality != "output":
+            if variable.causality not in causalities:
                 continue
             names = variable.dependencies if element == "Outputs" else variable.initial_dependencies
             unknown = {"index": str(references[variable.name] + 1)}

@@ -41,7 +41,7 @@ class Variable:
 
     name: str
     type: Literal["Real", "Integer", "Enumeration", "Boolean", "String"]
-    causality: Literal["input", "output", "parameter", "local"]
+    causality: Literal["input", "output", "parameter", "calculatedParameter", "local"]
     variability: Literal["constant", "fixed", "tunable", "discrete", "continuous"]
     description: str
     initial: Literal["exact", "calculated"] | None = None
@@ -121,6 +121,7 @@ def interface(plan: SolvePlan, drive: Drive = "time") -> Interface:
         Part("watch", tuple(_watches(plan, every))),
         Part("driven", tuple(_driven(plan))),
         Part("constants", tuple(_law_constants(plan))),
+        Part("parameters", tuple(_parameters(plan))),
         Part("tolerance", (_TOLERANCE,)),
         Part("fixed", tuple(_fixed(plan))),
         Part("counts", tuple(_counts(plan, every))),
@@ -209,7 +210,7 @@ def _output(plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...]) ->
         unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
         derivative_of=derivative_name(name, order - 1) if order else None,
         dependencies=_input_names(plan, drivers, order),
-        initial_dependencies=_initial_names(plan, drivers, order),
+        initial_dependencies=(*_initial_names(plan, drivers, order), *plan.parameters_of(name)),
     )
 
 
@@ -256,7 +257,10 @@ def _solver_output(
         minimum=minimum,
         maximum=maximum,
         dependencies=_input_names(plan, every, order),
-        initial_dependencies=_initial_names(plan, every, order, tolerance=kind == "Enumeration"),
+        initial_dependencies=(
+            *_initial_names(plan, every, order, tolerance=kind == "Enumeration"),
+            *(parameter.name for parameter in plan.parameters),
+        ),
     )
 
 
@@ -313,18 +317,35 @@ def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
         )
 
 
-def _fixed(plan: SolvePlan) -> Iterator[Variable]:
-    for name, value in plan.fixed.items():
-        owner, _, coordinate = name.rpartition(".")
+def _parameters(plan: SolvePlan) -> Iterator[Variable]:
+    for name, value, quantity, description in plan.parameters:
         yield Variable(
             name,
             "Real",
-            "local",
-            "constant",
-            f"{owner}: {coordinate}, which the joints fix",
+            "parameter",
+            "fixed",
+            description or f"Parameter {name} of the mechanism",
             initial="exact",
-            unit=unit_of(quantity_of(name), plan.mechanism.length_unit),
+            unit=unit_of(quantity, plan.mechanism.length_unit),
             start=value,
+        )
+
+
+def _fixed(plan: SolvePlan) -> Iterator[Variable]:
+    """Coordinates that the joints fix: constants, or what follows from parameters."""
+    for name, value in plan.fixed.items():
+        owner, _, coordinate = name.rpartition(".")
+        parameters = plan.parameters_of(name)
+        yield Variable(
+            name,
+            "Real",
+            "calculatedParameter" if parameters else "local",
+            "fixed" if parameters else "constant",
+            f"{owner}: {coordinate}, which the joints fix",
+            initial="calculated" if parameters else "exact",
+            unit=unit_of(quantity_of(name), plan.mechanism.length_unit),
+            start=None if parameters else value,
+            initial_dependencies=parameters or None,
         )
 
 

@@ -45,7 +45,7 @@ CAPABILITIES = {
 }
 RUN_TIME = ("slave.py", "estimated_rates.py")  # of this room
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-PARTS_WITH_START = ("inputs", "constants", "tolerance", "fixed", "drive")
+PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""

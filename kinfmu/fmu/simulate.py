@@ -69,6 +69,7 @@ def simulate(
             samples.log(_WARNING, "driven by inputs, and none are given: the drivers stay at their start values")
         with interruptible() as interrupted, _slave(about, folder, samples.log) as slave:
             _initialize(slave, interface, chosen, t)
+            samples.read_fixed(slave)
             _step_through(slave, interface, samples, t, table, progress, interrupted)
         mechanism_text = (folder / "resources" / "mechanism.toml").read_text(encoding="utf-8")
     return samples.run(about, mechanism_text, chosen)
@@ -284,12 +285,20 @@ class _Samples:
         self._size = 0
         self._events: list[Event] = []
         self.now = 0.0
+        self.fixed: dict[str, float] = {}
 
     def log(self, status: int, text: str) -> None:
         """A message of the FMU becomes an event at the current time."""
         event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
         if not self._events or self._events[-1] != event:
             self._events.append(event)
+
+    def read_fixed(self, slave: Any) -> None:
+        """Coordinates that never move: constants, or what follows from the parameters."""
+        names = [variable.name for variable in self._interface.part("fixed")]
+        references = self._interface.value_references()
+        values = slave.getReal([references[name] for name in names]) if names else []
+        self.fixed = dict(zip(names, values, strict=True))
 
     def add(self, t: float, reals: list[float], status: int, iterations: int) -> None:
         self._t[self._size] = t
@@ -313,7 +322,7 @@ class _Samples:
             values=part["values"],
             rates=part["rates"],
             accelerations=part["accelerations"],
-            fixed={variable.name: float(variable.start or 0.0) for variable in interface.part("fixed")},
+            fixed=self.fixed,
             input_names=tuple(variable.name for variable in interface.part("inputs")),
             inputs=part["driven"],
             status=status,

@@ -19,7 +19,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import Sample, estimated_rates
-from kinfmu.solver import Pose, Solver, Status
+from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
 Row = tuple[float, ...]
 
@@ -97,14 +97,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         parts = {part.name: part for part in self.layout.parts}
         self._inputs: list[float] = list(parts["inputs"].starts)  # value, speed, acceleration of each driver
         self._constants: Row = parts["constants"].starts
-        self._fixed: Row = parts["fixed"].starts
+        self._parameters: Row = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
         self._driven_by_time: bool = parts["drive"].starts[0]
         self._references = _Places(self.layout)
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real
         self._last_fetch = self._plan_fetch(())
-        self._solver = Solver(self.model, tolerance=self._tolerance)
+        self._solver = with_parameters(self.model, self._parameters, self._tolerance)
+        self._unbound = False  # parameters were set and not yet bound
 
         self._initialized = False
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
@@ -131,7 +132,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _driven(self) -> tuple[Row, Row, Row]:
         """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
         if self._driven_by_time:
-            return self.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
+            return self._solver.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
         history = self._history
         if self._touched or not history:
             t, u = self._time, self._wanted()
@@ -160,7 +161,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return self._committed.u, rest, rest
         t, u = self._history[-1]
         if self._driven_by_time:
-            return self.model.drive(t, self._constants)  # type: ignore[no-any-return]
+            return self._solver.model.drive(t, self._constants)  # type: ignore[no-any-return]
         return self._by_inputs(self._committed_inputs, t, u)
 
     def _wanted(self) -> Row:
@@ -172,6 +173,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """The pose asked for, good or not: followed from the committed one."""
         pose = self._pose
         if pose is None:
+            if self._unbound:
+                self._bind()
             u = self._driven()[0] if self._driven_by_time else self._wanted()
             pose = self._pose = self._solver.solve(self._committed, u)
         return pose
@@ -259,8 +262,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _read_tolerance(self) -> Row:
         return (self._tolerance,)
 
+    def _read_parameters(self) -> Row:
+        return self._parameters
+
     def _read_fixed(self) -> Row:
-        return self._fixed
+        self._asked()  # binds parameters
+        return tuple(self._solver.model.FIXED.values())
 
     def _plan_fetch(self, vrs: tuple[int, ...]) -> Fetch:
         """Work out once how a list of Real value references is read."""
@@ -388,7 +395,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         part, place = self._references.real(vr)
         kind = "" if part is None else self.layout.parts[part].name
         name = self._references.name(vr)
-        if kind not in ("inputs", "constants", "tolerance"):
+        if kind not in ("inputs", "constants", "parameters", "tolerance"):
             self._refuse(name or f"value reference {vr}", "is not a Real variable that can be set")
             return
         if not math.isfinite(value):
@@ -399,9 +406,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return
         if kind == "constants":
             self._constants = (*self._constants[:place], float(value), *self._constants[place + 1 :])
+        elif kind == "parameters":
+            if self._initialized:
+                self._refuse(name, f"= {value!r} comes too late: it is fixed once the FMU is initialized")
+                return
+            self._parameters = (*self._parameters[:place], float(value), *self._parameters[place + 1 :])
+            self._unbound = True
         elif value > 0.0:
-            self._tolerance = float(value)
-            self._solver = Solver(self.model, tolerance=value)
+            self._tolerance = self._solver.tolerance = float(value)
         else:
             self._refuse(name, f"= {value!r} must be positive; {self._tolerance!r} stays")
             return
@@ -445,7 +457,20 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._forget()
 
     def exit_initialization_mode(self) -> None:
-        self._initialized = True
+        try:
+            self._initialized = True
+            if self._unbound:
+                self._bind()
+        except Exception as error:  # an exception here would be Fatal for the host
+            self._report_defect(error)
+
+    def _bind(self) -> None:
+        """Bind the parameters: their anchor is reached by continuation, or every pose fails and says why."""
+        self._unbound = False
+        self._solver = with_parameters(self.model, self._parameters, self._tolerance)
+        self._committed = self._solver.anchor
+        if isinstance(self._solver, Stuck):
+            self.log(self._solver.message, Fmi2Status.error)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
@@ -507,7 +532,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
         if self._history and not self._touched and abs(current_time - self._history[-1][0]) <= SAME_TIME * step_size:
             return self._committed
-        u, _, _ = self.model.drive(current_time, self._constants)
+        u, _, _ = self._solver.model.drive(current_time, self._constants)
         return self._solver.solve(self._committed, u)
 
     def _commit(self, pose: Pose, t: float) -> None:
@@ -530,6 +555,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "token": self.layout.token,
             "inputs": list(self._inputs),
             "constants": list(self._constants),
+            "parameters": list(self._parameters),
             "tolerance": self._tolerance,
             "driven_by_time": self._driven_by_time,
             "initialized": self._initialized,
@@ -557,7 +583,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
         self._stray, self._stray_reported = state["stray"]
-        self._solver = Solver(self.model, tolerance=self._tolerance)
+        self._parameters = tuple(state["parameters"])
+        self._unbound = False
+        self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.restore(state["committed"])
         self._committed_inputs = tuple(state["committed_inputs"])
         self._history = tuple((t, tuple(u)) for t, u in state["history"])

@@ -49,7 +49,7 @@ class Block:
 class Rates:
     """Derivatives with respect to time on the graph: each symbol's rate is the symbol of its next derivative."""
 
-    def __init__(self, tracer: Tracer, fixed: Mapping[str, float]) -> None:
+    def __init__(self, tracer: Tracer, fixed: Mapping[str, Node]) -> None:
         self.graph = tracer.graph
         self.first: dict[Node, Node] = {}
         self.both: dict[Node, Node] = {}
@@ -85,7 +85,10 @@ def build_block(
     fixed: Mapping[str, Node],
     anchor: Mapping[str, float],
 ) -> Block:
-    """Trace the rows of a block once and take everything from that trace. anchor: all coordinates, by name."""
+    """Trace the rows of a block once and take everything from that trace.
+
+    anchor: values of all coordinates and parameters, by name of their symbols.
+    """
     known = ChainMap[str, Node]({}, fixed)  # type: ignore[arg-type]  # the fixed ones are not written to
     assigned = []
     for name, index in structure.assigned:
@@ -140,7 +143,7 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
     for sample in range(_DETERMINANT_SAMPLES):
         turned = {
             name: value
-            if sample == 0
+            if sample == 0 or name.endswith(".")  # parameters keep their values
             else rng.uniform(-np.pi, np.pi)
             if name.endswith(".phi")
             else value + size * rng.uniform(-0.5, 0.5)

@@ -11,8 +11,10 @@ Frequencies = tuple[tuple[str, int], ...]  # angle -> multiple, the argument of 
 _Terms = dict[tuple[str, Frequencies], float]  # ('sin' or 'cos', argument) -> coefficient
 
 
-def determinant_formula(block: Block) -> str | None:
+def determinant_formula(block: Block, parameters: Mapping[str, float] | None = None) -> str | None:
     """det J of a 1 x 1 or 2 x 2 block as a sum of sines and cosines of sums of angles, or None if it is no such sum.
+
+    parameters: their values, by the names of their symbols.
 
     Products become sums (sin a cos b = (sin(a + b) + sin(a - b)) / 2), so that equal formulas read the same.
     """
@@ -23,16 +25,18 @@ def determinant_formula(block: Block) -> str | None:
         node = jacobian[0][0]
     else:
         node = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0]
-    terms = _harmonics(node)
+    terms = _harmonics(node, parameters or {})
     return None if terms is None else _written(terms)
 
 
-def _harmonics(root: Node) -> _Terms | None:
+def _harmonics(root: Node, parameters: Mapping[str, float]) -> _Terms | None:
     values: dict[Node, _Terms] = {}
     angles: dict[Node, Mapping[str, int]] = {}
     for node in reachable([root]):
         if node.op == "constant":
             values[node] = {("cos", ()): float(node.constant or 0.0)}
+        elif node.op == "symbol" and node.name in parameters:
+            values[node] = {("cos", ()): parameters[node.name]}
         elif node.op == "symbol" and node.name.endswith(".phi"):
             angles[node] = {node.name: 1}
         elif node.op in ("sin", "cos") and node.args[0] in angles:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start
-from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import InconsistentError, MechanismError, MobilityError, listed, suggestion
@@ -17,7 +17,7 @@ from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
 from kinfmu.plan.origin import localized
 from kinfmu.plan.structure import RowTracer, find_structure
-from kinfmu.plan.trace import Tracer
+from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
 from kinfmu.redundancy import Redundancy, find_redundancy
 from kinfmu.units import Quantity
 
@@ -39,6 +39,15 @@ class LawConstant(NamedTuple):
     is_positive: bool = False  # other values are refused
 
 
+class PlanParameter(NamedTuple):
+    """A parameter of the geometry, settable under its name; the name of its symbol is that of `parameter_symbol`."""
+
+    name: str
+    value: float
+    quantity: Quantity
+    description: str
+
+
 class Motion(NamedTuple):
     """Something that moves: its position, rate and acceleration as nodes."""
 
@@ -53,9 +62,9 @@ class SolvePlan:
     """A value: everything that a back end needs to print the code of a mechanism. Equal plans have equal `text`.
 
     origin: where the plan's own origin lies in the world; only outputs, `fixed` and start values know of the world's.
-    outputs: the generalized coordinates q, then the points of interest; fixed: coordinates that never move; blocks in
-    the order of solving; watches: rows set aside as redundant, relative to the size; laws: u, ud, udd of each driver
-    over the symbol `time`; anchor: an assembled, regular pose.
+    outputs: the generalized coordinates q, then the points of interest; fixed_nodes: coordinates that never move, as
+    constants or formulas of parameters; blocks in the order of solving; watches: rows set aside as redundant, relative
+    to the size; laws: u, ud, udd of each driver over the symbol `time`; anchor: an assembled, regular pose.
     """
 
     mechanism: Mechanism
@@ -63,13 +72,25 @@ class SolvePlan:
     origin: Point
     drivers: tuple[DriverInfo, ...]
     law_constants: tuple[LawConstant, ...]
+    parameters: tuple[PlanParameter, ...]
     laws: tuple[Motion, ...]
     blocks: tuple[Block, ...]
     outputs_motion: tuple[Motion, ...]
     coordinate_count: int
-    fixed: Mapping[str, float]
+    fixed_nodes: Mapping[str, Node]
     watches: tuple[tuple[str, Node], ...]
     anchor: Assembled
+
+    @cached_property
+    def parameter_values(self) -> dict[str, float]:
+        """Parameters as written, by the names of their symbols."""
+        return {parameter_symbol(parameter.name): parameter.value for parameter in self.parameters}
+
+    @cached_property
+    def fixed(self) -> dict[str, float]:
+        """Values of the coordinates that never move, with the parameters as written."""
+        nodes = list(self.fixed_nodes.values())
+        return dict(zip(self.fixed_nodes, evaluate(nodes, self.parameter_values), strict=True))
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -95,7 +116,7 @@ class SolvePlan:
         """Every node that the plan is made of, arguments first."""
         roots = [node for block in self.blocks for node in _nodes(block)]
         roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
-        return tuple(reachable([*roots, *(node for _, node in self.watches)]))
+        return tuple(reachable([*roots, *self.fixed_nodes.values(), *(node for _, node in self.watches)]))
 
     @cached_property
     def text(self) -> str:
@@ -110,7 +131,8 @@ class SolvePlan:
             lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in _nodes(block)]}")
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
-        lines += [f"{list(self.fixed.items())} {self.law_constants} {self.drivers} {self.coordinate_count}"]
+        lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
+        lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)
 
     def __eq__(self, other: object) -> bool:
@@ -134,16 +156,29 @@ class SolvePlan:
 
     def depends(self, output: str) -> tuple[int, ...]:
         """Drivers (by position) on which an output depends structurally."""
-        (motion,) = (motion for motion in self.outputs_motion if motion.name == output)
-        return self._drivers_behind([motion.position])
+        behind = self._behind[output]
+        return tuple(k for k, driver in enumerate(self.drivers) if driver.inputs[0] in behind)
 
-    def _drivers_behind(self, nodes: Sequence[Node]) -> tuple[int, ...]:
-        inputs = {driver.inputs[0]: k for k, driver in enumerate(self.drivers)}
-        wanted = {symbol.name for symbol in symbols(nodes)}
-        for block in reversed(self.blocks):
-            if wanted & set(block.coordinates):
-                wanted |= {symbol.name for symbol in symbols(_nodes(block)[: _position_count(block)])}
-        return tuple(sorted(inputs[name] for name in wanted if name in inputs))
+    def parameters_of(self, name: str) -> tuple[str, ...]:
+        """Parameters on which an output or a fixed coordinate depends structurally, in file order."""
+        behind = self._behind[name]
+        return tuple(p.name for p in self.parameters if parameter_symbol(p.name) in behind)
+
+    @cached_property
+    def _behind(self) -> dict[str, frozenset[str]]:
+        """Inputs and parameters, by the names of their symbols, behind each output and each fixed coordinate."""
+        behind: dict[str, frozenset[str]] = {}
+
+        def of(nodes: Sequence[Node]) -> frozenset[str]:
+            names = {symbol.name for symbol in symbols(nodes)}
+            return frozenset().union(*(behind.get(name, frozenset((name,))) for name in names))
+
+        for block in self.blocks:
+            own = set(block.coordinates)
+            found = frozenset(of(_nodes(block)[: _position_count(block)]) - own)
+            behind |= dict.fromkeys(own, found)
+        told = {motion.name: of([motion.position]) for motion in self.outputs_motion}
+        return told | {name: of([node]) for name, node in self.fixed_nodes.items()}
 
 
 def _nodes(block: Block) -> list[Node]:
@@ -183,12 +218,14 @@ def plan_from(
     tracer = Tracer(local)
     set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy.kept, set_aside)
-    known = {name: tracer.graph.constant(value) for name, value in structure.fixed.items()}
+    known = structure.fixed
     rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
+    parameters = _parameters(mechanism)
     at_anchor = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
+    at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in parameters}
     blocks = _needed(
         [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
         [motion.position for motion in motions],
@@ -197,7 +234,7 @@ def plan_from(
     watches = []
     for index in set_aside:
         node = row(index, known)
-        if all(symbol.name in solved for symbol in symbols([node])):
+        if all(symbol.name in solved for symbol in symbols([node]) if not is_parameter(symbol)):
             watches.append((system.rows[index].name, node / (system.rows[index].scale * system.size)))
     return SolvePlan(
         mechanism=mechanism,
@@ -205,11 +242,12 @@ def plan_from(
         origin=origin,
         drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
         law_constants=_law_constants(mechanism),
+        parameters=parameters,
         laws=_laws(mechanism, tracer),
         blocks=tuple(blocks),
         outputs_motion=tuple(motions),
         coordinate_count=coordinate_count,
-        fixed=fixed,
+        fixed_nodes=fixed,
         watches=tuple(watches),
         anchor=anchor,
     )
@@ -273,7 +311,7 @@ def _are(drivers: Sequence[str]) -> str:
 
 def _outputs(
     mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
-) -> tuple[list[Motion], int, dict[str, float]]:
+) -> tuple[list[Motion], int, dict[str, Node]]:
     """Outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":
         wanted = [name for name in mechanism.coordinate_names if name not in known]
@@ -287,15 +325,15 @@ def _outputs(
         return node + offset
 
     nodes = [(name, in_world(name, known.get(name, tracer.symbols[name]))) for name in wanted]
-    fixed = {name: float(in_world(name, node).constant or 0.0) for name, node in known.items() if name not in wanted}
+    fixed = {name: in_world(name, node) for name, node in known.items() if name not in wanted}
     coordinate_count = len(nodes)
     for name, target in mechanism.points.items():
         for coordinate, node in zip(("x", "y"), tracer.point(target, known), strict=True):
             value = in_world(coordinate, node)
-            if value.constant is None:
-                nodes.append((f"{name}.{coordinate}", value))
+            if all(is_parameter(symbol) for symbol in symbols([value])):
+                fixed[f"{name}.{coordinate}"] = value
             else:
-                fixed[f"{name}.{coordinate}"] = value.constant
+                nodes.append((f"{name}.{coordinate}", value))
     positions = [node for _, node in nodes]
     motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
     return [Motion(*motion) for motion in motions], coordinate_count, fixed
@@ -326,6 +364,16 @@ def _law_constants(mechanism: Mechanism) -> tuple[LawConstant, ...]:
         LawConstant(f"{driver.name}.{key}", float(value), said.quantity(*driver.law_kinds), said.is_positive)
         for driver in mechanism.drivers
         for key, (value, said) in driver.law.constants().items()
+        if ("drivers", driver.name, "law", key) not in mechanism.expressions  # those follow from parameters
+    )
+
+
+def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
+    """Parameters that are numbers of their own; what follows from them is computed."""
+    return tuple(
+        PlanParameter(name, float(parameter.value), parameter.quantity or Quantity("number"), parameter.description)
+        for name, parameter in mechanism.parameters.items()
+        if parameter.expression is None
     )
 
 
@@ -333,8 +381,13 @@ def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
     graph = tracer.graph
     time, one = graph.symbol("time"), graph.constant(1.0)
     laws = []
-    for driver in mechanism.drivers:
-        constants = {key: graph.symbol(f"{driver.name}.{key}") for key in driver.law.constants()}
+    for driver, traced in zip(mechanism.drivers, tracer.drivers, strict=True):
+        constants = {
+            key: value
+            if ("drivers", driver.name, "law", key) in mechanism.expressions
+            else graph.symbol(f"{driver.name}.{key}")
+            for key, (value, _) in traced.law.constants().items()
+        }
         target = graph.lift(driver.law.target(time, **constants))
         (rate,) = graph.derivative([target], {time: one})
         (acceleration,) = graph.derivative([rate], {time: one})

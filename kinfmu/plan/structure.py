@@ -14,7 +14,7 @@ from kinfmu.equations.blocks import ordered_blocks
 from kinfmu.equations.graph import Node, symbols
 from kinfmu.equations.system import System
 from kinfmu.errors import MobilityError, listed
-from kinfmu.plan.trace import Tracer
+from kinfmu.plan.trace import Tracer, is_parameter
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,11 @@ class BlockStructure:
 
 @dataclass(frozen=True)
 class Structure:
-    """fixed: coordinates that joints hold at a constant, in file order; blocks: in the order of solving."""
+    """fixed: coordinates that joints hold at a constant or a formula of parameters, in file order; blocks: in the order
+    of solving.
+    """
 
-    fixed: Mapping[str, float]
+    fixed: Mapping[str, Node]
     blocks: tuple[BlockStructure, ...]
 
 
@@ -56,20 +58,18 @@ class RowTracer:
 
     def __call__(self, index: int, known: Mapping[str, Node]) -> Node:
         kind, number, k = self._owners[index]
-        mechanism = self.tracer.mechanism
         if kind == "joint":
-            return self.tracer.joint(mechanism.joints[number], known)[k]
-        return self.tracer.driver(mechanism.drivers[number], known)
+            return self.tracer.joint(self.tracer.joints[number], known)[k]
+        return self.tracer.driver(self.tracer.drivers[number], known)
 
 
 def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_aside: Sequence[int]) -> Structure:
     """Order of solving the kept joint rows and the driver rows; rows set aside may join a block as companions."""
     row = RowTracer(system, tracer)
-    fixed, used = _constants(system, tracer, row, kept)
-    known = {name: tracer.graph.constant(value) for name, value in fixed.items()}
+    known, used = _constants(system, tracer, row, kept)
     driving = range(system.joint_row_count, len(system.rows))
     open_rows = [index for index in (*kept, *driving) if index not in used]
-    unknown = [name for name in system.coordinates if name not in fixed]
+    unknown = [name for name in system.coordinates if name not in known]
     number = {name: k for k, name in enumerate(unknown)}
     meets = {
         index: [number[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in number]
@@ -84,7 +84,7 @@ def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_asid
         _torn(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
         for rows, columns in order.blocks
     ]
-    return Structure(fixed, tuple(_with_companions(system, row, known, blocks, kept, set_aside)))
+    return Structure(known, tuple(_with_companions(system, row, known, blocks, kept, set_aside)))
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:
@@ -103,10 +103,8 @@ def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Ma
     return -rest if coefficient == 1.0 else rest if coefficient == -1.0 else rest / -coefficient
 
 
-def _constants(
-    system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]
-) -> tuple[dict[str, float], set[int]]:
-    """Coordinates that the kept joint rows fix to constants, and the rows used up by that."""
+def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]) -> tuple[dict[str, Node], set[int]]:
+    """Coordinates that the kept joint rows fix, in file order, and the rows used up by that."""
     values: dict[str, Node] = {}
     used: set[int] = set()
     touching: dict[str, list[int]] = {}  # body -> rows
@@ -120,18 +118,17 @@ def _constants(
         index = heapq.heappop(waiting)
         if index in used:
             continue
-        free = symbols([row(index, values)])
+        free = [symbol for symbol in symbols([row(index, values)]) if not is_parameter(symbol)]
         if len(free) != 1:
             continue
         value = given_value(tracer, row, index, free[0].name, values)
-        if value is None or value.constant is None:
+        if value is None:
             continue
         values[free[0].name] = value
         used.add(index)
         for again in touching[free[0].name.partition(".")[0]]:
             heapq.heappush(waiting, again)
-    fixed = {name: node.constant for name in system.coordinates if (node := values.get(name)) is not None}
-    return {name: value for name, value in fixed.items() if value is not None}, used
+    return {name: values[name] for name in system.coordinates if name in values}, used
 
 
 def _torn(

@@ -11,15 +11,32 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
 
+def parameter_symbol(name: str) -> str:
+    """Name of a parameter's symbol: a full stop at the end, which no coordinate and no input has."""
+    return f"{name}."
+
+
+def is_parameter(symbol: Node) -> bool:
+    """True for the symbol of a parameter."""
+    return symbol.name.endswith(".")
+
+
 class Tracer:
-    """Turns joints, drivers and points into nodes of one graph; every coordinate and driver value is a symbol there."""
+    """Turns joints, drivers and points into nodes of one graph.
+
+    Every coordinate, every driver value and every parameter is a symbol there.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
         self.graph = Graph()
         self.symbols = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
         self.targets = {driver.name: self.graph.symbol(driver.inputs()[0]) for driver in mechanism.drivers}
-        self._points = mechanism.body_points
+        own = [name for name, parameter in mechanism.parameters.items() if parameter.expression is None]
+        members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in own})
+        self.joints = members.joints
+        self.drivers = members.drivers
+        self._points = members.body_points
 
     def joint(self, joint: Joint, known: Mapping[str, Node]) -> tuple[Node, ...]:
         """Rows of a joint, with `known` in place of the symbols of some coordinates."""

@@ -19,14 +19,15 @@ class Solver:
     """Follows the branch of a mechanism that its anchor lies on. All methods are pure: state is in the poses.
 
     model: a module generated from a SolvePlan; tolerance: residual relative to the size above which the status of a
-    sample is not ok (Newton always goes to round-off).
+    sample is not ok (Newton always goes to round-off); anchor: a good pose to follow all others from, the model's own
+    if None.
     """
 
-    def __init__(self, model: Model, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, model: Model, tolerance: float = TOLERANCE, anchor: Pose | None = None) -> None:
         self.model = model
         self.tolerance = tolerance
         u, z = model.ANCHOR
-        self.anchor = Pose(u, evaluated(model, u, z, held=0))
+        self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
         self._one = len(u) == 1
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 

@@ -29,8 +29,7 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     (solver,) = {
         module.Solver
         for name, module in sys.modules.items()
-        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}")
-        and name.endswith(".fmu.slave")
+        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}") and name.endswith(".solver")
     }
     assert solver is not Solver
     calls: dict[str, int] = {}

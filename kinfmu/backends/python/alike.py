@@ -23,6 +23,7 @@ from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Graph, Node, reachable
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
+from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.curve import CurveData
 
 SHARED_FROM = 8  # alike blocks; for fewer a call costs more than the code it saves
@@ -90,7 +91,11 @@ def _form(block: Block, rate_of: Callable[[str, int], str]) -> _Form:
     nodes = reachable([node for group in roots for node in group])
     number = {node: k for k, node in enumerate(nodes)}
     positions = [node for group in _position_groups(block) for node in group]
-    given = tuple(node.name for node in reachable(positions) if node.op == "symbol" and node.name not in own)
+    given = tuple(
+        node.name
+        for node in reachable(positions)
+        if node.op == "symbol" and node.name not in own and not is_parameter(node)
+    )
     spoken = {
         rate_of(name, order): f"{canonical}{order}"
         for name, canonical in [*own.items(), *((name, f"given{k}") for k, name in enumerate(given))]
@@ -103,7 +108,7 @@ def _form(block: Block, rate_of: Callable[[str, int], str]) -> _Form:
             constants.append(float(node.value))  # type: ignore[arg-type]  # constants hold floats
             lines.append("constant")
         elif node.op == "symbol":
-            lines.append(spoken[node.name])
+            lines.append(node.name if is_parameter(node) else spoken[node.name])
         else:
             lines.append((node.op, node.value, *(number[arg] for arg in node.args)))
     lines += [tuple(number[node] for node in group) for group in roots]
@@ -136,7 +141,7 @@ def _renamed(block: Block, form: _Form, differs: Sequence[bool], rate_of: Callab
             else:
                 new[node] = graph.constant(float(node.value))  # type: ignore[arg-type]  # constants hold floats
         elif node.op == "symbol":
-            new[node] = graph.symbol(spoken[node.name])
+            new[node] = graph.symbol(node.name if is_parameter(node) else spoken[node.name])
         else:
             new[node] = graph.copy(node, *(new[arg] for arg in node.args))
     return Block(
@@ -181,9 +186,9 @@ class Kind:
         }
         return sorted(names, key=lambda name: int(name.removeprefix("given").partition(".")[0]))
 
-    def source(self, curves: Mapping[CurveData, str]) -> list[str]:
+    def source(self, curves: Mapping[CurveData, str], with_residuals: bool) -> list[str]:
         """The functions; curves: names of the constants that hold the data of curves."""
-        return _KindEmitter(self, curves).source()
+        return _KindEmitter(self, curves).source(with_residuals)
 
 
 class _KindEmitter:
@@ -196,12 +201,13 @@ class _KindEmitter:
         self.positions = [node for group in _position_groups(block) for node in group]
         self.hold: dict[str, Node | None] = {}
 
-    def source(self) -> list[str]:
+    def source(self, with_residuals: bool) -> list[str]:
         later = [
             self._linear("velocity", 1, self.block.velocity),
             self._linear("acceleration", 2, self.block.acceleration),
             *([self._assigned("rates", 1), self._assigned("accelerations", 2)] if self.block.assigned else []),
             self._jacobian(),
+            *([self._residual()] if with_residuals else []),
         ]
         parts = self._position()
         hold = "\n".join(unpacking(self.hold, "hold"))
@@ -286,12 +292,20 @@ class _KindEmitter:
         label = self.kind.label
         return ["", f"def jacobian{label}(hold):", _HOLD, *indented(lines), f"    return {matrix(rows)}", ""]
 
+    def _residual(self) -> list[str]:
+        writer = Writer(self.names, reachable(self.positions))
+        lines = writer.statements(self.block.residuals)
+        scaled = zip(self.block.residuals, self.block.row_scales, strict=True)
+        row = ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled)
+        self._import(writer)
+        return ["", f"def residual{self.kind.label}(hold):", _HOLD, *indented(lines), f"    return [{row}]", ""]
+
     def _import(self, writer: Writer) -> None:
         """Note what a later function takes from the position."""
         for node in writer.used:
             if node.op != "symbol":
                 self.hold.setdefault(self.names.of(node), node)
-            elif not node.name.endswith(_RATES):
+            elif not node.name.endswith(_RATES) and not is_parameter(node):
                 self.hold.setdefault(identifier(node.name), None)
 
 
@@ -350,3 +364,7 @@ class Calls:
     def jacobian(self) -> str:
         """The block's Jacobian as an expression."""
         return f"jacobian{self.member.kind.label}({self.hold})"
+
+    def residual(self) -> str:
+        """The block's residuals, relative to the size, as an expression."""
+        return f"residual{self.member.kind.label}({self.hold})"

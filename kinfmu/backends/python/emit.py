@@ -1,6 +1,7 @@
 """SolvePlan -> Python source: one module of plain arithmetic on the standard library, the `model` of a Solver.
 
-The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage:
+The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage.
+With parameters the functions stand inside `bound(parameters)`, which computes once what depends on parameters alone:
 
     drive(t, constants)                            -> u, ud, udd
     position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch,
@@ -44,6 +45,7 @@ from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.trace import is_parameter, parameter_symbol
 
 
 def emit(plan: SolvePlan) -> str:
@@ -78,6 +80,9 @@ class _Emitter:
                     self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
                 self.position_nodes += [motion[0] for _, motion in block.assigned]
                 self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+        self.parametric, self.prolog = _parametric(plan)
+        known = [node for node in reachable(self.position_nodes) if node not in self.parametric]
+        self.known = {*known, *self.prolog}  # what later stages find computed
         self.definitions = self._defined_by(self.formulas, identifier)
         self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
         self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
@@ -100,6 +105,7 @@ class _Emitter:
         return Definitions(ordered)
 
     def module(self) -> str:
+        """Constants and functions; with parameters the functions stand in `bound`, which binds their values."""
         later = [
             self._velocity(),
             self._acceleration(),
@@ -110,19 +116,39 @@ class _Emitter:
             self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
             self._watches(),
             self._jacobians(),
+            *([self._residuals()] if self.plan.parameters else []),
         ]
         position = self._position()  # after the later stages, which say what it has to hand on
         kinds = {call.member.kind.label: call.member.kind for call in self.calls.values()}
-        parts = [
-            *self._header(),
-            *self._drive(),
-            *(line for kind in kinds.values() for line in kind.source(self.curves)),
-            *position,
-        ]
+        shared = [line for kind in kinds.values() for line in kind.source(self.curves, bool(self.plan.parameters))]
         unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
+        functions = [*self._drive(), *shared, *position]
         for lines in later:
-            parts += [unpacked if line is _VALUES else line for line in lines]
-        return "\n".join(parts) + "\n"
+            functions += [unpacked if line is _VALUES else line for line in lines]
+        if self.plan.parameters:
+            functions = self._bound(functions)
+        return "\n".join([*self._header(), *functions]) + "\n"
+
+    def _bound(self, functions: Sequence[str]) -> list[str]:
+        """The functions inside one that binds the parameters: what depends on nothing else is computed there, once."""
+        names = [identifier(parameter_symbol(parameter.name)) for parameter in self.plan.parameters]
+        writer = Writer(self.names, (), self.prolog)
+        prolog = writer.statements(self.prolog)
+        fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in self.plan.fixed_nodes.items())
+        defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]
+        return [
+            "",
+            "def bound(parameters):",
+            '    """The model for these values of PARAMETERS."""',
+            *unpacking(names, "parameters"),
+            *indented(prolog),
+            f"    FIXED = {{{fixed}}}",
+            *(f"    {line}" if line else "" for text in functions for line in text.split("\n")),
+            "    constants = {name: value for name, value in globals().items() if name.isupper()}",
+            f"    functions = {{{', '.join(f'{name!r}: {name}' for name in defined)}}}",
+            "    return SimpleNamespace(**constants | functions | {'FIXED': FIXED})",
+            "",
+        ]
 
     def _header(self) -> list[str]:
         plan = self.plan
@@ -132,11 +158,14 @@ class _Emitter:
         ]
         rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
         imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
+        if plan.parameters:
+            imports.append("from types import SimpleNamespace")
         if self.curves:
             imports += ["", "from .curve import curve"]
         if large:
             imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
         kinds = tuple(driver.quantity.kind for driver in plan.drivers)
+        rows, scales = tuple(b.row_names for b in self.solved), tuple(b.row_scales for b in self.solved)
         reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
         return [
             f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
@@ -155,11 +184,13 @@ class _Emitter:
             f"FIXED = {dict(plan.fixed)!r}",
             f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
             f"POSITIVE = {tuple(k for k, constant in enumerate(plan.law_constants) if constant.is_positive)!r}",
+            f"PARAMETERS = {tuple((parameter.name, parameter.value) for parameter in plan.parameters)!r}",
             f"WATCHES = {plan.watch_names!r}",
             f"UNKNOWNS = {plan.unknowns!r}",
             f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
             f"BLOCKS = {tuple(self.places)!r}",
             f"ANCHOR = {(anchor_u, anchor_z)!r}",
+            *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
             *(f"{name} = {data!r}" for data, name in self.curves.items()),
             "",
         ]
@@ -183,7 +214,7 @@ class _Emitter:
 
     def _position(self) -> list[str]:
         keep = [node for node in self.exports.values() if node is not None]
-        writer = Writer(self.names, (), keep)
+        writer = Writer(self.names, self.prolog, keep)
         lines = [
             "",
             "def position(u, z, zd, zdd, s, held=0):",
@@ -266,7 +297,7 @@ class _Emitter:
 
     def _alone(self) -> list[list[str]]:
         """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
-        writer = Writer(self.names, reachable(self.position_nodes))
+        writer = Writer(self.names, self.known)
         alone = Alone(self.inputs[1][0], self.inputs[2][0], self.formulas)
         definitions = self._defined_by(alone.formulas, alone.spoken)
         lines, done = [], set[int]()
@@ -301,7 +332,7 @@ class _Emitter:
 
     def _linear(self, order: int, right: _Right) -> list[str]:
         """Linear solves of one order as a function's body."""
-        writer = Writer(self.names, reachable(self.position_nodes))
+        writer = Writer(self.names, self.known)
         lines = self._linear_lines(writer, order, right, self.definitions, set(), identifier, held=True)
         self._import(writer)
         result = tupled(identifier(derivative_name(name, order)) for name in self.unknowns)
@@ -356,7 +387,7 @@ class _Emitter:
                 lines += unpacking(map(identifier, names), argument)
         if highest:
             lines += self._chained(highest)
-        writer = Writer(self.names, reachable(self.position_nodes))
+        writer = Writer(self.names, self.known)
         body = self.definitions.lines(writer, _names(targets), set()) + writer.statements(targets)
         returned = tupled(writer.expression(node) for node in targets)
         self._import(writer)
@@ -380,7 +411,7 @@ class _Emitter:
         return lines
 
     def _watches(self) -> list[str]:
-        writer = Writer(self.names, reachable(self.position_nodes))
+        writer = Writer(self.names, self.known)
         targets = [node for _, node in self.plan.watches]
         body = writer.statements(targets)
         returned = tupled(writer.expression(node) for node in targets)
@@ -396,7 +427,7 @@ class _Emitter:
         ]
 
     def _jacobians(self) -> list[str]:
-        writer = Writer(self.names, reachable(self.position_nodes))
+        writer = Writer(self.names, self.known)
         matrices = []
         body: list[str] = []
         for k, block in enumerate(self.solved):
@@ -417,10 +448,33 @@ class _Emitter:
             "",
         ]
 
+    def _residuals(self) -> list[str]:
+        writer = Writer(self.names, self.known)
+        rows, body = [], []
+        for k, block in enumerate(self.solved):
+            if k in self.calls:
+                rows.append(self.calls[k].residual())
+            else:
+                body += writer.statements(block.residuals)
+                scaled = zip(block.residuals, block.row_scales, strict=True)
+                rows.append("[" + ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled) + "]")
+        self._import(writer)
+        return [
+            "",
+            "def residuals(values):",
+            '    """Residuals of each block, relative to the size."""',
+            _VALUES,
+            *indented(body),
+            f"    return {tupled(rows)}",
+            "",
+        ]
+
     def _import(self, writer: Writer) -> None:
         """Note what a later stage takes from the position stage."""
         coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
         for node in writer.used:
+            if node in self.parametric:
+                continue
             if node.op != "symbol":
                 self.exports.setdefault(self.names.of(node), node)
             elif node.name in coordinates:
@@ -429,6 +483,21 @@ class _Emitter:
 
 _VALUES = "    <values>"
 _Right = Callable[[Block], tuple[Node, ...]]
+
+
+def _parametric(plan: SolvePlan) -> tuple[set[Node], list[Node]]:
+    """Operations that depend on parameters alone, and those of them that others are made of, or outputs."""
+    depends: dict[Node, bool] = {}  # on parameters alone
+    for node in plan.nodes:
+        if node.op == "symbol":
+            depends[node] = is_parameter(node)
+        elif node.op != "constant":
+            on = [arg for arg in node.args if arg.op != "constant"]
+            depends[node] = bool(on) and all(depends[arg] for arg in on)
+    alone = {node for node, is_alone in depends.items() if is_alone and node.args}
+    used = [arg for node in plan.nodes if node not in alone for arg in node.args]
+    used += [*plan.fixed_nodes.values(), *(motion.position for motion in plan.outputs_motion)]
+    return alone, list(dict.fromkeys(node for node in used if node in alone))
 
 
 def _names(targets: Sequence[Node]) -> list[str]:

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import linecache
 from types import ModuleType
+from typing import Any
 
 from kinfmu.backends.python.emit import emit
 from kinfmu.plan import SolvePlan
 
 
-def load_model(plan: SolvePlan) -> ModuleType:
-    """The generated module of a plan, ready for a Solver; its source shows in tracebacks."""
+def load_model(plan: SolvePlan) -> Any:
+    """The generated model of a plan with its parameters as written, ready for a Solver."""
+    module = load_module(plan)
+    return module.bound(tuple(value for _, value in module.PARAMETERS)) if plan.parameters else module
+
+
+def load_module(plan: SolvePlan) -> ModuleType:
+    """The generated module of a plan; its source shows in tracebacks.
+
+    Without parameters it is a model itself; with parameters its function `bound` gives one.
+    """
     source = emit(plan)
     name = f"kinfmu.solver.model_{plan.mechanism.name}"  # beside `linear`, as in an FMU
     model = ModuleType(name)

@@ -1,0 +1,144 @@
+"""Parameters of a mechanism at run time: the same as a file with those numbers, or refused with the row and the gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute
+from kinfmu.backends.python import load_module
+from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError
+from kinfmu.mechanism import Point
+from kinfmu.plan import compile_plan
+from kinfmu.solver import Stuck, with_parameters
+from kinfmu.solver.status import Status
+from tests.oracle import fourbar as exact_fourbar
+
+LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
+OTHERS = {"ground": 4.2, "crank": 1.3, "coupler": 3.1, "rocker": 3.3}
+
+
+def linkage(lengths: Mapping[str, float] = LENGTHS) -> Mechanism:
+    """A four-bar whose lengths are parameters."""
+    return Mechanism(
+        "settable",
+        [
+            Body("ground", {"O": (0, 0), "C": ("ground", 0)}),
+            Body("crank", {"O": (0, 0), "P": ("crank", 0)}, (0, 0, 1.0)),
+            Body("coupler", {"P": (0, 0), "Q": ("coupler", 0), "M": ("coupler/2", "rocker/6")}, (0.5, 0.8, 0.6)),
+            Body("rocker", {"C": (0, 0), "Q": ("rocker", 0)}, (4, 0, 1.8)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, "1 rad/s"))],
+        points={"M": "coupler.M"},
+        parameters=dict(lengths),
+        run=kinfmu.RunSettings(0.0, 6.0, 0.25),
+    )
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return kinfmu.build(linkage(), tmp_path_factory.mktemp("parameters"))
+
+
+def test_other_lengths_give_the_same_as_a_file_with_those_lengths(fmu: Path) -> None:
+    written = kinfmu.solve(linkage(OTHERS))
+    for run in (kinfmu.solve(linkage(), parameters=OTHERS), kinfmu.simulate(fmu, parameters=OTHERS)):
+        assert run.outputs == written.outputs
+        for got, wanted, within in (
+            (run.values, written.values, 1e-13),
+            (run.rates, written.rates, 1e-12),
+            (run.accelerations, written.accelerations, 1e-11),
+        ):
+            np.testing.assert_allclose(got, wanted, rtol=0, atol=within)
+        assert run.fixed == pytest.approx(written.fixed, abs=1e-15)
+
+
+def test_other_lengths_agree_with_the_oracle() -> None:
+    u = np.linspace(0.0, 6.2, 25)
+    run = kinfmu.solve(linkage(), crank_angle=u, parameters=OTHERS)
+    lengths = [OTHERS[name] for name in ("ground", "crank", "coupler", "rocker")]
+    exact = exact_fourbar(*(repr(length) for length in lengths), u)
+    np.testing.assert_allclose(run["coupler.phi"], exact.q[:, 1].astype(float), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run["rocker.alpha"], exact.qdd[:, 2].astype(float), rtol=0, atol=1e-11)
+
+
+def test_parameters_take_units_and_law_constants_stand_beside_them() -> None:
+    run = kinfmu.solve(linkage(), [0.0, 1.0], parameters={"coupler": "3100 mm", "crank.speed": 2.0})
+    assert run["crank.phi"].tolist() == [1.0, 3.0]
+    np.testing.assert_allclose(
+        np.hypot(run["M.x"] - run["coupler.x"], run["M.y"] - run["coupler.y"]), math.hypot(1.55, 0.5)
+    )
+    assert 'coupler = "3.1 m"' in run.mechanism_text
+
+
+def test_a_derived_parameter_can_be_set_too() -> None:
+    mechanism = replace(linkage(), parameters={**LENGTHS, "rocker": "crank*3"})
+    run = kinfmu.solve(mechanism, parameters={"rocker": 3.2})
+    np.testing.assert_array_equal(run.values, kinfmu.solve(linkage({**LENGTHS, "rocker": 3.2})).values)
+
+
+def test_lengths_that_do_not_close_are_refused_with_the_joint_and_the_gap(fmu: Path) -> None:
+    gap = 9.0 - 3.0 - math.sqrt(1.0 + 16.0 - 8.0 * math.cos(1.0))  # coupler less rocker and what lies between the pins
+    with pytest.raises(AssemblyError, match=rf"stays open by {gap:.4g} m"):
+        kinfmu.solve(linkage(), parameters={"coupler": 9.0})
+    run = kinfmu.simulate(fmu, parameters={"coupler": 9.0})
+    assert run.status.tolist() == [Status.INCONSISTENT]
+    assert run.events[0].text == (
+        f"parameters coupler = 9: the mechanism does not close: rows Q.x, Q.y stay open by {gap:.4g} m"
+    )
+
+
+def test_a_redundant_bar_of_another_length_is_refused_with_its_row(tmp_path: Path) -> None:
+    reference = kinfmu.load("fourbar")
+    joints = tuple(replace(j, length="bar") if isinstance(j, Distance) else j for j in reference.joints)
+    mechanism = replace(reference, joints=joints, parameters={"bar": 1.0})
+    with pytest.raises(InconsistentError, match=r"\[joints.AB\].*open by 0.01 m"):
+        kinfmu.solve(mechanism, parameters={"bar": 1.01})
+    run = kinfmu.simulate(kinfmu.build(mechanism, tmp_path), parameters={"bar": 1.01})
+    assert run.status.tolist() == [Status.INCONSISTENT]
+    assert "the redundant row AB.length is open by about 0.01005 m" in run.events[0].text
+
+
+def test_a_name_that_is_no_parameter_is_told(fmu: Path) -> None:
+    with pytest.raises(KinfmuError, match="'copler' is not known; did you mean 'coupler'"):
+        kinfmu.solve(linkage(), parameters={"copler": 3.0})
+    with pytest.raises(KinfmuError, match="'copler' is no parameter of this FMU; did you mean 'coupler'"):
+        kinfmu.simulate(fmu, parameters={"copler": 3.0})
+
+
+def test_continuation_keeps_the_branch_where_assembly_would_take_the_nearest() -> None:
+    """Lengths far from those written, step by step: the rocker pin stays on its side of the diagonal."""
+    module = load_module(compile_plan(linkage()))
+    for scale in (0.2, 1.0, 30.0):
+        solver = with_parameters(module, tuple(scale * value for value in OTHERS.values()))
+        assert not isinstance(solver, Stuck)
+        exact = exact_fourbar(*(repr(OTHERS[name]) for name in ("ground", "crank", "coupler", "rocker")), [1.0])
+        assert solver.anchor.z == pytest.approx([float(exact.q[0, 1]), float(exact.q[0, 2])], abs=1e-13)
+
+
+def test_parameters_are_in_the_state_of_an_fmu_and_in_what_depends_on_them(fmu: Path) -> None:
+    from fmpy import read_model_description
+
+    described = read_model_description(str(fmu))
+    by_name = {variable.name: variable for variable in described.modelVariables}
+    assert by_name["coupler"].causality == "parameter"
+    assert (by_name["coupler"].variability, by_name["coupler"].unit, by_name["coupler"].start) == ("fixed", "m", "3.5")
+    unknown = {item.variable.name: item for item in described.initialUnknowns}
+    assert {"coupler", "ground"} <= {variable.name for variable in unknown["rocker.phi"].dependencies}
+    assert {variable.name for variable in unknown["rocker.x"].dependencies} == {"ground"}
+
+
+def test_points_may_be_given_as_points() -> None:
+    assert linkage().bodies[0].points["C"] == Point(4.0, 0.0)
