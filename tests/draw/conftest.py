@@ -1,13 +1,17 @@
-"""The command line, called in this process."""
+"""The command line, called in this process; the gallery's figures, each drawn once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from kinfmu import gallery
 from kinfmu.cli import main
+from kinfmu.draw import figure
 
 
 @pytest.fixture
@@ -21,3 +25,17 @@ def run_cli() -> Callable[..., tuple[int, str, str]]:
         return result.exit_code, result.stdout, result.stderr
 
     return run
+
+
+@pytest.fixture(scope="session")
+def gallery_figure(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """`gallery_figure("fourbar")`: a fresh SVG of a mechanism of the gallery."""
+    folder = tmp_path_factory.mktemp("figures")
+
+    @cache
+    def draw(name: str) -> Path:
+        path = folder / f"{name}.svg"
+        figure(gallery.load(name), path)
+        return path
+
+    return draw

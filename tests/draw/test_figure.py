@@ -26,11 +26,11 @@ def texts_in(path: Path) -> str:
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(name: str, tmp_path: Path) -> None:
+def test_a_mechanism_of_the_gallery_is_drawn_with_all_its_names(
+    name: str, gallery_figure: Callable[[str], Path]
+) -> None:
     mechanism = gallery.load(name)
-    path = tmp_path / "figure.svg"
-    figure(mechanism, path)
-    said = texts_in(path)
+    said = texts_in(gallery_figure(name))
     assert mechanism.title in said
     assert f"x [{mechanism.length_unit}]" in said
     words = said.replace(",", " ").split()
