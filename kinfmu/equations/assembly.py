@@ -198,6 +198,9 @@ def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] 
         least = min(least, _block_margin(part.jacobian(q[list(columns)])))
         if least <= COMFORTABLE:
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
+    open_rows = np.flatnonzero(np.abs(Part(system).residual(q, u)) > CLOSED)
+    if len(open_rows):  # a cam that dwells at the random pose does not show there whom it leads
+        return None, f"the rows {listed(system.rows[k].name for k in open_rows[:5])} open when others close"
     return Assembled(q, u, least), ""
 
 
