@@ -1,4 +1,4 @@
-"""The command line: kinfmu list | new | check | solve | build | simulate | review."""
+"""The command line: kinfmu list | new | schema | check | solve | build | simulate | review."""
 
 from __future__ import annotations
 
@@ -192,6 +192,22 @@ def new(mechanism: str, file: Path) -> None:
     except OSError as error:
         raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
     click.echo(f"{file}: written; next: kinfmu check {file}")
+
+
+@main.command()
+@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), help="Where to; stdout if not said.")
+def schema(output: Path | None) -> None:
+    """The JSON Schema of mechanism files, by which editors complete and check them."""
+    from kinfmu.mechanism.schema import schema_text
+
+    if output is None:
+        click.echo(schema_text(), nl=False)
+        return
+    try:
+        output.write_text(schema_text(), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise KinfmuError(f"{output}: cannot be written ({error.strerror})") from None
+    click.echo(f"{output}: written; a mechanism file names it in its first line: #:schema {output}")
 
 
 @main.command()

@@ -11,7 +11,9 @@ from kinfmu.joints.laws.law import Law, Led
 class External(Law):
     """No law: the value comes from outside, by the FMU's inputs; until then the driver stands still.
 
-    u = start
+        u = start
+
+    start: value as long as nothing comes.
     """
 
     type: ClassVar[str] = "external"

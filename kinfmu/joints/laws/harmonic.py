@@ -16,7 +16,8 @@ class Harmonic(Law):
 
         u = start + amplitude sin(frequency x + phase)
 
-    start: middle of the motion; frequency: [rad] per unit of x, over time also in Hz; phase: [rad].
+    amplitude: half of the whole way; start: middle of the motion; frequency: [rad] per unit of x, over time also in Hz;
+    phase: [rad].
     """
 
     type: ClassVar[str] = "harmonic"
