@@ -1,0 +1,111 @@
+"""The key tables of docs/mechanism-files.md, from what the classes declare."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from kinfmu.drivers import DRIVERS
+from kinfmu.joints import JOINTS
+from kinfmu.joints.laws import LAWS, LawQuantity
+from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
+from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
+
+SHAPES = {
+    "truth": "`true` or `false`",
+    "numbers": "list of numbers",
+    "points": "list of `[x, u]`",
+    "segments": "list of tables",
+    "measure": "a measure",
+    "law": "a law, with its keys",
+}
+REFERRED = {"point": ('`"body.point"`', 'two `"body.point"`'), "body": ("a body", "two bodies")}
+
+
+def sections() -> dict[str, str]:
+    """The generated parts of the page by name, as Markdown."""
+    return {
+        "units": _units(),
+        "joints": "\n".join(_types(JOINTS, "type")),
+        "drivers": "\n".join(_types(DRIVERS, "type")),
+        "laws": "\n".join(_types(LAWS, "law")),
+    }
+
+
+def filled(page: str) -> str:
+    """The page with its generated parts written anew."""
+    for name, text in sections().items():
+        begin, end = f"<!-- generated: {name} -->", f"<!-- end: {name} -->"
+        assert page.count(begin) == page.count(end) == 1, f"the page must have {begin} and {end}, once"
+        page = re.sub(f"{begin}.*?{end}", lambda _, part=f"{begin}\n\n{text}\n\n{end}": part, page, flags=re.DOTALL)
+    return page
+
+
+def _units() -> str:
+    rows = {"length": METRES, "angle": ANGLES, "time": SECONDS}
+    lines = ["| what | units |", "|---|---|"]
+    lines += [f"| {kind} | {', '.join(f'`{unit}`' for unit in units)} |" for kind, units in rows.items()]
+    lines += [
+        "| speed | such as `mm/s`, `m/min` |",
+        "| angular speed | such as `rad/s`, `deg/s`, `rev/min`; `rpm`; `Hz`, a whole wave or turn in a second |",
+        "| acceleration | such as `mm/s2`, `deg/s2`; higher rates such as `mm/s3` alike |",
+        "| per angle or length | for cams and couplings, such as `mm/rad`, `mm/deg2`, `rad/mm` |",
+        "| number | none |",
+    ]
+    return "\n".join(lines)
+
+
+def _types(classes: Iterable[Any], word: str) -> Iterable[str]:
+    blocks = []
+    for cls in classes:
+        lines = [f'### `{word} = "{cls.type}"`', "", f"{summary_of(cls)}.", ""]
+        equation = _equation(cls)
+        if equation:
+            lines += [*(f"    {line}" for line in equation), ""]
+        lines += ["| key | value | if not said | meaning |", "|---|---|---|---|"]
+        lines += [f"| `{key.name}` | {_value(key)} | {_default(key)} | {_cell(key.meaning)} |" for key in keys_of(cls)]
+        if cls.type == "spline":
+            lines.append("| `file` | name of a CSV file | | two columns, in place of `points` |")
+        blocks.append("\n".join(lines))
+    return ["\n\n".join(blocks)]
+
+
+def _equation(cls: Any) -> list[str]:
+    """The lines set in below the first line of the docstring, or of that of the class it is derived from."""
+    for base in cls.__mro__:
+        lines = [line.strip() for line in (base.__doc__ or "").splitlines() if line.startswith(" " * 8)]
+        if lines:
+            return [re.sub(r"\s{2,}", "    ", line) for line in lines]
+    return []
+
+
+def _value(key: Key) -> str:
+    if key.takes == "number":
+        return _measured(key.measures)
+    if key.takes in SHAPES:
+        return SHAPES[key.takes]
+    assert key.refers is not None
+    if key.refers.kind == "choice":
+        return " or ".join(f'`"{choice}"`' for choice in key.refers.choices)
+    return REFERRED[key.refers.kind][key.takes == "pair"]
+
+
+def _measured(measures: Quantity | LawQuantity | None) -> str:
+    if isinstance(measures, LawQuantity):
+        base = {"led": "as u", "argument": "as x"}.get(measures.of, measures.of)
+        return base + (" per x" if measures.order else "")
+    assert measures is not None
+    return measures.kind
+
+
+def _default(key: Key) -> str:
+    if key.default is REQUIRED:
+        return "must be said"
+    if isinstance(key.default, bool):
+        return f"`{str(key.default).lower()}`"
+    return f'`"{key.default}"`' if isinstance(key.default, str) else f"{key.default:g}"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|")
