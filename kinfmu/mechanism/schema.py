@@ -183,6 +183,7 @@ def _value(key: Key) -> Schema:
         "numbers": _list(_ref("number"), 1),
         "points": _list(_ref("xy"), 2),
         "segments": _list(_ref("segment"), 1),
+        "measure": {"type": "object", "required": ["measure"]},
     }
     default = {} if key.default is REQUIRED else {"default": key.default}
     shape = shapes[key.takes]

@@ -97,6 +97,7 @@ def value(takes: str, refers: str, name: str) -> Any:
         "pair": pairs.get(refers),
         "numbers": [1, "2 deg/s"],
         "points": [[0, 0], [1, 1], [2, 0], [3, "1"]],
+        "measure": {"measure": "angle", "of": "rod"},
         "segments": [{"law": "cycloidal", "rise": 1, "duration": 2}, {"law": "dwell", "duration": 1}],
     }
     return shapes[takes]
