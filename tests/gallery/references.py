@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from tests.gallery.geometry import LEFT, RIGHT, Quantity, Vector, decimal, degrees, heading, meet, turned
 from tests.oracle import solve
-from tests.power_series import Series, asin, mp, sqrt
+from tests.power_series import Series, asin, mp, sin, sqrt
 
 Law = Callable[[Series], Series]  # the driven quantity over time, both as series
 Coordinates = dict[str, Quantity]
@@ -56,9 +56,40 @@ def turning(start: float, speed: float) -> Law:
     return lambda t: t * degrees(speed) + degrees(start)
 
 
-def moving(start: float, speed: float) -> Law:
-    """A constant speed in lengths a second."""
-    return lambda t: t * decimal(speed) + decimal(start)
+def swinging(middle: float, amplitude: float, hertz: float, phase: float = 0) -> Law:
+    """A harmonic motion, phase in degrees."""
+    return lambda t: sin(t * (2 * mp.pi * decimal(hertz)) + degrees(phase)) * decimal(amplitude) + decimal(middle)
+
+
+def in_degrees(law: Law) -> Law:
+    """A law whose values are degrees."""
+    return lambda t: law(t) * (mp.pi / 180)
+
+
+def rising(start: float, *rises: tuple[float, float, float], shape: Callable[[Series], Series]) -> Law:
+    """Rises (begin, duration, rise), each along a curve from 0 at 0 to 1 at 1."""
+
+    def law(t: Series) -> Series:
+        value = t * 0 + decimal(start)
+        for begin, duration, rise in rises:
+            part = (t - decimal(begin)) / decimal(duration)
+            if part.c[0] >= 1:
+                value = value + decimal(rise)
+            elif part.c[0] > 0:
+                value = value + shape(part) * decimal(rise)
+        return value
+
+    return law
+
+
+def three_four_five(x: Series) -> Series:
+    """10 x^3 - 15 x^4 + 6 x^5."""
+    return x * x * x * (x * (x * 6 - 15) + 10)
+
+
+def cycloidal(x: Series) -> Series:
+    """x - sin(2 pi x) / (2 pi)."""
+    return x - sin(x * (2 * mp.pi)) / (2 * mp.pi)
 
 
 def point(name: str, at: Vector) -> Coordinates:
@@ -121,7 +152,7 @@ def double_crank(u: Series) -> Coordinates:
     return {"crank.phi": u, **body("coupler", p, heading(q - p, u + 1)), "follower.phi": heading(q - c, u)}
 
 
-@reference(left_angle=turning(50, 10))
+@reference(left_angle=in_degrees(swinging(65, 17, 0.5)))
 def triple_rocker(u: Series) -> Coordinates:
     """Roberts's linkage: rockers 65 on a ground of 100, a coupler of 50 with its tracer 65 from both pins."""
     b = Vector(100, 0)
@@ -291,7 +322,7 @@ def jansen_leg(u: Series) -> Coordinates:
     }
 
 
-@reference(stylus_x_position=moving(60, 10), stylus_y_position=moving(20, 5))
+@reference(stylus_x_position=swinging(80, 20, 0.25, 90), stylus_y_position=swinging(30, 20, 0.25))
 def pantograph(x: Series, y: Series) -> Coordinates:
     """A parallelogram of 80 on arms of 240: the pen is where the stylus would be, three times as far from O."""
     stylus = Vector(x, y)
@@ -308,7 +339,7 @@ def pantograph(x: Series, y: Series) -> Coordinates:
     }
 
 
-@reference(piston_position=moving(-44, 3))
+@reference(piston_position=rising(-44, (0, 1.5, 12), (2.5, 1.5, -12), shape=cycloidal))
 def parallel_jaw(y: Series) -> Coordinates:
     """Bell cranks of 60 and 20 about (35, 0), moved by rods of 40 from (10, y); jaws on parallelograms; mirrored."""
     pivot, pin = Vector(35, 0), Vector(10, y)
@@ -361,9 +392,9 @@ def geared_five_bar(u: Series) -> Coordinates:
 
 
 @reference(
-    boom_cylinder_length=moving(2.25, 0.08),
-    stick_cylinder_length=moving(2.45, 0.09),
-    bucket_cylinder_length=moving(1.85, 0.1),
+    boom_cylinder_length=rising(2.25, (1, 4, 0.4), shape=three_four_five),
+    stick_cylinder_length=rising(2.45, (0, 4, 0.45), shape=three_four_five),
+    bucket_cylinder_length=rising(1.85, (0.5, 4, 0.5), shape=three_four_five),
 )
 def excavator(boom_length: Series, stick_length: Series, bucket_length: Series) -> Coordinates:
     """Boom, stick and bucket, each by the triangle that its cylinder spans; the bucket behind a four-bar linkage."""
@@ -405,7 +436,7 @@ def _angle(way: Vector) -> Quantity:
     return mp.atan2(way.y, way.x)
 
 
-@reference(steering_angle=turning(-300, 60))
+@reference(steering_angle=in_degrees(swinging(0, 300, 0.1)))
 def rack_steering(u: Series) -> Coordinates:
     """A pinion of radius 8 moves the rack; tie rods of 270 turn arms (30, -100) about (-650, 0) and (650, 0)."""
     way = u * 8
