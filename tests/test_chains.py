@@ -51,10 +51,13 @@ def test_alike_blocks_share_one_function() -> None:
     assert emit(compile_plan(fourbar_chain(3))).count("def position") == 1
 
 
-def test_shared_code_and_code_of_its_own_agree_to_the_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("many", [1, 1000])
+def test_shared_code_and_code_of_its_own_agree_to_the_bit(monkeypatch: pytest.MonkeyPatch, many: int) -> None:
     t = np.linspace(0.0, 1.5, 7)
+    monkeypatch.setattr("kinfmu.backends.python.emit.MANY", many)
     shared = kinfmu.solve(fourbar_chain(12), t)
     monkeypatch.setattr("kinfmu.backends.python.alike.SHARED_FROM", 100)
+    monkeypatch.setattr("kinfmu.backends.python.emit.MANY", 1000)
     own = kinfmu.solve(fourbar_chain(12), t)
     for name in ("values", "rates", "accelerations", "residual", "margin", "error"):
         np.testing.assert_array_equal(getattr(shared, name), getattr(own, name))

@@ -47,6 +47,8 @@ from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
 
+MANY = 64  # unknowns; beyond, a name for each of their parts would make functions of tens of thousands of names
+
 
 def emit(plan: SolvePlan) -> str:
     """Source text of the model module; equal plans give equal text."""
@@ -60,6 +62,7 @@ class _Emitter:
         curves = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
         self.curves = {data: f"CURVE_{k}" for k, data in enumerate(curves, start=1)}
         self.unknowns = plan.unknowns
+        self.many = len(self.unknowns) > MANY
         first = 0
         self.places: list[tuple[int, int]] = []  # first and last + 1 of each solved block's unknowns
         for block in self.solved:
@@ -165,6 +168,7 @@ class _Emitter:
         if large:
             imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
         kinds = tuple(driver.quantity.kind for driver in plan.drivers)
+        factors = tuple(1.0 / block.determinant_scale for block in self.solved)
         rows, scales = tuple(b.row_names for b in self.solved), tuple(b.row_scales for b in self.solved)
         reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
         return [
@@ -190,6 +194,7 @@ class _Emitter:
             f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
             f"BLOCKS = {tuple(self.places)!r}",
             f"ANCHOR = {(anchor_u, anchor_z)!r}",
+            *([f"DETERMINANT_FACTORS = {factors!r}"] if self.many else []),
             *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
             *(f"{name} = {data!r}" for data, name in self.curves.items()),
             "",
@@ -225,22 +230,24 @@ class _Emitter:
             lines += ["    half = 0.5 * s"]
             if len(self.solved) > 1:
                 lines += ["    largest, iterations = 0.0, 0"]
-            for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
-                lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
-            for k, name in enumerate(self.unknowns):
-                lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
+            lines += self._predicted()
         for number, block in self.order:
             lines += indented(assigned_lines(writer, block) if number is None else self._solved(writer, number, block))
         z = tupled(identifier(name) for name in self.unknowns)
         values = tupled(self.exports)
-        margin = "1.0"
-        if self.solved:
+        margin, determinants = "1.0", "()"
+        if self.many:
+            raw = tupled(f"det{k}" for k in range(1, len(self.solved) + 1))
+            lines.append(f"    determinants = tuple([a * b for a, b in zip({raw}, DETERMINANT_FACTORS)])")
+            lines.append(f"    found = {z}")
+            margin, determinants, z = "min(map(abs, determinants))", "determinants", "found"
+        elif self.solved:
             lines += [
                 f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
             ]
+            determinants = tupled(f"m{k}" for k in range(1, len(self.solved) + 1))
             sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
             margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
-        determinants = tupled(f"m{k}" for k in range(1, len(self.solved) + 1))
         summary = "1.0, 0.0, 0, 0.0"
         if self.solved:
             error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
@@ -251,8 +258,25 @@ class _Emitter:
         summary += ", " + (f"max({', '.join(watched)})" if len(watched) > 1 else "".join(watched) or "0.0")
         return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
 
+    def _predicted(self) -> list[str]:
+        """Unknowns as predicted, by their names; of many unknowns in one go, so that the function stays small."""
+        if self.many:
+            names = tupled(identifier(name) for name in self.unknowns)
+            return [
+                "    predicted = [a + s * (b + half * c) for a, b, c in zip(z, zd, zdd)]",
+                f"    {names} = predicted",
+            ]
+        lines = []
+        for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
+            lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
+        for k, name in enumerate(self.unknowns):
+            lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
+        return lines
+
     def _moved(self) -> str:
         """The largest correction of a prediction, in radians and sizes."""
+        if self.many:
+            return "max([abs(a - b) / c for a, b, c in zip(found, predicted, UNKNOWN_SCALES)])"
         moves = []
         for k, name in enumerate(self.unknowns):
             move = f"abs({identifier(name)} - p{k})"
@@ -261,7 +285,7 @@ class _Emitter:
 
     def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
         """Statements of a block that needs Newton: its own, or a call of what alike blocks share."""
-        starts = [f"z{place}" for place in range(*self.places[k])]
+        starts = [f"z[{place}]" if self.many else f"z{place}" for place in range(*self.places[k])]
         if k in self.calls:
             lines = [self.calls[k].position(starts, map(identifier, block.unknowns))]
         else:
@@ -403,6 +427,10 @@ class _Emitter:
             lines = unpacking(rates, "first")
             return lines if order == 1 else lines + unpacking(accelerations, "second")
         speed, more = identifier(self.inputs[1][0]), identifier(self.inputs[2][0])
+        if self.many:
+            lines = unpacking(rates, f"[d * {speed} for d in first]")
+            given = f"[a * {speed} * {speed} + d * {more} for a, d in zip(second, first)]"
+            return lines if order == 1 else lines + unpacking(accelerations, given)
         lines = unpacking([f"d{k}" for k in range(len(rates))], "first")
         lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
         if order == 2:
