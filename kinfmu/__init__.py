@@ -30,7 +30,11 @@ if TYPE_CHECKING:
     from kinfmu.gallery import load as load
     from kinfmu.gallery import save as save
     from kinfmu.joints import Angle as Angle
+    from kinfmu.joints import CamOscillating as CamOscillating
+    from kinfmu.joints import CamRoller as CamRoller
+    from kinfmu.joints import CamTranslating as CamTranslating
     from kinfmu.joints import Coordinate as Coordinate
+    from kinfmu.joints import Coupling as Coupling
     from kinfmu.joints import Distance as Distance
     from kinfmu.joints import Fixed as Fixed
     from kinfmu.joints import Gear as Gear
@@ -52,6 +56,11 @@ if TYPE_CHECKING:
     from kinfmu.joints.laws import Segment as Segment
     from kinfmu.joints.laws import SimpleHarmonic as SimpleHarmonic
     from kinfmu.joints.laws import Spline as Spline
+    from kinfmu.joints.measures import AngleBetween as AngleBetween
+    from kinfmu.joints.measures import CoordinateOf as CoordinateOf
+    from kinfmu.joints.measures import DistanceBetween as DistanceBetween
+    from kinfmu.joints.measures import OffsetFrom as OffsetFrom
+    from kinfmu.joints.measures import PositionAlong as PositionAlong
     from kinfmu.mechanism import Body as Body
     from kinfmu.mechanism import Mechanism as Mechanism
     from kinfmu.mechanism import Parameter as Parameter
@@ -67,13 +76,20 @@ __version__ = VERSION
 
 _HOME = {
     "Angle": "kinfmu.joints",
+    "AngleBetween": "kinfmu.joints.measures",
     "AngleDriver": "kinfmu.drivers",
     "Body": "kinfmu.mechanism",
+    "CamOscillating": "kinfmu.joints",
+    "CamRoller": "kinfmu.joints",
+    "CamTranslating": "kinfmu.joints",
     "ConstantSpeed": "kinfmu.joints.laws",
     "Coordinate": "kinfmu.joints",
     "CoordinateDriver": "kinfmu.drivers",
+    "CoordinateOf": "kinfmu.joints.measures",
+    "Coupling": "kinfmu.joints",
     "Cycloidal": "kinfmu.joints.laws",
     "Distance": "kinfmu.joints",
+    "DistanceBetween": "kinfmu.joints.measures",
     "DistanceDriver": "kinfmu.drivers",
     "External": "kinfmu.joints.laws",
     "Fixed": "kinfmu.joints",
@@ -84,12 +100,14 @@ _HOME = {
     "ModifiedSine": "kinfmu.joints.laws",
     "ModifiedTrapezoid": "kinfmu.joints.laws",
     "MotionSequence": "kinfmu.joints.laws",
+    "OffsetFrom": "kinfmu.joints.measures",
     "Parameter": "kinfmu.mechanism",
     "Point": "kinfmu.mechanism",
     "PointOnLine": "kinfmu.joints",
     "Polynomial": "kinfmu.joints.laws",
     "Polynomial345": "kinfmu.joints.laws",
     "Polynomial4567": "kinfmu.joints.laws",
+    "PositionAlong": "kinfmu.joints.measures",
     "RackAndPinion": "kinfmu.joints",
     "RelativeAngle": "kinfmu.joints",
     "RelativeAngleDriver": "kinfmu.drivers",
@@ -117,13 +135,20 @@ _ROOMS = ("draw", "log")
 __all__ = [
     "VERSION",
     "Angle",
+    "AngleBetween",
     "AngleDriver",
     "Body",
+    "CamOscillating",
+    "CamRoller",
+    "CamTranslating",
     "ConstantSpeed",
     "Coordinate",
     "CoordinateDriver",
+    "CoordinateOf",
+    "Coupling",
     "Cycloidal",
     "Distance",
+    "DistanceBetween",
     "DistanceDriver",
     "External",
     "Fixed",
@@ -134,12 +159,14 @@ __all__ = [
     "ModifiedSine",
     "ModifiedTrapezoid",
     "MotionSequence",
+    "OffsetFrom",
     "Parameter",
     "Point",
     "PointOnLine",
     "Polynomial",
     "Polynomial345",
     "Polynomial4567",
+    "PositionAlong",
     "RackAndPinion",
     "RelativeAngle",
     "RelativeAngleDriver",

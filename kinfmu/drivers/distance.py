@@ -30,4 +30,4 @@ class DistanceDriver(Driver):
     law: Law = field(default_factory=ConstantSpeed)
 
     def measured(self) -> DistanceBetween:
-        return DistanceBetween(*self.between)
+        return DistanceBetween(self.between)

@@ -32,4 +32,4 @@ class SlideDriver(Driver):
     law: Law = field(default_factory=ConstantSpeed)
 
     def measured(self) -> PositionAlong:
-        return PositionAlong(*self.between, self.axis)
+        return PositionAlong(self.between, self.axis)

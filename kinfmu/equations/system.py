@@ -191,7 +191,7 @@ def size_of(mechanism: Mechanism) -> float:
         xy = np.array(points or [(0.0, 0.0)], dtype=float)
         longest = max(longest, float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0)))))
     for joint in mechanism.joints:
-        longest = max(longest, float(getattr(joint, "length", 0.0)))
+        longest = max(longest, float(joint.reach()))
     return longest or 1.0 / METRES[mechanism.length_unit]
 
 

@@ -11,6 +11,7 @@ from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
 from kinfmu.solver.curve import CurveData
 from kinfmu.solver.curve import curve as curve_value
 
+_NOTHING = 1e-100  # in place of a length of 0 whose derivative is asked for: what stands still stays so, nothing fails
 Derivative = Any  # float, or (n,) for n lines at once
 
 
@@ -83,7 +84,8 @@ def _(x: Taylor) -> Taylor:
 @sqrt.register
 def _(x: Taylor) -> Taylor:
     root = float(np.sqrt(x.f))
-    return _chain(x, root, 0.5 / root, -0.25 / (root * x.f))
+    slope = 0.5 / (root or _NOTHING)
+    return _chain(x, root, slope, -2.0 * slope * slope * slope)
 
 
 @floor.register
@@ -100,7 +102,7 @@ def _(x: Taylor, data: CurveData, order: int = 0) -> Taylor:
 def _(like: Taylor, y: Taylor | float, x: Taylor | float) -> Taylor:  # noqa: ARG001
     """w = (x y' - y x') / r^2 and w' = (x y'' - y x'' - 2 w (x x' + y y')) / r^2."""
     y, x = _lifted(y), _lifted(x)
-    squared = x.f * x.f + y.f * y.f
+    squared = x.f * x.f + y.f * y.f or _NOTHING
     d1 = (x.f * y.d1 - y.f * x.d1) / squared
     d2 = (x.f * y.d2 - y.f * x.d2 - 2.0 * d1 * (x.f * x.d1 + y.f * y.d1)) / squared
     return Taylor(float(np.arctan2(y.f, x.f)), d1, d2)

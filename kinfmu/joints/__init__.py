@@ -6,7 +6,11 @@ Adding a joint is one file and one line here.
 from __future__ import annotations
 
 from kinfmu.joints.angle import Angle
+from kinfmu.joints.cam_oscillating import CamOscillating
+from kinfmu.joints.cam_roller import CamRoller
+from kinfmu.joints.cam_translating import CamTranslating
 from kinfmu.joints.coordinate import Coordinate
+from kinfmu.joints.coupling import Coupling
 from kinfmu.joints.distance import Distance
 from kinfmu.joints.fixed import Fixed
 from kinfmu.joints.gear import Gear
@@ -29,13 +33,21 @@ JOINTS: tuple[type[Joint], ...] = (
     RelativeAngle,
     Gear,
     RackAndPinion,
+    CamTranslating,
+    CamOscillating,
+    CamRoller,
+    Coupling,
 )
 
 __all__ = [
     "GROUND",
     "JOINTS",
     "Angle",
+    "CamOscillating",
+    "CamRoller",
+    "CamTranslating",
     "Coordinate",
+    "Coupling",
     "Distance",
     "Fixed",
     "Gear",

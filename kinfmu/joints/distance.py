@@ -29,6 +29,9 @@ class Distance(Held):
     between: PointPair
     length: Length
 
+    def reach(self) -> float:
+        return self.length
+
     def check(self) -> None:
         if not self.length >= SHORTEST:  # NaN too
             raise MechanismError(
@@ -37,4 +40,4 @@ class Distance(Held):
             )
 
     def measured(self) -> tuple[DistanceBetween, float]:
-        return DistanceBetween(*self.between), self.length
+        return DistanceBetween(self.between), self.length

@@ -22,6 +22,11 @@ class Joint(ABC):
     labels: ClassVar[tuple[str, ...]]  # one word a row, such as "x"
     name: str
 
+    @property
+    def is_tied(self) -> bool:
+        """True if it depends on where the world's origin lies and `moved` cannot make up for it."""
+        return False
+
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
         """Names of the bodies that the rows touch, ground included."""
@@ -36,6 +41,10 @@ class Joint(ABC):
     def moved(self, dx: float, dy: float) -> Joint:  # noqa: ARG002  absolute joints depend on it
         """The joint when the whole mechanism stands elsewhere; the same unless it is absolute."""
         return self
+
+    def reach(self) -> float:
+        """The largest length that it holds by itself [length]: what the size of a mechanism counts besides bodies."""
+        return 0.0
 
     def scales(self) -> tuple[float, ...]:
         """Residual per unit of the row's kind, one a row: |residual| / scale is the gap, to first order."""
@@ -66,6 +75,10 @@ class Held(Joint):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         measure, value = self.measured()
         return (measure.row(at, value),)
+
+    def reach(self) -> float:
+        """The largest length that it holds by itself [length]: what the size of a mechanism counts besides bodies."""
+        return 0.0
 
     def scales(self) -> tuple[float, ...]:
         measure, value = self.measured()

@@ -27,4 +27,4 @@ class PointOnLine(Held):
     axis: Radians = 0.0
 
     def measured(self) -> tuple[OffsetFrom, float]:
-        return OffsetFrom(*self.between, self.axis), 0.0
+        return OffsetFrom(self.between, self.axis), 0.0

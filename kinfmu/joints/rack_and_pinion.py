@@ -45,6 +45,6 @@ class RackAndPinion(Joint):
         return (*map(body_of, self.between), self.pinion)
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        way = PositionAlong(*self.between, self.axis).value(at)
+        way = PositionAlong(self.between, self.axis).value(at)
         turn = AngleBetween(self.pinion, body_of(self.between[0])).value(at)
         return (way - self.radius * turn - self.offset,)

@@ -34,7 +34,7 @@ class Translational(Joint):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         i, j = self.bodies()
         return (
-            OffsetFrom(*self.between, self.axis).row(at, 0.0),
+            OffsetFrom(self.between, self.axis).row(at, 0.0),
             AngleBetween(j, i).row(at, self.angle),
         )
 

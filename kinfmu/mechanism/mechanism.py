@@ -11,7 +11,8 @@ from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.placement import Reference
+from kinfmu.joints.measures import Measure
+from kinfmu.joints.placement import Reference, is_pair
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
@@ -259,18 +260,25 @@ def _check_body_itself(body: Body) -> None:
 
 def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
     table = "joints" if isinstance(member, Joint) else "drivers"
-    cls: object = type(member)
-    hints = hints_of(cls)
-    for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
-        where, value = f"[{table}.{member.name}] {key.name}", getattr(member, key.name)
-        for said in getattr(hints[key.name], "__metadata__", ()):
-            if isinstance(said, Reference):
-                _check_reference(bodies, where, value, said, is_pair=hints[key.name].__origin__ is not str)
+    _check_fields(bodies, f"[{table}.{member.name}] ", member)
     touched = member.bodies()
     if len(touched) > 1 and len(set(touched)) == 1:
         raise MechanismError(f"[{table}.{member.name}] joins body '{touched[0]}' to itself")
     if set(touched) == {GROUND_NAME}:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
+
+
+def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure) -> None:
+    """What its fields refer to; `before` is said before the key."""
+    cls: object = type(member)
+    hints = hints_of(cls)
+    for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+        where, value = f"{before}{key.name}", getattr(member, key.name)
+        if isinstance(value, Measure):
+            _check_fields(bodies, f"{where}.", value)
+        for said in getattr(hints[key.name], "__metadata__", ()):
+            if isinstance(said, Reference) and not (value is None and key.default is None):
+                _check_reference(bodies, where, value, said, is_pair=is_pair(hints[key.name]))
 
 
 def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:

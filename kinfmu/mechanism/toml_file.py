@@ -13,6 +13,8 @@ from kinfmu.drivers import DRIVERS, Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.joints.laws import LAWS, External, Law
+from kinfmu.joints.measures import MEASURES, Measure
+from kinfmu.joints.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.law_table import law_keys, law_lines, read_law
@@ -180,13 +182,25 @@ class _Reader:
             quantity = next((m for m in getattr(hints[key.name], "__metadata__", ()) if isinstance(m, Quantity)), None)
             if quantity is not None:
                 values[key.name] = self.number(spot, value, quantity)
-            elif getattr(hints[key.name], "__origin__", None) is str:
+            elif hints[key.name] is Measure:
+                values[key.name] = self.measure(spot, value)
+            elif not is_pair(hints[key.name]):
                 values[key.name] = _text(spot, value)
             else:
                 if not isinstance(value, list) or len(value) != 2:
                     raise MechanismError(f"{spot} = {quoted(value)} must be two points ['body.point', 'body.point']")
                 values[key.name] = tuple(_text(spot, v, "text such as 'body.point'") for v in value)
         return values
+
+    def measure(self, where: str, table: Any) -> Measure:
+        """A measure from a table such as { measure = "angle", of = "rocker" }."""
+        if not isinstance(table, dict):
+            example = '{ measure = "angle", of = "rocker" }'
+            raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
+        cls = _chosen(where, table, "measure", MEASURES)
+        _known_keys(where, table, ("measure", *_keys(cls)))
+        measure: Measure = cls(**self.values(where, cls, table))
+        return measure
 
 
 def _parameter(name: str, value: Any) -> Parameter:
@@ -307,6 +321,10 @@ def _written(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
 def _toml(value: object) -> str:
     if isinstance(value, Computed):
         value = value.expression.text
+    if isinstance(value, Measure):
+        keys = {key: getattr(value, key) for key in _keys(type(value))}
+        said = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in said.items()) + " }"
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'

@@ -13,13 +13,14 @@ FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned a
 def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     """The mechanism as seen from its own origin, and where that lies in the world [length].
 
-    The origin is the first ground point if the mechanism lies far off, else the world's (also where a driver drives a
-    coordinate of the world): constraints do not depend on
-    it, and rounding then is relative to the size and not to the offset.
+    The origin is the first ground point if the mechanism lies far off, else the world's (also where a driver or a law
+    leads a coordinate of the world): constraints do not depend on it, and rounding then is relative to the size and not
+    to the offset.
     """
     ground = next(body for body in mechanism.bodies if body.is_ground)
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
     is_tied = any(driver.measured().is_absolute for driver in mechanism.drivers)
+    is_tied = is_tied or any(joint.is_tied for joint in mechanism.joints)
     if is_tied or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first

@@ -7,19 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from kinfmu.drivers import Driver
-from kinfmu.equations.system import System
-from kinfmu.joints import Joint
-from kinfmu.joints.laws import LAWS, RISES, Law, MotionSequence, Polynomial, Segment, Spline
+from kinfmu.equations.system import System, placement
+from kinfmu.joints import CamRoller, Coupling, Joint
+from kinfmu.joints.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
 from kinfmu.joints.laws.law import number_fields
 from kinfmu.joints.laws.spline import ENDS, PERIODIC
-from kinfmu.joints.placement import Reference
+from kinfmu.joints.measures import MEASURES, DistanceBetween, Measure
+from kinfmu.joints.placement import Reference, is_pair
 from kinfmu.mechanism import Body, Mechanism, Point, Start
 from kinfmu.units import Quantity
 from tests.power_series import Series
@@ -42,13 +43,17 @@ def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrateg
 
 def _values(cls: type[Any], key: str, hint: Any) -> st.SearchStrategy[Any]:
     if hint is Law:
-        return st.sampled_from(LAWS).flatmap(laws)
+        if issubclass(cls, Driver):
+            return st.sampled_from(LAWS).flatmap(laws)
+        return pitch_curves() if cls is CamRoller else lifts()
+    if hint is Measure:
+        return st.sampled_from(MEASURES).flatmap(measures)
     for said in getattr(hint, "__metadata__", ()):
         if isinstance(said, Quantity):
             return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[said.kind]
         if isinstance(said, Reference):
             beside = "between" in {field.name for field in fields(cls)}
-            return _references(said, is_pair=bool(get_args(hint.__origin__)), beside=beside)
+            return _references(said, is_pair=is_pair(hint), beside=beside)
     raise NotImplementedError(f"{cls.__name__}.{key}: tests/joints/drawn.py does not know how to draw {hint}")
 
 
@@ -75,6 +80,36 @@ def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
     if cls is Spline:
         return st.sampled_from(ENDS).flatmap(splines)
     return st.builds(cls, **numbers)
+
+
+def lifts() -> st.SearchStrategy[Law]:
+    """Laws of a cam's angle, of moderate slope: derivatives of derivatives are compared to round-off."""
+    small, slow = st.floats(-1.0, 1.0).map(lambda x: round(x, 3)), st.floats(2.0, 6.0)
+    rises = st.sampled_from(RISES).flatmap(lambda cls: st.builds(cls, small, slow, small, small))
+    harmonics = st.builds(Harmonic, small, st.sampled_from([1.0, 2.0, 0.5]), small, small)
+    polynomials = st.builds(Polynomial, st.lists(small, min_size=1, max_size=3).map(tuple))
+    return rises | harmonics | polynomials | splines("natural")
+
+
+def pitch_curves() -> st.SearchStrategy[Law]:
+    """Radii over a turn."""
+    whole = st.builds(Harmonic, st.floats(0.1, 0.5), st.sampled_from([1.0, 2.0]), st.floats(1.0, 2.0), angles)
+    return whole | st.builds(lambda r: Polynomial((r,)), st.floats(1.0, 2.0))
+
+
+def measures(cls: type[Measure]) -> st.SearchStrategy[Measure]:
+    """Measures of a class between the bodies left and right."""
+    drawn: dict[str, st.SearchStrategy[Any]] = {}
+    hints = get_type_hints(cls, include_extras=True)
+    for key in fields(cls):  # type: ignore[arg-type]  # every leaf is a dataclass
+        (said,) = hints[key.name].__metadata__
+        if isinstance(said, Quantity):
+            drawn[key.name] = angles
+        elif key.name == "to":
+            drawn[key.name] = st.sampled_from([None, "third"])
+        else:
+            drawn[key.name] = _references(said, is_pair=is_pair(hints[key.name]), beside=False)
+    return st.builds(cls, **drawn)
 
 
 @st.composite
@@ -104,6 +139,23 @@ def systems(draw: st.DrawFn, member: type[Joint] | type[Driver], **given: st.Sea
     one = draw(members(member, **given))
     of_kind: Mapping[str, Any] = {"joints": (one,)} if isinstance(one, Joint) else {"drivers": (one,)}
     return System(Mechanism("drawn", tuple(bodies), **of_kind))
+
+
+def are_apart(system: System, q: NDArray[np.float64]) -> bool:
+    """True unless points whose distance the joint measures lie so near each other that its derivatives are large."""
+    at = placement(system.mechanism, q)
+    pairs = []
+    for joint in system.mechanism.joints:
+        if isinstance(joint, CamRoller):
+            pairs.append(joint.between)
+        elif isinstance(joint, Coupling):
+            pairs += [m.between for m in (joint.input, joint.output) if isinstance(m, DistanceBetween)]
+    return all(DistanceBetween(pair).value(at) >= 1.0 for pair in pairs)
+
+
+def regular_poses(system: System) -> st.SearchStrategy[NDArray[np.float64]]:
+    """All coordinates q, where the joint is smooth."""
+    return poses(system).filter(lambda q: are_apart(system, q))
 
 
 def poses(system: System) -> st.SearchStrategy[NDArray[np.float64]]:

@@ -33,7 +33,8 @@ def changed(old: str, new: str) -> str:
 
 
 TYPES = (
-    "revolute, translational, fixed, distance, point_on_line, coordinate, angle, relative_angle, gear, rack_and_pinion"
+    "revolute, translational, fixed, distance, point_on_line, coordinate, angle, relative_angle, gear, "
+    "rack_and_pinion, cam_translating, cam_oscillating, cam_roller, coupling"
 )
 LAWS = (
     "constant_speed, polynomial, harmonic, simple_harmonic, cycloidal, modified_sine, modified_trapezoid, 3-4-5, "

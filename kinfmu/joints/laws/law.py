@@ -82,6 +82,11 @@ class Law(ABC):
             if measures.is_positive and not value > 0.0:
                 raise MechanismError(f"{where} {path[0]} = {float(value)!r} must be positive")
 
+    @property
+    def repeats(self) -> bool:
+        """True if it is meant to repeat: if its table says so."""
+        return False
+
     def why_not_periodic(self, period: float, told: str) -> str:  # noqa: ARG002  periodic laws need both
         """Why f(x + period) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
 

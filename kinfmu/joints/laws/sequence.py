@@ -109,6 +109,10 @@ class MotionSequence(Law):
             if segment.law == DWELL and segment.rise != 0.0:
                 raise MechanismError(f"{where} segments: segment {k} is a dwell, which has no rise")
 
+    @property
+    def repeats(self) -> bool:
+        return self.repeat
+
     def why_not_periodic(self, period: float, told: str) -> str:
         if not self.repeat:
             return "its sequence does not repeat; say repeat = true"

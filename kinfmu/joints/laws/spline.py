@@ -88,6 +88,10 @@ class Spline(Law):
                     f"{where} points: the last value {last!r} must be the first, {first!r}, with ends = 'periodic'"
                 )
 
+    @property
+    def repeats(self) -> bool:
+        return self.ends == PERIODIC
+
     def why_not_periodic(self, period: float, told: str) -> str:
         if self.ends != PERIODIC:
             return "its table does not repeat; say ends = 'periodic'"

@@ -8,4 +8,14 @@ from kinfmu.joints.measures.distance import DistanceBetween
 from kinfmu.joints.measures.measure import Measure
 from kinfmu.joints.measures.slide import OffsetFrom, PositionAlong
 
-__all__ = ["AngleBetween", "CoordinateOf", "DistanceBetween", "Measure", "OffsetFrom", "PositionAlong"]
+MEASURES: tuple[type[Measure], ...] = (AngleBetween, CoordinateOf, DistanceBetween, PositionAlong, OffsetFrom)
+
+__all__ = [
+    "MEASURES",
+    "AngleBetween",
+    "CoordinateOf",
+    "DistanceBetween",
+    "Measure",
+    "OffsetFrom",
+    "PositionAlong",
+]

@@ -7,18 +7,19 @@ from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.measures.measure import Measure
-from kinfmu.joints.placement import Placement, body_of
+from kinfmu.joints.placement import Axis, Placement, PointName, body_of
 
 
 @dataclass(frozen=True)
 class CoordinateOf(Measure):
     """World coordinate of a point, along axis 'x' or 'y'."""
 
+    type: ClassVar[str] = "coordinate"
     kind: ClassVar[str] = "length"
     is_absolute: ClassVar[bool] = True
 
-    of: str
-    axis: str
+    of: PointName
+    axis: Axis
 
     def bodies(self) -> tuple[str, ...]:
         return (body_of(self.of),)

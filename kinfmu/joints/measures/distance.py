@@ -8,20 +8,20 @@ from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value, sqrt
 from kinfmu.joints.measures.measure import Measure
-from kinfmu.joints.placement import Placement, body_of
+from kinfmu.joints.placement import Placement, PointPair, body_of
 
 
 @dataclass(frozen=True)
 class DistanceBetween(Measure):
     """Distance of two points, L = |d|; its row d.d - L^2 needs no root and is smooth for every d."""
 
+    type: ClassVar[str] = "distance"
     kind: ClassVar[str] = "length"
 
-    a: str
-    b: str
+    between: PointPair
 
     def bodies(self) -> tuple[str, ...]:
-        return body_of(self.a), body_of(self.b)
+        return tuple(map(body_of, self.between))
 
     def value(self, at: Placement) -> Value:
         return sqrt(self._squared(at))
@@ -36,7 +36,6 @@ class DistanceBetween(Measure):
         return math.sqrt(max(residual + target * target, 0.0)) - target
 
     def _squared(self, at: Placement) -> Value:
-        a_x, a_y = at.point(self.a)
-        b_x, b_y = at.point(self.b)
+        (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
         d_x, d_y = b_x - a_x, b_y - a_y
         return d_x * d_x + d_y * d_y

@@ -12,9 +12,11 @@ from kinfmu.joints.placement import Placement
 class Measure(ABC):
     """One number of a pose, in plain arithmetic.
 
-    A leaf is a frozen dataclass. `kind` is 'length' or 'angle'.
+    A leaf is a frozen dataclass; its fields are keys of the table that names it, such as
+    `{ measure = "angle", of = "rocker" }`. `kind` is 'length' or 'angle'.
     """
 
+    type: ClassVar[str]  # how mechanism files call it
     kind: ClassVar[str]
     is_absolute: ClassVar[bool] = False  # True if it depends on where the world's origin lies
 

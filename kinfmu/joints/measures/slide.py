@@ -7,47 +7,46 @@ from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.measures.measure import Measure
-from kinfmu.joints.placement import Placement, body_of
+from kinfmu.joints.placement import Placement, PointPair, body_of
+from kinfmu.units import Radians
 
 
 @dataclass(frozen=True)
 class PositionAlong(Measure):
-    """How far point b lies along an axis through point a: e.d with d = r_b - r_a and e fixed in a's body.
+    """How far a point lies along an axis through another: e.d with d = r_b - r_a and e fixed in a's body.
 
-    axis: angle of e in that body's frame [rad].
+    between: the points a and b; axis: angle of e in a's body's frame [rad].
     """
 
+    type: ClassVar[str] = "position"
     kind: ClassVar[str] = "length"
 
-    a: str
-    b: str
-    axis: float = 0.0
+    between: PointPair
+    axis: Radians = 0.0
 
     def bodies(self) -> tuple[str, ...]:
-        return body_of(self.a), body_of(self.b)
+        return tuple(map(body_of, self.between))
 
     def value(self, at: Placement) -> Value:
-        a_x, a_y = at.point(self.a)
-        b_x, b_y = at.point(self.b)
-        e_x, e_y = at.direction(body_of(self.a), self.axis)
+        (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
+        e_x, e_y = at.direction(body_of(self.between[0]), self.axis)
         return e_x * (b_x - a_x) + e_y * (b_y - a_y)
 
 
 @dataclass(frozen=True)
 class OffsetFrom(Measure):
-    """How far point b lies to the left of an axis through point a: n.d with n = e turned by 90 degrees."""
+    """How far a point lies to the left of an axis through another: n.d with n = e turned by 90 degrees."""
 
+    type: ClassVar[str] = "offset"
     kind: ClassVar[str] = "length"
 
-    a: str
-    b: str
-    axis: float = 0.0
+    between: PointPair
+    axis: Radians = 0.0
 
     def bodies(self) -> tuple[str, ...]:
-        return body_of(self.a), body_of(self.b)
+        return tuple(map(body_of, self.between))
 
     def value(self, at: Placement) -> Value:
-        a_x, a_y = at.point(self.a)
-        b_x, b_y = at.point(self.b)
-        e_x, e_y = at.direction(body_of(self.a), self.axis)
+        (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
+        e_x, e_y = at.direction(body_of(self.between[0]), self.axis)
         return e_x * (b_y - a_y) - e_y * (b_x - a_x)

@@ -1,0 +1,65 @@
+"""What cams with a lift law have in common: a follower that goes along with the angle of a cam."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from kinfmu.errors import MechanismError
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.laws import Law
+from kinfmu.joints.measures import AngleBetween, Measure
+from kinfmu.joints.placement import Placement
+
+TURN = 2.0 * math.pi  # [rad]
+_LOOKS = 24  # angles in a turn that a lift is looked at, to see how large it is
+
+
+class Cam(Joint):
+    """A follower led by a cam: a measure of it follows the cam's angle against the body that holds both.
+
+    Phi = measure - offset - f(phi_k - phi_i)        (1 row, scale 1)
+    """
+
+    cam: str
+    law: Law
+    offset: float
+    led: ClassVar[str]  # 'length' or 'angle': what the lift is
+
+    def holder(self) -> str:
+        """Body i, which holds the cam's axle and the follower's guide or pivot."""
+        return self.bodies()[0]
+
+    def follower(self) -> Measure:
+        """What the lift is of."""
+        raise NotImplementedError
+
+    @property
+    def law_kinds(self) -> tuple[str, str]:
+        """What the law leads and what it follows."""
+        return self.led, "angle"
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        turn = AngleBetween(self.cam, self.holder()).value(at)
+        return (self.follower().value(at) - self.offset - self.law.at(turn),)
+
+    def kinds(self) -> tuple[str, ...]:
+        return (self.led,)
+
+    def reach(self) -> float:
+        lifts = [abs(self.offset + self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS)]
+        return max(lifts) if self.led == "length" else 0.0
+
+    def check(self) -> None:
+        where = f"[joints.{self.name}]"
+        self.law.check(where)
+        if self.cam in self.bodies()[:2]:
+            raise MechanismError(
+                f"{where} cam = '{self.cam}' must be another body than the follower and what holds it", joint=self.name
+            )
+        why = self.law.why_not_periodic(TURN, "a turn") if self.law.repeats else ""
+        if why:
+            raise MechanismError(
+                f"{where} law: {why}; a follower that goes on turn after turn needs a coupling", joint=self.name
+            )

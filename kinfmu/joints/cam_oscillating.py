@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.cam import Cam
+from kinfmu.joints.laws import Law
+from kinfmu.joints.measures import AngleBetween
+from kinfmu.joints.placement import BodyName, BodyPair
+from kinfmu.units import Radians
+
+
+@dataclass(frozen=True)
+class CamOscillating(Cam):
+    """A cam that swings a follower, by a lift law.
+
+        Phi = phi_j - phi_i - offset - f(phi_k - phi_i)        (1 row)
+
+    between: body i, which holds both pivots, then the follower j; cam: body k; law: lift f over the cam's angle [rad
+    over rad]; offset: angle of the follower where the lift is 0 [rad]. After Haug (1989), cam-followers; there by
+    profiles.
+    """
+
+    type: ClassVar[str] = "cam_oscillating"
+    labels: ClassVar[tuple[str, ...]] = ("lift",)
+    led: ClassVar[str] = "angle"
+
+    name: str
+    between: BodyPair
+    cam: BodyName
+    law: Law
+    offset: Radians = 0.0
+
+    def bodies(self) -> tuple[str, ...]:
+        return (*self.between, self.cam)
+
+    def follower(self) -> AngleBetween:
+        return AngleBetween(self.between[1], self.between[0])

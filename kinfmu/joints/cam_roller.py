@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.errors import MechanismError
+from kinfmu.joints.arithmetic import Value, atan2, sqrt
+from kinfmu.joints.cam import TURN
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.laws import Law
+from kinfmu.joints.placement import Placement, PointPair, body_of
+
+_LOOKS = 360  # angles at which the radius is looked at, one a degree
+
+
+@dataclass(frozen=True)
+class CamRoller(Joint):
+    """A roller on a cam: the roller's centre stays on the pitch curve.
+
+        Phi = |d| - f(angle of d in the cam's frame),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
+
+    between: the pole of the pitch curve on the cam i, then the roller's centre on the follower j; law: radius f > 0 of
+    the pitch curve over the polar angle in the cam's frame [length over rad], with a turn for its period. The pitch
+    curve is the cam's profile moved outwards by the roller's radius. After Haug (1989), cam-followers.
+    """
+
+    type: ClassVar[str] = "cam_roller"
+    labels: ClassVar[tuple[str, ...]] = ("radius",)
+
+    name: str
+    between: PointPair
+    law: Law
+
+    @property
+    def law_kinds(self) -> tuple[str, str]:
+        """What the law leads and what it follows."""
+        return "length", "angle"
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(map(body_of, self.between))
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
+        d_x, d_y = b_x - a_x, b_y - a_y
+        (e_x, e_y), (n_x, n_y) = (at.direction(body_of(self.between[0]), angle) for angle in (0.0, 0.5 * math.pi))
+        angle = atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
+        return (sqrt(d_x * d_x + d_y * d_y) - self.law.at(angle),)
+
+    def reach(self) -> float:
+        return max(float(self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS))
+
+    def check(self) -> None:
+        where = f"[joints.{self.name}]"
+        self.law.check(where)
+        why = self.law.why_not_periodic(TURN, "a turn")
+        if why:
+            raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
+        for degrees in range(_LOOKS):
+            radius = self.law.at(math.radians(degrees))
+            if not radius > 0.0:
+                raise MechanismError(
+                    f"{where} law: the radius of the pitch curve is {radius:.6g} at {degrees} deg; it must be positive",
+                    joint=self.name,
+                )

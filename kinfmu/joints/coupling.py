@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.joint import Joint
+from kinfmu.joints.laws import Law
+from kinfmu.joints.measures import Measure
+from kinfmu.joints.placement import Placement
+
+
+@dataclass(frozen=True)
+class Coupling(Joint):
+    """One measured quantity led by another, by a law: any gearing, screw or indexer.
+
+        Phi = output - f(input)        (1 row, scale 1)
+
+    input, output: measures, such as the angle of a body or the position of a point along an axis; law: f, in the unit
+    of the output over that of the input. After Haug (1989), relative constraints; a measure may be absolute too.
+    """
+
+    type: ClassVar[str] = "coupling"
+    labels: ClassVar[tuple[str, ...]] = ("coupled",)
+
+    name: str
+    input: Measure
+    output: Measure
+    law: Law
+
+    @property
+    def law_kinds(self) -> tuple[str, str]:
+        """What the law leads and what it follows."""
+        return self.output.kind, self.input.kind
+
+    @property
+    def is_tied(self) -> bool:
+        return self.input.is_absolute or self.output.is_absolute
+
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*self.input.bodies(), *self.output.bodies())))
+
+    def residual(self, at: Placement) -> tuple[Value, ...]:
+        return (self.output.value(at) - self.law.at(self.input.value(at)),)
+
+    def kinds(self) -> tuple[str, ...]:
+        return (self.output.kind,)
+
+    def check(self) -> None:
+        self.law.check(f"[joints.{self.name}]")
