@@ -13,6 +13,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.joints.laws import LAWS, RISES, External, Law, LawQuantity, Spline
 from kinfmu.joints.laws.sequence import DWELL
+from kinfmu.joints.measures import MEASURES, Measure
 from kinfmu.joints.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
@@ -134,6 +135,7 @@ def _definitions() -> Schema:
             ]
         },
         **{f"law_{law.type}": _law(law) for law in LAWS},
+        "measure": {"oneOf": [_measure(cls) for cls in MEASURES]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},
         "driver": {"oneOf": [_member(cls, LAWS) for cls in DRIVERS]},
     }
@@ -153,6 +155,14 @@ def _member(cls: Any, laws: Iterable[type[Law]]) -> Schema:
         "required": [*required, "law"],
         "oneOf": [_ref(f"law_{law.type}", propertyNames={"enum": [*own, "law", *_law_keys(law)]}) for law in laws],
     }
+
+
+def _measure(cls: type[Measure]) -> Schema:
+    """The table of a measured quantity."""
+    keys = keys_of(cls)
+    required = ["measure", *(key.name for key in keys if key.default is REQUIRED)]
+    own = {"measure": {"const": cls.type}, **{key.name: _value(key) for key in keys}}
+    return {"description": summary_of(cls), **_table(own, required)}
 
 
 def _law_keys(law: type[Law]) -> list[str]:
@@ -183,9 +193,9 @@ def _value(key: Key) -> Schema:
         "numbers": _list(_ref("number"), 1),
         "points": _list(_ref("xy"), 2),
         "segments": _list(_ref("segment"), 1),
-        "measure": {"type": "object", "required": ["measure"]},
+        "measure": _ref("measure"),
     }
-    default = {} if key.default is REQUIRED else {"default": key.default}
+    default = {} if key.default in (REQUIRED, None) else {"default": key.default}
     shape = shapes[key.takes]
     return {"description": key.meaning, **({"allOf": [shape]} if "$ref" in shape else shape), **default}
 

@@ -18,6 +18,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.joints.laws import LAWS
+from kinfmu.joints.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
 from kinfmu.mechanism.schema import schema, schema_text
 from kinfmu.mechanism.toml_file import parse, text
@@ -89,7 +90,7 @@ def values(cls: type, table: dict[str, Any]) -> dict[str, Any]:
 def value(takes: str, refers: str, name: str) -> Any:
     names = {"point": "rod.P", "body": "rod", "choice": "x", "": ""}
     pairs = {"point": ["ground.O", "rod.P"], "body": ["arm", "rod"]}
-    if name in ("carrier", "pinion"):
+    if name in ("carrier", "pinion", "cam"):
         return "third"
     shapes = {
         "number": 1.5,
@@ -116,6 +117,20 @@ def test_every_joint_has_its_table_in_the_schema(cls: Any) -> None:
     for key in list(table):
         assert not SCHEMA.is_valid(document | {"joints": {"J": {k: v for k, v in table.items() if k != key}}})
     assert not SCHEMA.is_valid(document | {"joints": {"J": table | {"odd": 1}}})
+
+
+@pytest.mark.parametrize("cls", MEASURES, ids=lambda cls: cls.type)
+def test_every_measure_has_its_table_in_the_schema(cls: Any) -> None:
+    measure = values(cls, {"measure": cls.type})
+    joint = {"type": "coupling", "input": {"measure": "angle", "of": "rod", "to": "arm"}, "law": "constant_speed"}
+
+    def fits(output: dict[str, Any]) -> bool:
+        return SCHEMA.is_valid({"name": "a", "bodies": BODIES, "joints": {"J": joint | {"output": output}}})
+
+    assert fits(measure)
+    for key in measure:
+        assert not fits({k: v for k, v in measure.items() if k != key})
+    assert not fits(measure | {"odd": 1})
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda cls: cls.type)
@@ -147,7 +162,7 @@ def test_parameters_may_be_numbers_text_or_tables() -> None:
     assert not any(map(fits, [True, [1], "", "a; b", {"description": "crank"}, {"value": 1, "unit": "mm"}]))
 
 
-@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS, *MEASURES], ids=lambda cls: cls.__name__)
 def test_every_key_says_what_it_means(cls: Any) -> None:
     assert summary_of(cls)
     for key in keys_of(cls):

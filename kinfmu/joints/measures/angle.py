@@ -12,7 +12,10 @@ from kinfmu.joints.placement import BodyName, Placement, Reference
 
 @dataclass(frozen=True)
 class AngleBetween(Measure):
-    """Angle of body `of` against body `to`: phi_of - phi_to, turns kept; without `to` against the world."""
+    """Angle of a body against another, or against the world: phi_of - phi_to, turns kept.
+
+    of: the body; to: the body that it is counted from, the world if nothing is said.
+    """
 
     type: ClassVar[str] = "angle"
     kind: ClassVar[str] = "angle"

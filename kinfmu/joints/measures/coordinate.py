@@ -12,7 +12,10 @@ from kinfmu.joints.placement import Axis, Placement, PointName, body_of
 
 @dataclass(frozen=True)
 class CoordinateOf(Measure):
-    """World coordinate of a point, along axis 'x' or 'y'."""
+    """World coordinate of a point.
+
+    of: the point; axis: 'x' or 'y'.
+    """
 
     type: ClassVar[str] = "coordinate"
     kind: ClassVar[str] = "length"

@@ -13,7 +13,10 @@ from kinfmu.joints.placement import Placement, PointPair, body_of
 
 @dataclass(frozen=True)
 class DistanceBetween(Measure):
-    """Distance of two points, L = |d|; its row d.d - L^2 needs no root and is smooth for every d."""
+    """Distance of two points, L = |d|; its row d.d - L^2 needs no root and is smooth for every d.
+
+    between: the two points.
+    """
 
     type: ClassVar[str] = "distance"
     kind: ClassVar[str] = "length"

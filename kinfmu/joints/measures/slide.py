@@ -35,7 +35,10 @@ class PositionAlong(Measure):
 
 @dataclass(frozen=True)
 class OffsetFrom(Measure):
-    """How far a point lies to the left of an axis through another: n.d with n = e turned by 90 degrees."""
+    """How far a point lies to the left of an axis through another: n.d with n = e turned by 90 degrees.
+
+    between: the points a and b; axis: angle of e in a's body's frame [rad].
+    """
 
     type: ClassVar[str] = "offset"
     kind: ClassVar[str] = "length"
