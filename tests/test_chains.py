@@ -83,6 +83,7 @@ def test_one_output_of_the_first_loop_needs_the_first_loop_only() -> None:
 def test_the_gallery_gives_a_chain_of_any_length() -> None:
     assert kinfmu.load("fourbar_chain:5") == fourbar_chain(5)
     assert kinfmu.load("open_chain:3") == open_chain(3)
+    assert kinfmu.load("fourbar_chain") == fourbar_chain(4)
     with pytest.raises(MechanismError, match="whole number from 1 to 10000"):
         kinfmu.load("fourbar_chain:many")
 

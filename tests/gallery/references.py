@@ -458,3 +458,12 @@ def rack_steering(u: Series) -> Coordinates:
         **point("left_wheel", left_pin + turned(left, -80)),
         **point("right_wheel", right_pin + turned(right, 80)),
     }
+
+
+@reference(crank_angle=lambda t: t + decimal(1.0471975511965976))
+def fourbar_chain(u: Series) -> Coordinates:
+    """Bars of length 1 on pivots at 0 to 4 stay parallel; couplers do not turn."""
+    coordinates: Coordinates = {"bar_0.phi": u}
+    for k in range(1, 5):
+        coordinates |= {f"bar_{k}.phi": u, **body(f"coupler_{k}", Vector(k - 1, 0) + turned(u, 1), 0)}
+    return coordinates | point("end", Vector(4, 0) + turned(u, 1))
