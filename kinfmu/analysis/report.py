@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.drivers import DriverAdvice, better_told, driver_advice
+from kinfmu.analysis.file_notes import file_notes
 from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import Matrix, moving_jacobian
 from kinfmu.analysis.named import NamedLoop, find_named
@@ -113,6 +114,7 @@ def check(mechanism: Mechanism) -> Report:
 
     Faults of the mechanism do not raise; they stand in the report's `problem`.
     """
+    notes = list(file_notes(mechanism))
     local, origin = localized(mechanism)
     system = System(local)
     redundancy = find_redundancy(system)
@@ -121,8 +123,9 @@ def check(mechanism: Mechanism) -> Report:
     except KinfmuError as problem:
         advice = driver_advice(system, redundancy)
         loops = find_named(mechanism, redundancy, ())
-        return Report(mechanism, redundancy, better_told(problem, redundancy, advice), None, (), loops, advice)
-    ways, notes = [], []
+        problem = better_told(problem, redundancy, advice)
+        return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
+    ways = []
     for number, driver in enumerate(mechanism.drivers):
         try:
             ways.append(follow(plan, number))

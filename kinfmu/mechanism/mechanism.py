@@ -102,6 +102,19 @@ class Mechanism:
         return tuple(f"{body.name}.{c}" for body in self.moving_bodies for c in COORDINATES)
 
     @property
+    def unused_parameters(self) -> tuple[str, ...]:
+        """Parameters to which no number of the mechanism refers, not by way of others either."""
+        open_ones = [name for expression in self.expressions.values() for name in expression.names]
+        used: set[str] = set()
+        while open_ones:
+            name = open_ones.pop()
+            if name not in used:
+                used.add(name)
+                expression = self.parameters[name].expression
+                open_ones += expression.names if expression else ()
+        return tuple(name for name in self.parameters if name not in used)
+
+    @property
     def members(self) -> Members:
         """Bodies, joints, drivers and run, with their numbers."""
         return Members(self.bodies, self.joints, self.drivers, self.run)

@@ -19,7 +19,7 @@ from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Revolute
 from kinfmu.joints.laws import ConstantSpeed
-from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
+from kinfmu.mechanism import Body, Mechanism, Parameter, Point, RunSettings, Start, expression
 from kinfmu.mechanism.toml_file import parse, text
 from kinfmu.units import METRES
 
@@ -32,14 +32,33 @@ titles = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp", "Cn
 
 
 @st.composite
+def parameters(draw: st.DrawFn) -> dict[str, Any]:
+    """Parameters in any order: numbers, text with units, and expressions of those drawn before."""
+    found: dict[str, Any] = {}
+    for name in draw(st.lists(names.filter(lambda name: name not in expression.WORDS), max_size=4, unique=True)):
+        number = draw(st.floats(-1e6, 1e6))
+        forms = [number, f"{number!r} mm", f"{number!r} deg/s", Parameter(number, description=draw(titles))]
+        forms += [f"-{other} / 3 + {other}" for other in _lengths(found)]
+        found[name] = draw(st.sampled_from(forms))
+    return dict(draw(st.permutations(list(found.items()))))
+
+
+def _lengths(parameters: dict[str, Any]) -> list[str]:
+    """Names of those that may stand where a length is needed."""
+    return [name for name, value in parameters.items() if "deg" not in str(value)]
+
+
+@st.composite
 def mechanisms(draw: st.DrawFn) -> Mechanism:
     """Mechanisms of one to three moving bodies in a row, with everything that a file can say."""
+    numbered = draw(parameters())
+    lengths = st.one_of(numbers, st.sampled_from(["5 mm + 1 m", "sqrt(2)*3 m", *_lengths(numbered)]))
     count = draw(st.integers(1, 3))
     bodies = draw(st.lists(names, min_size=count, max_size=count, unique=True))
-    points = st.dictionaries(names, st.builds(Point, numbers, numbers), min_size=1, max_size=3)
-    maybe = st.one_of(st.none(), numbers)
+    points = st.dictionaries(names, st.builds(Point, lengths, lengths), min_size=1, max_size=3)
+    maybe, phi = st.one_of(st.none(), lengths), st.one_of(st.none(), numbers)
     made = [Body("ground", draw(points))]
-    made += [Body(name, draw(points), draw(st.builds(Start, maybe, maybe, maybe))) for name in bodies]
+    made += [Body(name, draw(points), draw(st.builds(Start, maybe, maybe, phi))) for name in bodies]
     made = draw(st.permutations(made))
     joint_names = iter(draw(st.lists(names, min_size=2 * count, max_size=2 * count, unique=True)))
     joints: list[Any] = []
@@ -52,7 +71,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
             joints.append(Distance(next(joint_names), pair, draw(positive)))
         else:
             of = next(point for point in pair if not point.startswith("ground."))
-            joints.append(Coordinate(next(joint_names), of, draw(st.sampled_from("xy")), draw(numbers)))
+            joints.append(Coordinate(next(joint_names), of, draw(st.sampled_from("xy")), draw(lengths)))
     law = st.builds(ConstantSpeed, numbers, numbers)
     drivers = [
         AngleDriver(name, draw(st.sampled_from(bodies)), draw(law))
@@ -73,6 +92,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
         run=RunSettings(start, start + draw(st.floats(0.0, 1e6)), draw(st.floats(1e-9, 1e6))),
         length_unit=draw(st.sampled_from(sorted(METRES))),
         title=draw(titles),
+        parameters=numbered,
     )
 
 
@@ -81,6 +101,8 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
 def test_a_mechanism_that_is_written_and_read_is_the_same(mechanism: Mechanism) -> None:
     again = parse(text(mechanism))
     assert again == mechanism
+    assert again.expressions == mechanism.expressions
+    assert list(again.parameters) == list(mechanism.parameters)
     assert list(again.points) == list(mechanism.points)
     assert [list(body.points) for body in again.bodies] == [list(body.points) for body in mechanism.bodies]
     assert text(again) == text(mechanism)
@@ -170,9 +192,12 @@ WORDS += [
     "y",
     "phi",
     "O",
+    "parameters",
+    "a",
 ]
 TEXTS = ["revolute", "distance", "coordinate", "angle", "constant_speed", "ground.O", "bar.O", "bar", "1 m", "60 deg"]
 TEXTS += ["moving", "all", "m", "x", "", ".", "nan m", "1e999 m", "\n", "\0", "1 \n m"]
+TEXTS += ["a", "2*a + 5 mm", "a/0", "2*(a", "sqrt(-1)", "a**a", "1e30*1e30*1e300", "atan2(a, 0)"]
 keys = st.one_of(st.sampled_from(WORDS), st.text(max_size=4))
 scalars = st.one_of(
     st.sampled_from(TEXTS), st.text(max_size=8), st.integers(), st.booleans(), st.floats(), st.dates(), st.times()

@@ -1,0 +1,44 @@
+"""What is hardly meant in a file is told by check, with the place."""
+
+from __future__ import annotations
+
+import pytest
+
+from kinfmu import gallery
+from kinfmu.analysis import check
+from kinfmu.analysis.file_notes import file_notes
+from kinfmu.mechanism.toml_file import parse
+from tests.mechanism.test_wrong_files import CRANK_ROCKER
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_the_gallery_gives_no_cause(name: str) -> None:
+    assert list(file_notes(gallery.load(name))) == []
+
+
+def test_parameters_that_stand_nowhere_are_told() -> None:
+    text = CRANK_ROCKER.replace("crank = 1.0", 'crank = "2*half"\nhalf = 0.5\nrod = 3\nlong = "2*rod"', 1)
+    mechanism = parse(text)
+    assert mechanism.unused_parameters == ("rod", "long")
+    note = "[parameters] rod, long change nothing: no number of the mechanism refers to it"
+    assert list(file_notes(mechanism)) == [note]
+    report = check(mechanism)
+    assert note in report.notes
+    assert note in str(report)
+
+
+def test_an_angle_that_looks_like_degrees_is_told() -> None:
+    mechanism = parse(CRANK_ROCKER.replace('phi = "60 deg"', "phi = 60", 1))
+    assert list(file_notes(mechanism)) == [
+        "[bodies.crank] start.phi = 60 rad is 3437.75 deg, more than a turn: "
+        "a bare angle is in radians; degrees are written such as '60 deg'"
+    ]
+
+
+def test_notes_stand_in_the_report_of_a_mechanism_at_fault_too() -> None:
+    mechanism = parse(
+        CRANK_ROCKER.replace("crank = 1.0", "crank = 1.0\nrod = 3", 1).replace("Q = [3.5, 0]", "Q = [9, 0]")
+    )
+    report = check(mechanism)
+    assert report.problem is not None
+    assert report.notes == ("[parameters] rod changes nothing: no number of the mechanism refers to it",)
