@@ -16,8 +16,9 @@ class Coupling(Joint):
 
         Phi = output - f(input)        (1 row, scale 1)
 
-    input, output: measures, such as the angle of a body or the position of a point along an axis; law: f, in the unit
-    of the output over that of the input. After Haug (1989), relative constraints; a measure may be absolute too.
+    input: the measure that leads, such as the angle of a body; output: the measure that is led, such as the position of
+    a point along an axis; law: f, in the unit of the output over that of the input. After Haug (1989), relative
+    constraints; measures may be absolute too.
     """
 
     type: ClassVar[str] = "coupling"

@@ -9,6 +9,7 @@ from typing import Any
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.joints.laws import LAWS, LawQuantity
+from kinfmu.joints.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
 
@@ -29,6 +30,7 @@ def sections() -> dict[str, str]:
         "units": _units(),
         "joints": "\n".join(_types(JOINTS, "type")),
         "drivers": "\n".join(_types(DRIVERS, "type")),
+        "measures": "\n".join(_types(MEASURES, "measure")),
         "laws": "\n".join(_types(LAWS, "law")),
     }
 
@@ -102,6 +104,8 @@ def _measured(measures: Quantity | LawQuantity | None) -> str:
 def _default(key: Key) -> str:
     if key.default is REQUIRED:
         return "must be said"
+    if key.default is None:
+        return ""
     if isinstance(key.default, bool):
         return f"`{str(key.default).lower()}`"
     return f'`"{key.default}"`' if isinstance(key.default, str) else f"{key.default:g}"
