@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
 from kinfmu.draw.instant import Instant, instant
 from kinfmu.draw.links import links, shortest
@@ -95,6 +96,7 @@ def _marks(shown: Instant) -> list[Mark]:
     plates, bars = links(shown, rods(shown, sliding))
     return [
         *wheels(shown),
+        *cams(shown),
         *supports(shown),
         *rails(shown, sliding),
         *plates,

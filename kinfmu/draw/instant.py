@@ -13,12 +13,13 @@ from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, star
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
-from kinfmu.joints import Placement, Pose
+from kinfmu.joints import Placement, Pose, Revolute
 from kinfmu.joints.placement import body_of
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.run import FloatArray
+from kinfmu.shapes import palette
 from kinfmu.shapes.placing import poses_of, world
 from kinfmu.sweep import run_times, solve
 
@@ -58,6 +59,18 @@ class Instant:
     def angle(self, body: str) -> float:
         """Angle of a body as drawn [rad]."""
         return float(self.poses[body][0, 2])
+
+    def colour(self, body: str) -> palette.Colour:
+        """Colour of a body, the ground's too."""
+        order = [moving.name for moving in self.mechanism.moving_bodies]
+        return palette.body(order.index(body)) if body in order else palette.GROUND
+
+    def axle(self, wheel: str, carrier: str) -> FloatArray | None:
+        """Where a pin holds a wheel on its carrier, (2,); None if none does."""
+        for joint in self.mechanism.joints:
+            if isinstance(joint, Revolute) and set(joint.bodies()) == {wheel, carrier}:
+                return self.point(joint.between[0])
+        return None
 
     def value(self, driver: str) -> float:
         """What a driver measures as drawn [rad or length]."""

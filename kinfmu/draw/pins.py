@@ -13,7 +13,7 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet, box
 from kinfmu.draw.slides import Slide
 from kinfmu.drivers import DistanceDriver
-from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.shapes import palette
@@ -125,6 +125,10 @@ def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Plac
             place.points.append(point)
             if isinstance(member, Revolute | Fixed) and member.name not in place.joints:
                 place.joints.append(member.name)
+    for joint in shown.mechanism.joints:
+        if isinstance(joint, CamRoller):
+            home[joint.between[1]].kinds.add("pin")
+            home[joint.between[1]].points.append(joint.between[1])
     for slide in sliding:
         home[slide.point].kinds.add("pin" if slide.turns else "slide")
         home[slide.point].points.append(slide.point)

@@ -147,7 +147,6 @@ def rails(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
 
 def slots_and_blocks(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
     """The moving part of slides."""
-    order = {body.name: index for index, body in enumerate(shown.mechanism.moving_bodies)}
     racks = _racks(shown)
     found: list[Mark] = []
     for slide in sliding:
@@ -155,10 +154,10 @@ def slots_and_blocks(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
         if slide.slider in racks:
             continue  # the rack itself slides
         if slide.turns and slide.holder != GROUND_NAME:
-            found.append(Slot(shown.placed(slide.holder, slide.ends), palette.body(order[slide.holder])))
+            found.append(Slot(shown.placed(slide.holder, slide.ends), shown.colour(slide.holder)))
         else:
             is_ours = slide.turns or slide.slider == GROUND_NAME  # a pin's block belongs to no body
-            found.append(Block(at, along, palette.BAR if is_ours else palette.body(order[slide.slider])))
+            found.append(Block(at, along, palette.BAR if is_ours else shown.colour(slide.slider)))
     return found
 
 

@@ -63,7 +63,7 @@ def _links(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> tuple[list[
             track = world(poses[body_of(joint.between[1])], points[joint.between[1]])
             way = (track - origin) @ along
             first, last = (np.tile(origin + end * along, (len(track), 1)) for end in (way.min(), way.max()))
-            add(GROUND_NAME, first, last)
+            add(body_of(joint.between[1]), first, last)  # a rail may lie under its own slider
     return owners, np.stack(ends, axis=1) if ends else np.empty((0, 0, 2, 2))
 
 

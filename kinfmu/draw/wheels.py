@@ -10,7 +10,7 @@ from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet, box
-from kinfmu.joints import Gear, RackAndPinion, Revolute
+from kinfmu.joints import Gear, RackAndPinion
 from kinfmu.joints.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
@@ -20,7 +20,7 @@ from kinfmu.shapes.placing import seen_from
 _BELT = 0.3  # radius of the larger pulley of a belt beside the distance of the axles, where only the ratio is known
 _TEETH = 9.0  # [pt] from tooth to tooth of a rack, where there is room
 _TOOTH, _BACK = 4.0, 6.0  # [pt]; half height of the teeth, thickness of the rack behind them
-_DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle
+DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Wheel(Mark):
     def draw(self, sheet: Sheet) -> list[Name]:
         edge = palette.darker(self.colour)
         light = palette.lighter(palette.lighter(palette.lighter(self.colour))) if self.filled else None
-        sheet.circle(self.centre, self.radius, 1.0, edge, fill=light, style=_DASHES, matters=0.6)
+        sheet.circle(self.centre, self.radius, 1.0, edge, fill=light, style=DASHES, matters=0.6)
         spoke = self.centre + self.radius * np.array([np.cos(self.angle), np.sin(self.angle)])
         sheet.line([self.centre, spoke], 1.0, edge, matters=0.4)
         return []
@@ -97,13 +97,13 @@ class Rack(Mark):
         room = box(self.ends.mean(axis=0), along, length / 2.0, (_TOOTH + 2.0) * size)  # where the body's own bar lies
         sheet.line(room, 0.0, PAPER, closed=True, fill=PAPER, matters=0.0)
         sheet.line(corners, 0.9, edge, closed=True, fill=fill)
-        sheet.line(self.ends, 0.7, edge, style=_DASHES, matters=0.0)
+        sheet.line(self.ends, 0.7, edge, style=DASHES, matters=0.0)
         return []
 
 
 @dataclass(frozen=True, eq=False)
 class MeshName(Mark):
-    """The name of a pair of wheels or of a rack and its pinion, where they meet."""
+    """The name of a pair of wheels, of a rack and its pinion, or of a cam and its follower, where they meet."""
 
     name: str
     at: FloatArray
@@ -129,7 +129,7 @@ def racks(shown: Instant) -> list[Mark]:
 
 def _pair(shown: Instant, joint: Gear) -> list[Mark]:
     """Two wheels, from the distance of their axles and their ratio."""
-    a, b = (_axle(shown, gear, joint.carrier) for gear in joint.between)
+    a, b = (shown.axle(gear, joint.carrier) for gear in joint.between)
     if a is None or b is None:
         return []
     distance = float(np.hypot(*(b - a)))
@@ -144,7 +144,7 @@ def _pair(shown: Instant, joint: Gear) -> list[Mark]:
         second = distance / abs(1.0 - ratio)
         radii = (abs(ratio) * second, second)
     marks: list[Mark] = [
-        Wheel(centre, radius, shown.angle(gear), _colour(shown, gear))
+        Wheel(centre, radius, shown.angle(gear), shown.colour(gear))
         for gear, centre, radius in zip(joint.between, (a, b), radii, strict=True)
     ]
     if is_belt:
@@ -157,7 +157,7 @@ def _pair(shown: Instant, joint: Gear) -> list[Mark]:
 def _rack(shown: Instant, joint: RackAndPinion) -> list[Mark]:
     """The pinion, and the rack along its way over the run."""
     holder, rack = map(body_of, joint.between)
-    centre = _axle(shown, joint.pinion, holder)
+    centre = shown.axle(joint.pinion, holder)
     if centre is None:
         return []
     e_x, e_y = unit_vector(joint.axis)
@@ -172,22 +172,7 @@ def _rack(shown: Instant, joint: RackAndPinion) -> list[Mark]:
     first, last = -np.nanmax(way) - end, -np.nanmin(way) + end  # what passes the pinion, against the rack's place now
     ends = np.array([contact + first * along, contact + last * along])
     return [
-        Rack(ends, across, _colour(shown, rack)),
-        Wheel(centre, radius, shown.angle(joint.pinion), _colour(shown, joint.pinion), filled=False),
+        Rack(ends, across, shown.colour(rack)),
+        Wheel(centre, radius, shown.angle(joint.pinion), shown.colour(joint.pinion), filled=False),
         MeshName(joint.name, contact),
     ]
-
-
-def _axle(shown: Instant, wheel: str, carrier: str) -> FloatArray | None:
-    """Where a pin holds a wheel on its carrier, None if none does."""
-    for joint in shown.mechanism.joints:
-        if isinstance(joint, Revolute) and set(joint.bodies()) == {wheel, carrier}:
-            return shown.point(joint.between[0])
-    return None
-
-
-def _colour(shown: Instant, body: str) -> palette.Colour:
-    for index, moving in enumerate(shown.mechanism.moving_bodies):
-        if moving.name == body:
-            return palette.body(index)
-    return palette.GROUND
