@@ -1,4 +1,4 @@
-"""figure(): a mechanism at its start pose, with names, as a textbook would print it."""
+"""figure(): a mechanism with its names, as a textbook would print it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # j
 
 
 def figure(mechanism: Mechanism, path: str | Path) -> None:
-    """Draw a mechanism at its start pose into a .svg or .png file.
+    """Draw a mechanism into a .svg or .png file, at its start pose or, where links hide one another there, in its run.
 
     Bodies, joints, drivers and points of interest with their names and the paths of these points over the file's run;
     axes in the mechanism's unit of length, both of one scale. The same mechanism gives the same bytes. A mechanism that

@@ -1,4 +1,4 @@
-"""Cams: the pitch curve goes through the roller's centre and the profile touches the roller, wherever the cam stands."""
+"""Cams: the pitch curve goes through the roller's centre and the profile touches the roller, whatever the cam's angle."""
 
 from __future__ import annotations
 
