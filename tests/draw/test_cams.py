@@ -1,4 +1,4 @@
-"""Cams: the pitch curve goes through the roller's centre and the profile touches the roller, whatever the cam's angle."""
+"""Cams: the pitch curve goes through the roller's centre and the profile touches the roller, at every angle."""
 
 from __future__ import annotations
 
