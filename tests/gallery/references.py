@@ -2,7 +2,7 @@
 
 Each function takes the driven quantities as power series in time and returns every coordinate that is an output of the
 mechanism, by the names it has there; its dimensions are typed here once more. Rates and accelerations are terms of the
-series. Where a loop has no closed form one unknown is left to Newton (`stephenson_six_bar`).
+series. Where there is no closed form one unknown is left to Newton.
 """
 
 from __future__ import annotations
@@ -355,6 +355,24 @@ def parallel_jaw(y: Series) -> Coordinates:
         **point("right_pad", jaw + Vector(-20, 40)),
         **point("left_pad", Vector(20 - jaw.x, jaw.y + 40)),
     }
+
+
+@reference(cam_angle=turning(0, 360))
+def cam_roller(u: Series) -> Coordinates:
+    """The roller of a lever of 80 about (90, 0) stays on the cam's pitch curve: Newton finds the lever's angle."""
+    c = Vector(90, 0)
+    third = 2 * mp.pi / 3
+    pitch = rising(40, (0, third, 20), (third * 3 / 2, third, -20), shape=cycloidal)
+
+    def opening(q: list[Series], cam: Series) -> list[Series]:
+        r = c + turned(q[0], 80)
+        polar = heading(r, 0) - cam
+        return [sqrt(r.dot(r)) - pitch(polar - 2 * mp.pi * mp.floor(polar.c[0] / (2 * mp.pi)))]
+
+    value, speed, acceleration = u.c[0], u.c[1], 2 * u.c[2]
+    lever = solve(opening, [degrees(147)], value, speed, acceleration)
+    psi = Series([lever.q[0, 0], lever.qd[0, 0], lever.qdd[0, 0] / 2])
+    return {"cam.phi": u, "lever.phi": psi, **point("roller", c + turned(psi, 80))}
 
 
 # ------------------------------------------------------------------------------------------- several drivers, gears
