@@ -17,6 +17,7 @@ from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, listed, su
 from kinfmu.units import Quantity, factors
 
 if TYPE_CHECKING:
+    from kinfmu.analysis import Assemblies, Report
     from kinfmu.mechanism import Mechanism
     from kinfmu.run import Run
 
@@ -214,6 +215,7 @@ def schema(output: Path | None) -> None:
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("--json", "as_json", is_flag=True, help="Findings for programs.")
 @click.option("--matrices", is_flag=True, help="Jacobians at the start pose and singular points.")
+@click.option("--assemblies", is_flag=True, help="The ways of putting it together, and how to choose one.")
 @click.option(
     "--figure",
     "picture",
@@ -222,9 +224,14 @@ def schema(output: Path | None) -> None:
 )
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank=40mm.")
 def check(
-    mechanism: str, as_json: bool, matrices: bool, picture: Path | None, settings: tuple[tuple[str, str], ...]
+    mechanism: str,
+    as_json: bool,
+    matrices: bool,
+    assemblies: bool,
+    picture: Path | None,
+    settings: tuple[tuple[str, str], ...],
 ) -> None:
-    """Mobility, redundant and contradicting constraints, plan, singular points and range."""
+    """Mobility, redundant and contradicting constraints, drivers, plan, ranges and singular points."""
     from kinfmu.analysis import check as checked
 
     if picture is not None and picture.suffix.lower() not in FIGURES:
@@ -236,9 +243,14 @@ def check(
         findings = report.as_json()
         if matrices and report.problem is None:
             findings["matrices"] = [matrix.as_json() for matrix in report.matrices()]
+        if assemblies:
+            found = _assemblies(report)
+            findings["assemblies"] = None if found is None else found.as_json()
         click.echo(json.dumps(findings, indent=2))
     else:
         click.echo(str(report))
+        if assemblies and (found := _assemblies(report)) is not None:
+            click.echo(str(found))
         if matrices and report.problem is None:
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
@@ -445,6 +457,16 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
     recording = reviewed(run, other, save=save, screenshot=screenshot, at=at)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"made {listed(made)}")
+
+
+def _assemblies(report: Report) -> Assemblies | None:
+    """The ways of putting a mechanism together; None where its problem, told at the end, leaves none."""
+    try:
+        return report.assemblies()
+    except KinfmuError:
+        if report.problem is None:
+            raise
+        return None
 
 
 class _Progress:

@@ -1,7 +1,8 @@
-"""What `check` tells: mobility, redundancy, plan, singular points, range, and the matrices of the method."""
+"""What `check` tells: mobility, redundancy, drivers, plan, loops, ranges, assemblies, the matrices of the method."""
 
 from __future__ import annotations
 
+from kinfmu.analysis.assemblies import Assemblies
 from kinfmu.analysis.report import Report, check
 
-__all__ = ["Report", "check"]
+__all__ = ["Assemblies", "Report", "check"]

@@ -29,7 +29,7 @@ def as_json(report: Report) -> dict[str, Any]:
     shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
     advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
     (coordinates), suggestions (name, and the keys of the driver's table).
-    notes: text; problem: text or null.
+    notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies where they are asked for.
     """
     plan, mechanism = report.plan, report.mechanism
     return {

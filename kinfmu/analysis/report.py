@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.drivers import DriverAdvice, better_told, driver_advice
 from kinfmu.analysis.file_notes import file_notes
 from kinfmu.analysis.findings import as_json
@@ -21,7 +22,7 @@ from kinfmu.analysis.way import follow
 from kinfmu.analysis.written import written
 from kinfmu.equations.assembly import assemble, close
 from kinfmu.equations.system import FloatArray, System
-from kinfmu.errors import KinfmuError, listed
+from kinfmu.errors import AssemblyError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
 from kinfmu.redundancy import DependentRow, Redundancy, find_redundancy
@@ -101,6 +102,15 @@ class Report:
 
     def __str__(self) -> str:
         return "\n".join(lines(self))
+
+    def assemblies(self) -> Assemblies:
+        """Every way of putting the mechanism together at its start driver values.
+
+        Raises the report's `problem` if it is not one of the start poses, an AssemblyError if nothing closes.
+        """
+        if self.problem is not None and not isinstance(self.problem, AssemblyError):
+            raise self.problem
+        return find_assemblies(self.mechanism, self.plan)
 
     def matrices(self) -> tuple[Matrix, ...]:
         """The report's matrices: Phi_K,q at the start pose, Phi_q at each singular point and a small turn beside it."""

@@ -124,11 +124,11 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
         shape = f" ({kind.shape})" if kind.shape else ""
         return f"change point{shape}: {sums}; the links fall in line"
     turns = {
-        "crank-rocker": f"{first} turns all the way round, {last} rocks",
-        "rocker-crank": f"{last} turns all the way round, {first} rocks",
-        "double crank": f"{first} and {last} turn all the way round",
-        "double rocker": f"{coupler} turns all the way round, {first} and {last} rock",
-        "triple rocker": "no link turns all the way round",
+        "crank-rocker": f"{first} can turn all the way round, {last} rocks",
+        "rocker-crank": f"{last} can turn all the way round, {first} rocks",
+        "double crank": f"{first} and {last} can turn all the way round",
+        "double rocker": f"{coupler} can turn all the way round, {first} and {last} rock",
+        "triple rocker": "no link can turn all the way round",
     }
     return f"{kind.name}: {sums}; {turns[kind.name]}"
 
@@ -140,9 +140,9 @@ def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
     shorter, longer = ("crank", "rod") if loop.crank.length <= loop.rod.length else ("rod", "crank")
     sums = f"{shorter} + offset {kind.small:.6g} {_sign(kind.small, kind.large, kind.name)} {longer} {kind.large:.6g}"
     turns = {
-        "crank turns": f"{loop.crank.name} turns all the way round",
-        "rod turns": f"{loop.rod.name} turns all the way round, {loop.crank.name} rocks",
-        "nothing turns": f"{loop.crank.name} does not turn all the way round",
+        "crank turns": f"{loop.crank.name} can turn all the way round",
+        "rod turns": f"{loop.rod.name} can turn all the way round, {loop.crank.name} rocks",
+        "nothing turns": f"{loop.crank.name} cannot turn all the way round",
         "change point": "branches cross where all is in line",
     }
     return f"{sums}; {turns[kind.name]}"
@@ -154,13 +154,13 @@ def _sign(small: float, large: float, name: str) -> str:
 
 def _transmission(angle: TransmissionAngle, unit: str) -> str:
     at = [
-        f"{angle.driver} at {degrees(u) if angle.kind == 'angle' else f'{u:.6g} {unit}'}"
+        f"{angle.driver} at {degrees(u) if angle.kind == 'angle' else f'{round(u, 9) + 0.0:.6g} {unit}'}"
         for u in (angle.at_smallest, angle.at_largest)
     ]
     span = f"{degrees(angle.smallest)} ({at[0]}) to {degrees(angle.largest)} ({at[1]})"
     verdict = {
         "good": "good",
-        "poor": f"poor, {degrees(angle.worst)} from 0 or 180 where 40 deg is usual",
+        "poor": "poor (40 deg from 0 and 180 deg is usual)",
         "locks": _in_line(angle),
     }
     return f"transmission angle {span}: {verdict[angle.verdict]}"

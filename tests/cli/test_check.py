@@ -68,6 +68,13 @@ def test_the_check_of_the_fourbar_with_its_matrices_is_the_golden_file(
     golden("fourbar_check.txt", command("check", "fourbar", "--matrices").stdout)
 
 
+@pytest.mark.parametrize("arguments", [("crank_rocker", "--assemblies"), ("excavator",)])
+def test_checks_of_the_gallery_are_golden_files(
+    arguments: tuple[str, ...], command: Command, golden: Callable[[str, str], None]
+) -> None:
+    golden(f"{arguments[0]}_check.txt", command("check", *arguments).stdout)
+
+
 def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command) -> None:
     matrices = json.loads(command("check", "fourbar", "--json", "--matrices").stdout)["matrices"]
     joints, system = matrices[:2]
@@ -80,6 +87,23 @@ def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command)
     assert not any(joints["reduced"][4])
     assert system["rows"] == ["P.x", "P.y", "Q.x", "Q.y", "crank.angle"]
     np.testing.assert_allclose(system["reduced"], np.eye(5), atol=1e-12)
+
+
+def test_assemblies_are_listed_with_the_start_angle_that_chooses_each(command: Command) -> None:
+    told = command("check", "double_pendulum", "--assemblies").stdout
+    assert "assemblies  2 at crank = 5 pi/3 (300 deg), told apart by lower.phi" in told
+    assert '              choose it by [bodies.lower] start.phi = "-172.3 deg"' in told
+    found = json.loads(command("check", "double_pendulum", "--assemblies", "--json").stdout)["assemblies"]
+    assert [one["chosen"] for one in found["found"]] == [True, False]
+    assert "assemblies" not in json.loads(command("check", "double_pendulum", "--json").stdout)
+
+
+def test_a_mechanism_at_fault_has_no_assemblies_to_list(
+    command: Command, fails: Callable[..., str], fourbar_file: Callable[..., Path]
+) -> None:
+    path = fourbar_file("length = 1\n", "length = 1.01\n")
+    assert "contradicts the other joints" in fails("check", path, "--assemblies")
+    assert json.loads(command("check", path, "--assemblies", "--json").stdout)["assemblies"] is None
 
 
 def test_a_bar_of_a_wrong_length_is_told_by_name_and_gap(

@@ -1,0 +1,345 @@
+"""Assemblies: the distinct ways in which a mechanism can be put together at its start driver values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.analysis.written import degrees, written
+from kinfmu.backends.python import load_model
+from kinfmu.equations.assembly import CLOSED, SINGULAR, Assembled, assemble, close, start_targets
+from kinfmu.equations.system import FloatArray, System
+from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
+from kinfmu.mechanism import Mechanism, Point, Start
+from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.plan.anchor import find_anchor
+
+MOST = 64  # assemblies after which the search ends
+_SEED = 1989
+_TRIES = 20_000  # of Newton's method from random unknowns, at most
+_IN_VAIN = 300  # tries that close without finding anything new, after which all is taken for found
+_STARTS = 60  # random poses from which a mechanism without a plan is put together
+_LARGE = 150  # coordinates beyond which that takes minutes
+_SAME = 1e-6  # [rad, sizes]; poses closer than this are one
+_APART = 1e-3  # [rad, sizes]; what tells assemblies apart for people
+_SPREAD = 2.0  # sizes to either side over which bodies are thrown
+_STEPS = 4  # in which a pose is moved to driver values near by
+_ADVISED = 8  # assemblies for which a short choice of start poses is sought
+_SINGLE = 3  # bodies that are tried alone
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """One way of putting the mechanism together.
+
+    coordinates: all of them by name, in the world [length, rad], angles within half a turn; is_chosen: the one that the
+    file's start poses lead to; start: start poses that lead to it, by body, to be put in place of the file's.
+    """
+
+    coordinates: Mapping[str, float] = field(hash=False)
+    is_chosen: bool
+    start: Mapping[str, Start] = field(hash=False)
+
+
+@dataclass(frozen=True)
+class Assemblies:
+    """All that were found at these driver values, the file's first.
+
+    drivers: values by name [rad or length]; told_apart_by: names of coordinates of which one at least differs between
+    any two; is_complete: False if the search was ended because there are so many.
+    """
+
+    mechanism: Mechanism
+    drivers: Mapping[str, float] = field(hash=False)
+    found: tuple[Assembly, ...]
+    told_apart_by: tuple[str, ...]
+    is_complete: bool
+
+    def as_json(self) -> dict[str, Any]:
+        """As plain data: drivers, complete, told_apart_by, found: chosen, coordinates, start (x, y, phi by body)."""
+        return {
+            "drivers": dict(self.drivers),
+            "complete": self.is_complete,
+            "told_apart_by": list(self.told_apart_by),
+            "found": [
+                {
+                    "chosen": one.is_chosen,
+                    "coordinates": dict(one.coordinates),
+                    "start": {body: _given(start) for body, start in one.start.items()},
+                }
+                for one in self.found
+            ],
+        }
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self))
+
+
+def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
+    """Every way of putting a mechanism together at its start driver values, whatever its start poses say.
+
+    plan: that of the mechanism, None if it has none because its start poses do not close or leave several branches.
+    Newton's method from random unknowns of each block, seeded; what differs by whole turns is one. Raises the
+    KinfmuError of a mechanism that cannot be planned at all, an AssemblyError if none is found.
+    """
+    whole = replace(mechanism, coordinates="all", points={})
+    chosen = None
+    if plan is not None:
+        chosen, planned = plan.anchor.q, plan if plan.mechanism.coordinates == "all" else compile_plan(whole)
+    else:
+        planned = compile_plan(_started(whole, _some_pose(whole)))
+    poses, is_complete = _poses(planned)
+    if chosen is not None and all(_distance(planned, chosen, pose) > _SAME for pose in poses):
+        poses.insert(0, chosen)
+    is_chosen = [chosen is not None and _distance(planned, chosen, pose) <= _SAME for pose in poses]
+    order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], [round(c, 6) for c in poses[k].tolist()]))
+    poses, is_chosen = [poses[k] for k in order], [is_chosen[k] for k in order]
+    apart = _told_apart_by(planned, poses)
+    is_quick = not planned.watches  # with redundant rows each try takes seconds
+    found = []
+    for k, pose in enumerate(poses):
+        start = {} if is_chosen[k] else _choice(mechanism, planned, pose, chosen, is_advised=k < _ADVISED and is_quick)
+        found.append(Assembly(_named(planned, pose), is_chosen[k], start))
+    drivers = {driver.name: float(u) for driver, u in zip(mechanism.drivers, planned.anchor.u, strict=True)}
+    return Assemblies(mechanism, drivers, tuple(found), apart, is_complete)
+
+
+def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
+    """Poses of all coordinates as the plan's own origin sees them, and whether the search came to its end.
+
+    Half of the tries throw all unknowns, half those of one block of a pose that is known: with many blocks all at once
+    rarely close.
+    """
+    model, rng = load_model(plan), np.random.default_rng(_SEED)
+    u, anchor = model.ANCHOR
+    scales = np.array(model.UNKNOWN_SCALES, dtype=float)
+    is_angle = np.array([name.endswith(".phi") for name in model.UNKNOWNS], dtype=bool)
+    rest = (0.0,) * len(anchor)
+    known = [np.array(anchor, dtype=float)]
+    poses = [_pose(plan, model, model.position(u, anchor, rest, rest, -0.0)[-1])]
+    in_vain = 0
+    for trial in range(_TRIES):
+        if not anchor or in_vain >= _IN_VAIN or len(poses) >= MOST:
+            break
+        thrown = np.where(is_angle, math.pi, _SPREAD * scales) * rng.uniform(-1.0, 1.0, len(anchor))
+        thrown += np.where(is_angle, 0.0, known[0])
+        if trial % 2:
+            start, end = model.BLOCKS[rng.integers(len(model.BLOCKS))]
+            kept = known[rng.integers(len(known))].copy()
+            kept[start:end] = thrown[start:end]
+            thrown = kept
+        try:
+            found = model.position(u, tuple(thrown.tolist()), rest, rest, -0.0)
+        except (ArithmeticError, ValueError):  # singular, or diverged
+            continue
+        if not (found[3] <= CLOSED and found[6] <= CLOSED and found[2] > SINGULAR):
+            continue  # open, or where links may fold without end
+        pose = _pose(plan, model, found[-1])
+        if any(_distance(plan, pose, other) <= _SAME for other in poses):
+            in_vain += 1
+            continue
+        in_vain = 0
+        known.append(np.array(found[0], dtype=float))
+        poses.append(pose)
+    return poses, len(poses) < MOST
+
+
+def _pose(plan: SolvePlan, model: Any, values: tuple[float, ...]) -> FloatArray:
+    """All coordinates in the mechanism's order, as the plan's own origin sees them, angles within half a turn."""
+    at = {**plan.fixed, **dict(zip(plan.outputs, model.outputs(values), strict=True))}
+    offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
+    names = plan.mechanism.coordinate_names
+    q = np.array([at[name] - offset[name.rpartition(".")[2]] for name in names])
+    return _reduced(names, q)
+
+
+def _reduced(names: Sequence[str], q: FloatArray) -> FloatArray:
+    """The same pose with angles within half a turn."""
+    turned = [name.endswith(".phi") for name in names]
+    return np.where(turned, np.remainder(q + math.pi, math.tau) - math.pi, q)
+
+
+def _apart(plan: SolvePlan, a: FloatArray, b: FloatArray) -> FloatArray:
+    """How far two poses lie apart in each coordinate, but for whole turns [rad, sizes], (n,)."""
+    turned = np.array([name.endswith(".phi") for name in plan.mechanism.coordinate_names])
+    around = np.abs(np.remainder(b - a + math.pi, math.tau) - math.pi)
+    return np.where(turned, around, np.abs(b - a) / plan.size)
+
+
+def _distance(plan: SolvePlan, a: FloatArray, b: FloatArray) -> float:
+    return float(_apart(plan, a, b).max(initial=0.0))
+
+
+def _told_apart_by(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[str, ...]:
+    """Few coordinates, angles first, of which at least one differs between any two poses."""
+    names = plan.mechanism.coordinate_names
+    open_pairs = [_apart(plan, a, b) for k, a in enumerate(poses) for b in poses[k + 1 :]]
+    order = sorted(range(len(names)), key=lambda k: not names[k].endswith(".phi"))
+    told: list[str] = []
+    while open_pairs:
+        seen = {k: sum(float(pair[k]) > _APART for pair in open_pairs) for k in order}
+        best = max(order, key=lambda k: seen[k])
+        if not seen[best]:
+            break
+        told.append(names[best])
+        open_pairs = [pair for pair in open_pairs if pair[best] <= _APART]
+    return tuple(told)
+
+
+def _choice(
+    mechanism: Mechanism, plan: SolvePlan, pose: FloatArray, instead_of: FloatArray | None, *, is_advised: bool
+) -> dict[str, Start]:
+    """Few start poses, rounded, that lead to a pose if put in place of the file's; all of those that are elsewhere, if
+    nothing less does.
+
+    instead_of: the pose that the file's start poses lead to.
+    """
+    named = _named(plan, pose)
+    whole = {body.name: _rounded(named, body.name) for body in mechanism.moving_bodies}
+    moved = np.ones((len(whole), 3), dtype=bool)
+    if instead_of is not None:
+        moved = _apart(plan, instead_of, pose).reshape(-1, 3) > _APART
+    elsewhere = {name: start for (name, start), where in zip(whole.items(), moved, strict=True) if where.any()}
+    if is_advised:
+        for start in _shorter_choices(mechanism, elsewhere, moved):
+            if _leads_to(mechanism, plan, start, pose):
+                return start
+    return elsewhere
+
+
+def _shorter_choices(
+    mechanism: Mechanism, elsewhere: Mapping[str, Start], moved: NDArray[np.bool_]
+) -> Iterator[dict[str, Start]]:
+    """The angle of one body that only turns; the angles of all that are elsewhere, with and without their places.
+
+    moved: whether x, y, phi of each moving body are elsewhere, (bodies, 3).
+    """
+    bodies = mechanism.moving_bodies
+    only_turns = [body.name for body, where in zip(bodies, moved, strict=True) if where[2] and not where[:2].any()]
+    turned = {body.name: body.start._replace(phi=elsewhere[body.name].phi) for body in bodies if body.name in elsewhere}
+    for name in only_turns[:_SINGLE]:
+        yield {name: turned[name]}
+    if len(elsewhere) > 1 or not only_turns:
+        yield turned
+    if len(only_turns) < len(elsewhere):
+        yield {name: turned[name] if name in only_turns else start for name, start in elsewhere.items()}
+
+
+def _leads_to(mechanism: Mechanism, plan: SolvePlan, start: Mapping[str, Start], pose: FloatArray) -> bool:
+    """True if the mechanism with these start poses assembles in a pose, at the same driver values."""
+    bodies = [replace(body, start=start.get(body.name, body.start)) for body in mechanism.bodies]
+    system = System(localized(replace(mechanism, bodies=tuple(bodies)))[0])
+    try:
+        if assemble(system) is None:
+            return False
+        assembled = find_anchor(system)
+    except KinfmuError:
+        return False
+    return _distance(plan, _moved_to(system, assembled, plan.anchor.u), pose) <= _SAME
+
+
+def _moved_to(system: System, assembled: Assembled, u: FloatArray) -> FloatArray:
+    """The assembled pose at other driver values, in small steps: a nearly singular start is left by a little."""
+    q, way = assembled.q, u - assembled.u
+    for k in range(1, _STEPS + 1) if np.abs(way).max(initial=0.0) > 0.0 else ():
+        q, _ = close(system, q, assembled.u + way * (k / _STEPS))
+    return q
+
+
+def _named(plan: SolvePlan, pose: FloatArray) -> dict[str, float]:
+    """All coordinates by name, in the world."""
+    offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
+    names = plan.mechanism.coordinate_names
+    reduced = _reduced(names, pose).tolist()
+    return {name: value + offset[name.rpartition(".")[2]] for name, value in zip(names, reduced, strict=True)}
+
+
+def _rounded(named: Mapping[str, float], body: str) -> Start:
+    """A start pose with few digits: to a tenth of a degree and four digits of a length."""
+    x, y = (float(f"{named[f'{body}.{axis}']:.4g}") for axis in ("x", "y"))
+    return Start(x, y, math.radians(round(math.degrees(named[f"{body}.phi"]), 1)))
+
+
+def _started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
+    """The mechanism with a pose of all coordinates, in the world, as its start."""
+    poses = iter(pose.reshape(-1, 3).tolist())
+    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
+    return replace(mechanism, bodies=tuple(bodies))
+
+
+def _some_pose(mechanism: Mechanism) -> FloatArray:
+    """A pose in which a mechanism closes, in the world: beside a singular start pose, or from random ones."""
+    try:
+        return _in_world(mechanism, compile_plan(mechanism).anchor.q)
+    except AmbiguousStartError as error:
+        branches: list[FloatArray] = error.data["branches"]  # type: ignore[assignment]  # data are objects
+        return _in_world(mechanism, branches[0])
+    except AssemblyError as error:
+        found = _thrown_together(mechanism)
+        if found is None:
+            raise error from None
+        return found
+
+
+def _in_world(mechanism: Mechanism, q: FloatArray) -> FloatArray:
+    _, origin = localized(mechanism)
+    return np.asarray(q + np.tile([origin.x, origin.y, 0.0], len(q) // 3))
+
+
+def _thrown_together(mechanism: Mechanism) -> FloatArray | None:
+    """A closed pose at the start driver values, from seeded random poses; None if there is none or too much to try."""
+    system = System(localized(mechanism)[0])
+    if len(system.coordinates) > _LARGE:
+        return None
+    u, rng = start_targets(system), np.random.default_rng(_SEED)
+    ground = next(body for body in system.mechanism.bodies if body.is_ground)
+    middle = np.mean([*ground.points.values()] or [Point(0.0, 0.0)], axis=0)
+    centre = np.tile([*middle, 0.0], len(system.coordinates) // 3)
+    spread = np.where(system.column_scales == 1.0, math.pi, _SPREAD * system.size)
+    spread[2::3] = math.pi
+    for _ in range(_STARTS):
+        pose, gap = close(system, centre + spread * rng.uniform(-1.0, 1.0, len(centre)), u)
+        if gap <= CLOSED:
+            return _in_world(mechanism, pose)
+    return None
+
+
+def _given(start: Start) -> dict[str, float]:
+    return {key: float(value) for key, value in start._asdict().items() if value is not None}
+
+
+def _lines(assemblies: Assemblies) -> Iterator[str]:
+    mechanism = assemblies.mechanism
+    kinds = {driver.name: driver.quantity.kind for driver in mechanism.drivers}
+    at = listed(f"{name} = {written(u, mechanism.length_unit, kinds[name])}" for name, u in assemblies.drivers.items())
+    given = {body.name: body.start for body in mechanism.bodies}
+    many = f"{len(assemblies.found)}" if assemblies.is_complete else f"at least {len(assemblies.found)}"
+    apart = f", told apart by {listed(assemblies.told_apart_by)}" if assemblies.told_apart_by else ""
+    yield f"  assemblies  {many} at {at}{apart}"
+    for k, one in enumerate(assemblies.found, start=1):
+        said = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.told_apart_by]
+        if one.is_chosen:
+            said.append("the file's")
+        yield f"  {'*' if one.is_chosen else ' '} {k:<8}  {listed(said)}"
+        for number, (body, start) in enumerate(one.start.items()):
+            how = "and by" if number else "choose it by"
+            yield f"              {how} [bodies.{body}] start{_start(given[body], start)}"
+
+
+def _value(name: str, value: float, unit: str) -> str:
+    return f"{name} {degrees(value)}" if name.endswith(".phi") else f"{name} {value:.6g} {unit}"
+
+
+def _start(given: Start, start: Start) -> str:
+    """What a file would say for a start pose: its angle alone where that is all that changes."""
+    if start._replace(phi=given.phi) == given:
+        return f'.phi = "{degrees(start.phi or 0.0)}"'
+    said = [f"{key} = {value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None]
+    if start.phi is not None:
+        said.append(f'phi = "{degrees(start.phi)}"')
+    return f" = {{ {listed(said)} }}"
