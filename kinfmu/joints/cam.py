@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import math
+from abc import abstractmethod
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Joint
 from kinfmu.joints.laws import Law
+from kinfmu.joints.laws.law import TURN
 from kinfmu.joints.measures import AngleBetween, Measure
 from kinfmu.joints.placement import Placement
 
-TURN = 2.0 * math.pi  # [rad]
 _LOOKS = 24  # angles in a turn that a lift is looked at, to see how large it is
 
 
 class Cam(Joint):
     """A follower led by a cam: a measure of it follows the cam's angle against the body that holds both.
 
-    Phi = measure - offset - f(phi_k - phi_i)        (1 row, scale 1)
+        Phi = measure - offset - f(phi_k - phi_i)        (1 row, scale 1)
+
+    A leaf says between what, and along or about what it lifts.
     """
 
     cam: str
@@ -31,9 +33,9 @@ class Cam(Joint):
         """Body i, which holds the cam's axle and the follower's guide or pivot."""
         return self.bodies()[0]
 
+    @abstractmethod
     def follower(self) -> Measure:
         """What the lift is of."""
-        raise NotImplementedError
 
     @property
     def law_kinds(self) -> tuple[str, str]:
@@ -58,7 +60,7 @@ class Cam(Joint):
             raise MechanismError(
                 f"{where} cam = '{self.cam}' must be another body than the follower and what holds it", joint=self.name
             )
-        why = self.law.why_not_periodic(TURN, "a turn") if self.law.repeats else ""
+        why = self.law.why_no_turn() if self.law.repeats else ""
         if why:
             raise MechanismError(
                 f"{where} law: {why}; a follower that goes on turn after turn needs a coupling", joint=self.name

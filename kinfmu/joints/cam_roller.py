@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value, atan2, sqrt
-from kinfmu.joints.cam import TURN
 from kinfmu.joints.joint import Joint
 from kinfmu.joints.laws import Law
+from kinfmu.joints.laws.law import TURN
 from kinfmu.joints.placement import Placement, PointPair, body_of
 
 _LOOKS = 360  # angles at which the radius is looked at, one a degree
@@ -53,7 +53,7 @@ class CamRoller(Joint):
     def check(self) -> None:
         where = f"[joints.{self.name}]"
         self.law.check(where)
-        why = self.law.why_not_periodic(TURN, "a turn")
+        why = self.law.why_no_turn()
         if why:
             raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
         for degrees in range(_LOOKS):

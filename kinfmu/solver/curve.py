@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from functools import cache
 from math import cos, perm, sin
 
 Piece = tuple[
@@ -28,12 +29,16 @@ def curve(data: CurveData, order: int, x: float) -> float:
         for c in coefficients:
             value = value * s + c
         return value + a * sin(w * s + p) if a else value
-    power = len(coefficients) - 1
-    for c in coefficients[: max(power + 1 - order, 0)]:
-        value = value * s + perm(power, order) * c
-        power -= 1
+    for c, factor in zip(coefficients, _factors(len(coefficients), order), strict=False):
+        value = value * s + factor * c
     if a:
         quarter = order % 4  # sine, cosine, and the same with other signs
         wave = cos(w * s + p) if quarter % 2 else sin(w * s + p)
         value += (a if quarter < 2 else -a) * w**order * wave
     return value
+
+
+@cache
+def _factors(count: int, order: int) -> tuple[float, ...]:
+    """What the derivative of s^n puts before its power, n!/(n - order)!, for n from count - 1 down to order."""
+    return tuple(float(perm(power, order)) for power in range(count - 1, order - 1, -1))

@@ -295,7 +295,7 @@ def test_a_roller_that_starts_on_the_pole_is_told_and_nothing_fails() -> None:
 WRONG: dict[str, tuple[Joint, str]] = {
     "a sequence that is no turn": (
         CamTranslating("c", ("ground.O", "follower.R"), "cam", MotionSequence((Segment("dwell", 3.0),), repeat=True)),
-        "[joints.c] law: the durations of its sequence add up to 3, not to a turn (6.28318531); "
+        "[joints.c] law: the durations of its sequence add up to 171.887339 deg, not to a turn of 360 deg; "
         "a follower that goes on turn after turn needs a coupling",
     ),
     "a sequence that does not come back": (
@@ -315,7 +315,7 @@ WRONG: dict[str, tuple[Joint, str]] = {
     ),
     "a pitch curve that does not close": (
         CamRoller("c", ("cam.O", "follower.R"), Harmonic(0.1, 1.5, 1.0)),
-        "[joints.c] law: frequency = 1.5 makes 1.5 waves in a turn, no whole number; a pitch curve must close",
+        "[joints.c] law: frequency = 1.5 must be a whole number of waves in a turn; a pitch curve must close",
     ),
     "a pitch curve through its pole": (
         CamRoller("c", ("cam.O", "follower.R"), Harmonic(1.0, 1.0)),

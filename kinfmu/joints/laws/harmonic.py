@@ -1,13 +1,10 @@
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value, sin
-from kinfmu.joints.laws.law import Frequency, Law, Led, Phase
-
-NEARLY = 1e-9  # of a turn; by how much a period may miss, so that degrees and rounding do no harm
+from kinfmu.joints.laws.law import NEARLY, Frequency, Law, Led, Phase
 
 
 @dataclass(frozen=True)
@@ -30,8 +27,7 @@ class Harmonic(Law):
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["amplitude"] * sin(constants["frequency"] * x + constants["phase"])
 
-    def why_not_periodic(self, period: float, told: str) -> str:
-        waves = self.frequency * period / (2.0 * math.pi)
-        if abs(waves - round(waves)) <= NEARLY:
+    def why_no_turn(self) -> str:
+        if abs(self.frequency - round(self.frequency)) <= NEARLY:
             return ""
-        return f"frequency = {float(self.frequency)!r} makes {waves:.6g} waves in {told}, no whole number"
+        return f"frequency = {float(self.frequency)!r} must be a whole number of waves in a turn"

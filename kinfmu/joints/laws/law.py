@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -36,6 +37,8 @@ Phase = Annotated[float, LawQuantity("angle")]
 Frequency = Annotated[float, LawQuantity("angle", 1)]
 
 Path = tuple[str | int, ...]
+TURN = 2.0 * math.pi  # [rad]
+NEARLY = 1e-9  # of a turn; by how much a law may miss it, so that degrees and rounding do no harm
 
 
 class Constant(NamedTuple):
@@ -87,10 +90,10 @@ class Law(ABC):
         """True if it is meant to repeat: if its table says so."""
         return False
 
-    def why_not_periodic(self, period: float, told: str) -> str:  # noqa: ARG002  periodic laws need both
-        """Why f(x + period) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
+    def why_no_turn(self) -> str:
+        """Why f(x + 2 pi) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
 
-        told: the period in words, such as 'a turn'.
+        For laws of an angle: the lift of a cam, the radius of a pitch curve.
         """
         return f"law '{self.type}' does not repeat"
 

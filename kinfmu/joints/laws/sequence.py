@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
@@ -9,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints.arithmetic import Value, curve, floor
 from kinfmu.joints.laws.cycloidal import Cycloidal
-from kinfmu.joints.laws.law import Argument, Constant, Law, LawQuantity, Led, Path
+from kinfmu.joints.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
 from kinfmu.joints.laws.modified_sine import ModifiedSine
 from kinfmu.joints.laws.modified_trapezoid import ModifiedTrapezoid
 from kinfmu.joints.laws.polynomial_345 import Polynomial345
@@ -26,7 +27,6 @@ RISES: tuple[type[Rise], ...] = (
     Polynomial4567,
 )
 DWELL = "dwell"
-NEARLY = 1e-9  # relative; by how much sums may miss, so that degrees and rounding do no harm
 _SHAPES = {rise.type: rise.shape for rise in RISES}
 _RISE, _DURATION = LawQuantity("led"), LawQuantity("argument", is_positive=True)
 
@@ -113,12 +113,12 @@ class MotionSequence(Law):
     def repeats(self) -> bool:
         return self.repeat
 
-    def why_not_periodic(self, period: float, told: str) -> str:
+    def why_no_turn(self) -> str:
         if not self.repeat:
             return "its sequence does not repeat; say repeat = true"
         whole = sum(segment.duration for segment in self.segments)
-        if abs(whole - period) > NEARLY * period:
-            return f"the durations of its sequence add up to {whole:.9g}, not to {told} ({period:.9g})"
+        if abs(whole - TURN) > NEARLY * TURN:
+            return f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"
         rise = sum(segment.rise for segment in self.segments)
         if abs(rise) > NEARLY * max(abs(segment.rise) for segment in self.segments):
             return f"the rises of its sequence add up to {rise:.9g}, not to 0"

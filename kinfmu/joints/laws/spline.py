@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints.arithmetic import Value, curve, floor
-from kinfmu.joints.laws.law import Constant, Law, LawQuantity, Path
+from kinfmu.joints.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
 from kinfmu.joints.placement import Reference
 from kinfmu.solver.curve import CurveData, Piece
 
@@ -92,13 +93,13 @@ class Spline(Law):
     def repeats(self) -> bool:
         return self.ends == PERIODIC
 
-    def why_not_periodic(self, period: float, told: str) -> str:
+    def why_no_turn(self) -> str:
         if self.ends != PERIODIC:
             return "its table does not repeat; say ends = 'periodic'"
         width = self.points[-1][0] - self.points[0][0]
-        times = round(period / width)
-        if times < 1 or abs(width * times - period) > SAME * period:
-            return f"its table spans {width:.9g}, not {told} ({period:.9g})"
+        times = round(TURN / width)
+        if times < 1 or abs(width * times - TURN) > NEARLY * TURN:
+            return f"its table spans {math.degrees(width):.9g} deg, not a turn of 360 deg or a whole part of it"
         return ""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -16,10 +17,10 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
-from kinfmu.joints.laws import LAWS, Law
+from kinfmu.joints.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Spline
 from kinfmu.mechanism.law_table import law_keys
 from kinfmu.mechanism.toml_file import parse, text
-from tests.joints.drawn import coordinates, laws
+from tests.joints.drawn import coordinates, laws, splines
 from tests.power_series import Series
 
 every_law = pytest.mark.parametrize("cls", LAWS, ids=lambda cls: cls.type)
@@ -93,7 +94,7 @@ def test_a_law_is_the_same_after_writing_and_reading(cls: type[Law], data: st.Da
     assert parse(text(mechanism)) == mechanism
 
 
-@every_law
+@pytest.mark.parametrize("cls", [*RISES, MotionSequence], ids=lambda cls: cls.type)
 @given(data=st.data())
 def test_numbers_that_must_be_positive_are_told(cls: type[Law], data: st.DataObject) -> None:
     law = data.draw(laws(cls))
@@ -104,10 +105,34 @@ def test_numbers_that_must_be_positive_are_told(cls: type[Law], data: st.DataObj
                 driven(wrong)
 
 
-@every_law
-@given(data=st.data(), x=coordinates)
-def test_a_law_that_says_it_repeats_does(cls: type[Law], data: st.DataObject, x: float) -> None:
-    law = data.draw(laws(cls))
-    period = data.draw(st.sampled_from([2.0 * math.pi, 1.0]))
-    if not law.why_not_periodic(period, "a turn"):
-        assert law.at(x + period) == pytest.approx(law.at(x), abs=1e-7)
+@st.composite
+def turning(draw: st.DrawFn) -> Law:
+    """Laws that come back after a turn."""
+    spline = draw(splines("periodic"))
+    first, width = spline.points[0][0], spline.points[-1][0] - spline.points[0][0]
+    scaled = tuple((first + (x - first) * 2.0 * math.pi / width, u) for x, u in spline.points)
+    sequence = draw(laws(MotionSequence).filter(lambda law: len(law.segments) > 1))
+    whole = sum(segment.duration for segment in sequence.segments)
+    segments = [
+        segment._replace(duration=segment.duration * 2.0 * math.pi / whole, rise=0.0) for segment in sequence.segments
+    ]
+    rising = [k for k, segment in enumerate(segments) if segment.law != "dwell"]
+    if len(rising) > 1:
+        for k, rise in zip(rising[:2], (1.5, -1.5), strict=True):
+            segments[k] = segments[k]._replace(rise=rise)
+    return draw(
+        st.sampled_from(
+            [
+                Spline(scaled, "periodic"),
+                replace(sequence, segments=tuple(segments), repeat=True),
+                Harmonic(draw(coordinates), float(draw(st.integers(-3, 3)))),
+                Polynomial((draw(coordinates),)),
+            ]
+        )
+    )
+
+
+@given(law=turning(), x=coordinates)
+def test_a_law_that_comes_back_after_a_turn_says_so_and_does(law: Law, x: float) -> None:
+    assert law.why_no_turn() == ""
+    assert law.at(x + 2.0 * math.pi) == pytest.approx(law.at(x), abs=1e-11)  # x + 2 pi is rounded, and slopes are steep
