@@ -8,7 +8,7 @@ from kinfmu import gallery
 from kinfmu.analysis import check
 from kinfmu.analysis.file_notes import file_notes
 from kinfmu.mechanism.toml_file import parse
-from tests.mechanism.test_wrong_files import CRANK_ROCKER
+from tests.mechanism.test_wrong_files import CRANK_ROCKER, DRIVER
 
 
 @pytest.mark.parametrize("name", gallery.names())
@@ -32,6 +32,17 @@ def test_an_angle_that_looks_like_degrees_is_told() -> None:
     assert list(file_notes(mechanism)) == [
         "[bodies.crank] start.phi = 60 rad is 3437.75 deg, more than a turn: "
         "a bare angle is in radians; degrees are written such as '60 deg'"
+    ]
+
+
+def test_a_driven_distance_below_zero_is_told() -> None:
+    cylinder = (
+        'cylinder = { type = "distance", between = ["ground.O", "coupler.Q"], law = "constant_speed", start = -3 }'
+    )
+    mechanism = parse(CRANK_ROCKER.replace(DRIVER, f"{cylinder}\n", 1))
+    assert list(file_notes(mechanism)) == [
+        "[drivers.cylinder] the distance is -3 m at the start of the run: "
+        "it counts without its sign, and shrinks as the value grows"
     ]
 
 
