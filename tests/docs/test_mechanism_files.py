@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 import kinfmu
+from kinfmu.drivers import DRIVERS
+from kinfmu.joints import JOINTS
+from kinfmu.joints.laws import LAWS
 from kinfmu.mechanism.expression import DEEPEST, LONGEST
 from kinfmu.mechanism.mechanism import MOST_BODIES, MOST_PARAMETERS, RunSettings
 from kinfmu.mechanism.toml_file import LARGEST_FILE, parse
@@ -15,6 +18,7 @@ from kinfmu.mechanism.valid import LARGEST_NUMBER
 from tests.docs.key_tables import filled
 
 PATH = Path(__file__).parents[2] / "docs" / "mechanism-files.md"
+README = (PATH.parents[1] / "README.md").read_text(encoding="utf-8")
 PAGE = PATH.read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
@@ -42,6 +46,12 @@ def test_the_blocks_are_one_mechanism_that_solves() -> None:
 def test_every_table_of_the_format_is_on_the_page() -> None:
     tables = ("units", "parameters", "bodies.NAME", "joints.NAME", "drivers.NAME", "points", "outputs", "run")
     assert [re.sub(r"[`\[\]]", "", line[3:]) for line in PAGE.splitlines() if line.startswith("## `[")] == list(tables)
+
+
+def test_the_readme_names_every_type_and_no_other() -> None:
+    rows = dict(re.findall(r"^\| (?:`\[)?(\w+)[^|]*\|(.*)\|$", README, re.MULTILINE))
+    for table, classes in (("joints", JOINTS), ("drivers", DRIVERS), ("laws", LAWS)):
+        assert re.findall(r"`([^`]+)`", rows[table]) == [cls.type for cls in classes]
 
 
 def test_the_limits_are_those_of_the_code() -> None:
