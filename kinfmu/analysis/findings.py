@@ -24,7 +24,8 @@ def as_json(report: Report) -> dict[str, Any]:
     start: driver values by name from which runs are followed.
     singular: driver, value, kind ('change point' or 'limit'), block.
     ranges: driver, kind ('angle' or 'length'), low, high, turns (after which the mechanism repeats), reach (values
-    looked at), stopped, limits: value, bodies (that can move there while the driver stands still), coordinates.
+    looked at), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
+    while the driver stands still), coordinates.
     loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks), class,
     shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
     advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
@@ -84,7 +85,12 @@ def _range(reach: DriverRange) -> dict[str, Any]:
 
 
 def _limit(limit: LimitPosition) -> dict[str, Any]:
-    return {"value": limit.value, "bodies": list(limit.bodies), "coordinates": dict(limit.coordinates)}
+    return {
+        "value": limit.value,
+        "kind": limit.kind,
+        "bodies": list(limit.bodies),
+        "coordinates": dict(limit.coordinates),
+    }
 
 
 def _loop(named: NamedLoop) -> dict[str, Any]:

@@ -116,6 +116,7 @@ class _Net:
 
     def __init__(self, mechanism: Mechanism, without: set[str]) -> None:
         self.mechanism = mechanism
+        self.points = mechanism.body_points
         self.grid = _SAME * size_of(mechanism)
         self.joints = [joint for joint in mechanism.joints if joint.name not in without]
         self.places: list[list[Place]] = []  # of each pin
@@ -185,23 +186,27 @@ class _Net:
         return next((place for name in names for place in self.places[pin] if place.body == name), self.places[pin][0])
 
     def _place(self, point: str) -> Place:
-        x, y = self.mechanism.body_points[point]
+        x, y = self.points[point]
         return Place(body_of(point), float(x), float(y))
 
     def _number(self, place: Place) -> int:
         """The pin at a place; a new one if there is none."""
-        key = (place.body, round(place.x / self.grid), round(place.y / self.grid))
+        key = self._key(place)
         if key not in self._pin:
             self._pin[key] = len(self.places)
             self.places.append([place])
         return self._pin[key]
 
+    def _key(self, place: Place) -> tuple[str, int, int]:
+        return place.body, round(place.x / self.grid), round(place.y / self.grid)
+
     def _unite(self, a: Place, b: Place) -> None:
         into, gone = self._number(a), self._number(b)
         if into != gone:
+            for place in self.places[gone]:
+                self._pin[self._key(place)] = into
             self.places[into] += self.places[gone]
             self.places[gone] = []
-            self._pin = {key: into if pin == gone else pin for key, pin in self._pin.items()}
 
     def _join(self, link: Link, a: int, b: int) -> None:
         self.edges.setdefault(a, []).append(_Edge(link, b))

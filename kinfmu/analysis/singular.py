@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from kinfmu.analysis.limits import parting
 from kinfmu.analysis.way import Way
 from kinfmu.solver import Pose
-from kinfmu.solver.advance import Limit
+from kinfmu.solver.advance import NO_BLOCK, Limit
 from kinfmu.solver.bridge import Bridge
 
 
@@ -31,11 +31,13 @@ class SingularPoint:
 class LimitPosition:
     """The mechanism where a driver can go no further.
 
-    value: of the driver [rad or length]; coordinates: all of them by name, in the world; bodies: those that can move
-    there while the drivers stand still.
+    value: of the driver [rad or length]; kind: 'dead centre' (the motion turns back), 'change point' (branches cross
+    and no run goes over it) or 'end' (a distance of 0); coordinates: all of them by name, in the world; bodies: those
+    that can move there while the drivers stand still.
     """
 
     value: float
+    kind: str
     coordinates: Mapping[str, float] = field(hash=False)
     bodies: tuple[str, ...]
 
@@ -73,7 +75,15 @@ class DriverRange:
 def driver_range(way: Way) -> DriverRange:
     """Singular points and limits met on a way."""
     limits = [limit for limit in (way.low, way.high) if limit is not None]
-    found = [SingularPoint(limit.u[0], "limit", max(limit.block, -1) + 1, way.name) for limit in limits]
+    found = [
+        SingularPoint(
+            limit.u[0],
+            "change point" if _kind(way, limit) == "change point" else "limit",
+            max(limit.block, -1) + 1,
+            way.name,
+        )
+        for limit in limits
+    ]
     found += [
         _change_point(way, bridge)
         for bridge in way.bridges
@@ -83,7 +93,7 @@ def driver_range(way: Way) -> DriverRange:
     return DriverRange(
         driver=way.name,
         kind=way.kind,
-        points=tuple(found if way.kind != "angle" else _distinct(found, way.turns or 1)),
+        points=tuple(found if way.kind != "angle" or limits else _distinct(found, way.turns or 1)),
         lowest=_position(way, way.low),
         highest=_position(way, way.high),
         turns=way.turns,
@@ -96,7 +106,14 @@ def _position(way: Way, limit: Limit | None) -> LimitPosition | None:
     if limit is None:
         return None
     coordinates = way.at_limit(limit)
-    return LimitPosition(limit.u[0], coordinates, parting(way, coordinates))
+    return LimitPosition(limit.u[0], _kind(way, limit), coordinates, parting(way, coordinates))
+
+
+def _kind(way: Way, limit: Limit) -> str:
+    """What a limit is, as LimitPosition has it."""
+    if limit.block == NO_BLOCK:
+        return "end"
+    return "dead centre" if way.is_dead_centre(limit) else "change point"
 
 
 def _change_point(way: Way, bridge: Bridge) -> SingularPoint:
@@ -137,12 +154,10 @@ def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint
 
 def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
     """Points brought to [0, 2 pi turns), each once, in order."""
-    kept: dict[tuple[int, str], SingularPoint] = {}
+    kept: dict[int, SingularPoint] = {}
     period = turns * math.tau
     for point in points:
-        value = point.value
-        if point.kind == "change point":
-            value = math.fmod(math.fmod(value, period) + period, period)
-            value -= period if period - value < 1e-9 else 0.0
-        kept.setdefault((round(value * 1e7), point.kind), replace(point, value=value))
+        value = math.fmod(math.fmod(point.value, period) + period, period)
+        value -= period if period - value < 1e-9 else 0.0
+        kept.setdefault(round(value * 1e7), replace(point, value=value))
     return sorted(kept.values(), key=lambda point: point.value)

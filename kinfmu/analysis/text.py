@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from kinfmu.analysis.report import Report
 
 _MOST_LOOPS = 8  # of which the text tells; JSON has them all
+_END = {
+    "dead centre": "a dead centre",
+    "change point": "where branches cross and no run goes on",
+    "end": "where nothing is left of it",
+}
 _MOST_NAMES = 24  # in one line; JSON has them all
 
 
@@ -188,7 +193,8 @@ def _motion(report: Report) -> Iterator[str]:
 
 
 def _change_points(report: Report, reach: DriverRange, several: bool) -> Iterator[str]:
-    changes = [point.value for point in reach.points if point.kind == "change point"]
+    ends = (reach.low, reach.high)
+    changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
         places = _names(written(value, report.mechanism.length_unit, reach.kind) for value in changes)
         every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
@@ -203,28 +209,30 @@ def _all_multiples_of_pi(values: list[float]) -> bool:
 
 def _range(report: Report, reach: DriverRange) -> Iterator[str]:
     unit = report.mechanism.length_unit
-    low, high = (written(end, unit, reach.kind) for end in (reach.low or 0.0, reach.high or 0.0))
     seen = [written(end, unit, reach.kind) for end in reach.reach]
+    limits = [limit for limit in (reach.lowest, reach.highest) if limit is not None]
+    ends = [written(limit.value, unit, reach.kind) for limit in limits]
     if reach.stopped is not None:
         yield _line("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
-    elif reach.lowest is not None and reach.highest is not None:
-        ends = "dead centre at each limit"
-        if reach.kind == "length" and reach.low == 0.0 and not any(p.value == 0.0 and p.block for p in reach.points):
-            ends = "nothing is left of it at 0, dead centre at the other limit"
-        yield _line("range", f"{reach.driver} from {low} to {high}; {ends}")
+    elif len(limits) == 2:
+        low, high = (_END[limit.kind] for limit in limits)
+        if limits[0].kind == limits[1].kind == "dead centre":
+            yield _line("range", f"{reach.driver} from {ends[0]} to {ends[1]}; dead centre at each limit")
+        else:
+            yield _line("range", f"{reach.driver} from {ends[0]}, {low}, to {ends[1]}, {high}")
     elif reach.lowest is not None:
-        yield _line("range", f"{reach.driver} from {low}, a dead centre; no limit up to {seen[1]}")
+        yield _line("range", f"{reach.driver} from {ends[0]}, {_END[limits[0].kind]}; no limit up to {seen[1]}")
     elif reach.highest is not None:
-        yield _line("range", f"{reach.driver} up to {high}, a dead centre; no limit down to {seen[0]}")
+        yield _line("range", f"{reach.driver} up to {ends[0]}, {_END[limits[0].kind]}; no limit down to {seen[0]}")
     elif reach.turns == 1:
         yield _line("range", f"{reach.driver} turns all the way round")
     elif reach.turns is not None:
         yield _line("range", f"{reach.driver} turns all the way round; the mechanism repeats after {reach.turns} turns")
     else:
         yield _line("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
-    for limit in (reach.lowest, reach.highest):
-        if limit is not None and limit.bodies:
-            yield _line("", f"at {written(limit.value, unit, reach.kind)} {_parted(report, reach, limit)}")
+    for limit, end in zip(limits, ends, strict=True):
+        if limit.bodies:
+            yield _line("", f"at {end} {_parted(report, reach, limit)}")
 
 
 def _parted(report: Report, reach: DriverRange, limit: LimitPosition) -> str:

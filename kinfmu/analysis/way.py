@@ -56,17 +56,29 @@ class Way:
 
         There they go like a + b sqrt(s) + c s with the way s that is left: three poses beside it give a.
         """
-        is_low = limit is self.low
-        start, inwards = (self.poses[0], 1.0) if is_low else (self.poses[-1], -1.0)
-        near = []
-        for part in (1.0, 4.0, 9.0):
-            u = limit.u[0] + inwards * part * _BESIDE_LIMIT * self.solver.model.REACH[0]
-            pose = self.solver.solve(start, (u,))
-            if not pose.good:
-                return self.coordinates(start)
-            near.append(self.coordinates(pose))
-        first, second, third = near
+        beside = self._beside(limit)
+        if len(beside) < 3:
+            return self.coordinates(self.poses[0 if limit is self.low else -1])
+        first, second, third = map(self.coordinates, beside)
         return {name: 3.0 * first[name] - 3.0 * second[name] + third[name] for name in first}
+
+    def is_dead_centre(self, limit: Limit) -> bool:
+        """True if the motion turns back at a limit: rates per unit of the driver grow like 1 / sqrt(s) towards it.
+
+        Where they stay as they are, branches cross, and it is the solver that goes no further.
+        """
+        beside = self._beside(limit)
+        if len(beside) < 3:
+            return True
+        near, far = (max(map(abs, self.speeds(pose).values())) for pose in beside[:2])  # at s and at 4 s
+        return near > 1.5 * far
+
+    def _beside(self, limit: Limit) -> list[Pose]:
+        """Poses at s, 4 s and 9 s before a limit; fewer if they cannot be reached."""
+        start, inwards = (self.poses[0], 1.0) if limit is self.low else (self.poses[-1], -1.0)
+        parts = [inwards * part * _BESIDE_LIMIT * self.solver.model.REACH[0] for part in (1.0, 4.0, 9.0)]
+        poses = [self.solver.solve(start, (limit.u[0] + part,)) for part in parts]
+        return [pose for pose in poses if pose.good]
 
 
 @dataclass(frozen=True)
@@ -94,8 +106,8 @@ def follow(plan: SolvePlan, number: int) -> Way:
     solver = Solver(load_model(single))
     anchor, turns, low = solver.anchor, None, None
     if driver.quantity.kind == "angle":
-        up, turns = _turned(solver, single)
-        down = _Leg([], []) if turns is not None else _leg(solver, anchor, -math.tau, 1.0)
+        up, turns = _turned(solver, single, math.tau)
+        down, _ = (_Leg([], []), None) if turns is not None else _turned(solver, single, -math.tau)
     else:
         reach = SIZES * plan.size
         least = 0.0 if isinstance(driver.measured(), DistanceBetween) else -math.inf
@@ -117,13 +129,13 @@ def follow(plan: SolvePlan, number: int) -> Way:
     )
 
 
-def _turned(solver: Solver, plan: SolvePlan) -> tuple[_Leg, int | None]:
-    """Turn after turn forwards, and how many bring the mechanism back."""
+def _turned(solver: Solver, plan: SolvePlan, way: float) -> tuple[_Leg, int | None]:
+    """Turn after turn one way, 2 pi or -2 pi, and how many bring the mechanism back."""
     whole = _Leg([], [])
     pose = solver.anchor
     most = 1 if len(plan.mechanism.coordinate_names) > _LARGE else MOST_TURNS
     for turn in range(1, most + 1):
-        leg = _leg(solver, pose, math.tau, 1.0)
+        leg = _leg(solver, pose, way, 1.0)
         whole = _Leg(whole.poses + leg.poses, whole.bridges + leg.bridges, leg.limit, leg.stopped)
         if not whole.is_whole:
             return whole, None

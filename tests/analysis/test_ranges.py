@@ -121,6 +121,27 @@ def test_a_cylinder_that_closes_wholly_ends_at_zero() -> None:
     assert report.ranges[0].low == pytest.approx(0.0, abs=1e-12)
     assert report.ranges[0].high == pytest.approx(4.0, abs=1e-10)
     assert [point.kind for point in report.ranges[0].points] == ["limit", "limit"]
+    assert "lift from 0 m, where nothing is left of it, to 4 m, a dead centre" in str(report)
+
+
+def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dead_centre() -> None:
+    report = kinfmu.check(kinfmu.load("parallel_jaw"))
+    (reach,) = report.ranges
+    assert reach.lowest is not None
+    assert reach.highest is not None
+    dead_centre = math.sqrt((20 + 40) ** 2 - 25**2)  # crank and rod in line
+    assert (reach.lowest.value, reach.lowest.kind) == (pytest.approx(-dead_centre, abs=1e-9), "dead centre")
+    if reach.highest.value < dead_centre - 1e-6:
+        assert reach.highest.kind == "change point"
+        assert "where branches cross and no run goes on" in str(report)
+
+
+def test_a_rack_goes_more_than_a_turn_to_either_limit() -> None:
+    (reach,) = kinfmu.check(kinfmu.load("rack_steering")).ranges
+    assert reach.low is not None
+    assert reach.high is not None
+    assert reach.low == pytest.approx(-reach.high, abs=1e-9)
+    assert reach.high > math.tau
 
 
 def test_change_points_show_with_several_drivers_too() -> None:
