@@ -300,8 +300,7 @@ def _thrown_together(mechanism: Mechanism) -> FloatArray | None:
     ground = next(body for body in system.mechanism.bodies if body.is_ground)
     middle = np.mean([*ground.points.values()] or [Point(0.0, 0.0)], axis=0)
     centre = np.tile([*middle, 0.0], len(system.coordinates) // 3)
-    spread = np.where(system.column_scales == 1.0, math.pi, _SPREAD * system.size)
-    spread[2::3] = math.pi
+    spread = np.tile([_SPREAD * system.size, _SPREAD * system.size, math.pi], len(system.coordinates) // 3)
     for _ in range(_STARTS):
         pose, gap = close(system, centre + spread * rng.uniform(-1.0, 1.0, len(centre)), u)
         if gap <= CLOSED:

@@ -164,12 +164,13 @@ def _gradient(system: System, driver: Driver, pose: FloatArray) -> FloatArray:
 
 
 def _keys(driver: Driver) -> dict[str, Any]:
-    """The keys of a driver's table, without its law and what may be left out."""
+    """The keys of a driver's table, with the simplest law and without what may be left out."""
     keys: dict[str, Any] = {"type": driver.type}
     for field in fields(driver):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
         value = getattr(driver, field.name)
         if field.name not in ("name", "law") and value != field.default:
             keys[field.name] = list(value) if isinstance(value, tuple) else value
+    keys["law"] = driver.law.type
     return keys
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import row_reduced
+from kinfmu.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 
@@ -106,6 +108,27 @@ def test_findings_have_the_keys_that_their_docstring_names() -> None:
     for mechanism in (reference_fourbar(), five_bar(), slider_crank(), reference_fourbar(bar=1.01)):
         for key in kinfmu.check(mechanism).as_json():
             assert re.search(rf"\b{key}\b", described)
+
+
+def test_ranges_need_no_more_outputs_than_the_file_asks_for() -> None:
+    report = kinfmu.check(replace(five_bar(), coordinates=("forearm.phi",), points={}))
+    assert report.plan is not None
+    assert report.plan.coordinates == ("forearm.phi",)
+    assert [reach.turns for reach in report.ranges] == [1, 1]
+    assert len(report.assemblies().found) == 2
+
+
+def test_a_large_mechanism_is_told_in_short() -> None:
+    report = kinfmu.check(fourbar_chain(80))
+    assert report.range is not None
+    assert report.range.turns == 1
+    assert len(report.loops) == 80
+    assert {named.grashof.shape for named in report.loops} == {"parallelogram"}
+    text = str(report)
+    assert "and 72 more four-bars and slider-cranks" in text
+    assert "bodies      161 moving: bar_0, bar_1, coupler_1" in text
+    assert "and 137 more" in text
+    assert len(text) < 10_000
 
 
 def test_a_contradiction_stands_in_the_report_and_does_not_raise() -> None:

@@ -8,8 +8,8 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Fixed, Mechanism, Revolute, Translational
-from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MobilityError
+from kinfmu.mechanism.toml_file import parse, text
 from tests.mechanisms import five_bar, fourbar
 
 
@@ -31,7 +31,7 @@ def test_a_missing_driver_is_told_with_what_is_loose_and_what_could_be_driven() 
     assert (report.advice.missing, report.advice.loose, report.advice.surplus) == (1, ("arm.phi",), ())
     text = str(report)
     assert "  loose       arm.phi: 1 more driver needed" in text
-    assert '  could add   [drivers] arm = { type = "angle", of = "arm" }' in text
+    assert '  could add   [drivers] arm = { type = "angle", of = "arm", law = "constant_speed" }' in text
 
 
 @pytest.mark.parametrize("count", [0, 1])
@@ -40,12 +40,8 @@ def test_suggested_drivers_make_the_mechanism_move(count: int) -> None:
     advice = kinfmu.check(mechanism).advice
     assert advice is not None
     assert len(advice.suggestions) == advice.missing == 2 - count
-    types = {cls.type: cls for cls in DRIVERS}
-    added = []
-    for suggestion in advice.suggestions:
-        keys = dict(suggestion.keys)
-        added.append(types[keys.pop("type")](suggestion.name, **keys))
-    assert kinfmu.check(replace(mechanism, drivers=(*mechanism.drivers, *added))).problem is None
+    pasted = "\n".join(str(suggestion).replace("[drivers] ", "drivers.") for suggestion in advice.suggestions)
+    assert kinfmu.check(parse(pasted + "\n" + text(mechanism))).problem is None
 
 
 def test_a_body_in_the_open_could_be_driven_by_its_angle_and_a_point() -> None:
@@ -59,7 +55,9 @@ def test_a_slide_could_be_driven_along_its_axis() -> None:
     advice = kinfmu.check(Mechanism("slide", bodies, [Translational("rail", ("ground.G", "block.P"), 0.5)])).advice
     assert advice is not None
     (suggestion,) = advice.suggestions
-    assert str(suggestion) == '[drivers] rail = { type = "slide", between = ["ground.G", "block.P"], axis = 0.5 }'
+    assert str(suggestion) == (
+        '[drivers] rail = { type = "slide", between = ["ground.G", "block.P"], axis = 0.5, law = "constant_speed" }'
+    )
 
 
 def test_a_driver_too_many_is_named_with_the_one_it_fights() -> None:
@@ -77,7 +75,7 @@ def test_two_drivers_on_one_freedom_while_another_is_free_are_told() -> None:
     assert isinstance(report.problem, MobilityError)
     assert str(report.problem) == (
         "[drivers.two] drives what crank and the joints determine, while arm can still move; "
-        'drive, for example, [drivers] arm = { type = "angle", of = "arm" }'
+        'drive, for example, [drivers] arm = { type = "angle", of = "arm", law = "constant_speed" }'
     )
 
 
