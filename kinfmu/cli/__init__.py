@@ -1,0 +1,9 @@
+"""The command line: kinfmu list | new | schema | check | solve | build | simulate | review.
+
+A command a file, which puts itself into the group `main` when it is imported.
+"""
+
+from kinfmu.cli import build, check, listing, new, review, schema, simulate, solve
+from kinfmu.cli.group import main
+
+__all__ = ["build", "check", "listing", "main", "new", "review", "schema", "simulate", "solve"]

@@ -1,0 +1,5 @@
+"""python -m kinfmu.cli: the command line."""
+
+from kinfmu.cli import main
+
+main()

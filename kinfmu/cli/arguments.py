@@ -1,0 +1,110 @@
+"""Kinds of arguments: a mechanism, NAME=VALUE, and ranges of numbers with units."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kinfmu import gallery
+from kinfmu.errors import listed, suggestion
+from kinfmu.units import Quantity, factors
+
+
+class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+    """A gallery name or a .toml file; what does not exist is wrong usage, what is wrong in it the mechanism's fault."""
+
+    name = "MECH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        known = gallery.names()
+        if gallery.has(str(value)) or (str(value).endswith(".toml") and exists(Path(value))):
+            return str(value)
+        if str(value).endswith(".toml"):
+            self.fail(f"{value}: there is no such file", param, ctx)
+        hint = suggestion(str(value), known)
+        message = f"'{value}' is not in the gallery{hint}; gallery: {listed(known)}; files end in .toml"
+        return self.fail(message, param, ctx)
+
+
+class Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+    """NAME=VALUE."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        if isinstance(value, tuple):
+            return value
+        name, equals, text = str(value).partition("=")
+        if not (name and equals and text):
+            self.fail(f"'{value}' must be NAME=VALUE, such as crank.speed=2.0", param, ctx)
+        return name, text
+
+
+class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+    """A:B:X of numbers, with units where the quantity has any."""
+
+    def __init__(self, quantity: Quantity, last: str) -> None:
+        self.quantity = quantity
+        self.last = last
+        self.name = f"A:B:{last}"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).split(":")
+        if len(parts) != 3:
+            example = "0deg:360deg:361" if self.last == "N" else "0:1.5:0.01"
+            self.fail(f"'{value}' must be {self.name}, such as {example}", param, ctx)
+        third = Quantity("number") if self.last == "N" else self.quantity
+        try:
+            numbers = [
+                _number(part, quantity)
+                for part, quantity in zip(parts, (self.quantity, self.quantity, third), strict=True)
+            ]
+        except ValueError as error:
+            return self.fail(str(error), param, ctx)
+        a, b, x = numbers
+        if self.last == "N" and (x != int(x) or x < 1):
+            self.fail(f"'{value}': N = {parts[2]} must be a whole number of samples", param, ctx)
+        if self.last == "STEP" and (x <= 0.0 or b < a):
+            self.fail(f"'{value}' must run forwards with a positive step", param, ctx)
+        from kinfmu.run import MOST_SAMPLES
+
+        if (x if self.last == "N" else (b - a) / x) > MOST_SAMPLES:
+            self.fail(f"'{value}' asks for more than {MOST_SAMPLES} samples", param, ctx)
+        return a, b, x
+
+
+def exists(path: Path) -> bool:
+    """True if something other than a folder is there; a name that no file can have is not there."""
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def _number(text: str, quantity: Quantity) -> float:
+    """'360deg' as radians, '1.5' as it is; ValueError says what would be valid."""
+    known = factors(quantity, "m") if quantity.kind != "length" else {}
+    for unit in sorted(known, key=len, reverse=True):
+        if text.endswith(unit) and text[: -len(unit)].strip():
+            text, factor = text[: -len(unit)], known[unit]
+            break
+    else:
+        factor = 1.0
+    try:
+        number = float(text) * factor
+    except ValueError:
+        raise ValueError(f"'{text}' is not a number{f' (units: {listed(known)})' if known else ''}") from None
+    if not math.isfinite(number):
+        raise ValueError(f"'{text}' is not a finite number")
+    return number
+
+
+MECHANISM = MechanismName()
+SETTING = Setting()

@@ -1,0 +1,54 @@
+"""The group of commands, and how what went wrong is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from kinfmu import VERSION
+from kinfmu.errors import AssemblyError, KinfmuError, MechanismError
+
+
+class _Group(click.Group):
+    """Turns what kinfmu raises on purpose into one line on stderr and exit status 1."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KinfmuError as error:
+            click.echo("kinfmu: " + " ".join(str(error).splitlines()), err=True)
+            ctx.exit(1)
+        except MemoryError:
+            click.echo("kinfmu: there is not enough memory for so large a mechanism", err=True)
+            ctx.exit(1)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(VERSION, prog_name="kinfmu")
+def main() -> None:
+    """Planar kinematics: from a mechanism file to an FMU and logs that can be reviewed.
+
+    MECH is a name of the gallery (kinfmu list) or a .toml file. Exit status: 0 fine, 1 the mechanism or the run is at
+    fault, 2 wrong usage.
+    """
+
+
+@contextmanager
+def about(mechanism: str) -> Iterator[None]:
+    """What is found wrong in a mechanism after its file was read is told with the file's name in front."""
+    try:
+        yield
+    except (MechanismError, AssemblyError) as error:
+        raise type(error)(f"{mechanism}: {error}", **error.data) from None
+
+
+@contextmanager
+def instead(path: str, name: str) -> Iterator[None]:
+    """What is found wrong is told of what the user named, not of a file made on the way."""
+    try:
+        yield
+    except KinfmuError as error:
+        raise type(error)(str(error).replace(path, name), **error.data) from None

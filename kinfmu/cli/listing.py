@@ -1,0 +1,17 @@
+"""kinfmu list: the gallery."""
+
+from __future__ import annotations
+
+import click
+
+from kinfmu import gallery
+from kinfmu.cli.group import main
+
+
+@main.command("list")
+def list_() -> None:
+    """The mechanisms of the gallery."""
+    names = gallery.names()
+    width = max(map(len, names), default=0)
+    for name in names:
+        click.echo(f"{name:{width}}  {gallery.load(name).title}")

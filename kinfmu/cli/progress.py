@@ -1,0 +1,36 @@
+"""A progress bar for long runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+LONG_RUN = 2000  # samples from which a progress bar is worth a line
+
+
+class Progress:
+    """A progress bar on stderr for long runs, where somebody sees it."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._done = 0
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.render_finish()
+
+    def _show(self, done: int, count: int) -> None:
+        if self._bar is None:
+            if count < LONG_RUN or not sys.stderr.isatty():
+                return
+            self._bar = click.progressbar(length=count, label="simulating", file=sys.stderr)
+            self._bar.render_progress()
+        if done - self._done >= count // 200 or done == count:
+            self._bar.update(done - self._done)
+            self._done = done

@@ -1,0 +1,26 @@
+"""kinfmu schema: the JSON Schema of mechanism files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kinfmu.cli.group import main
+from kinfmu.errors import KinfmuError
+
+
+@main.command()
+@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), help="Where to; stdout if not said.")
+def schema(output: Path | None) -> None:
+    """The JSON Schema of mechanism files, by which editors complete and check them."""
+    from kinfmu.mechanism.schema import schema_text
+
+    if output is None:
+        click.echo(schema_text(), nl=False)
+        return
+    try:
+        output.write_text(schema_text(), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise KinfmuError(f"{output}: cannot be written ({error.strerror})") from None
+    click.echo(f"{output}: written; a mechanism file names it in its first line: #:schema {output}")

@@ -1,0 +1,78 @@
+"""kinfmu solve: a run as a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kinfmu import gallery
+from kinfmu.cli.arguments import MECHANISM, SETTING, Range
+from kinfmu.cli.group import about, main
+from kinfmu.cli.settings import as_numbers
+from kinfmu.cli.verdict import fail_if_failed, verdict
+from kinfmu.errors import listed
+from kinfmu.units import Quantity
+
+TABLES = (".csv", ".parquet", ".npz")
+
+
+@main.command()
+@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@click.option(
+    "-o", "output", type=click.Path(dir_okay=False, path_type=Path), required=True, help=".csv, .parquet or .npz."
+)
+@click.option("--times", type=Range(Quantity("time"), "STEP"), help="Times [s]; the file's run if nothing is said.")
+@click.option(
+    "--angle",
+    type=Range(Quantity("angle"), "N"),
+    help="N values of the driver [rad], or such as 0deg:360deg:361; rates are for 1 rad/s, time counts the samples.",
+)
+@click.option(
+    "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=2.0."
+)
+@click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
+@click.option("--engine", type=click.Choice(["auto", "python"]), default="auto", show_default=True)
+def solve(
+    mechanism: str,
+    output: Path,
+    times: tuple[float, float, float] | None,
+    angle: tuple[float, float, float] | None,
+    settings: tuple[tuple[str, str], ...],
+    outputs: str | None,
+    engine: str,
+) -> None:
+    """Solve position, velocity and acceleration at times or at driver values, into a table."""
+    import numpy as np
+
+    from kinfmu.log import write_table
+    from kinfmu.mechanism import RunSettings
+    from kinfmu.sweep import run_times
+    from kinfmu.sweep import solve as solved
+
+    if output.suffix.lower() not in TABLES:
+        raise click.UsageError(f"-o {output}: a table ends in one of {listed(TABLES)}")
+    if times and angle:
+        raise click.UsageError("--times and --angle cannot both drive")
+    mech = gallery.load(mechanism)
+    wanted = [name.strip() for name in outputs.split(",")] if outputs else None
+    geometry: dict[str, float | str] = {name: text for name, text in settings if name in mech.parameters}
+    laws = as_numbers(tuple(setting for setting in settings if setting[0] not in geometry))
+    for name, value in laws.items():
+        if isinstance(value, bool):
+            raise click.UsageError(f"--set {name}: a law constant is a number")
+    if angle:
+        if len(mech.drivers) != 1:
+            raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
+        t = None
+        for name in laws:
+            raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
+        samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
+    else:
+        t, samples = (run_times(RunSettings(*times)) if times else None), {}
+    with about(mechanism):
+        run = solved(mech, t, parameters=geometry | laws, outputs=wanted, engine=engine, **samples)
+    write_table(run, output)
+    click.echo(f"{verdict(run)}; written to {output}")
+    fail_if_failed(run)
