@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.drivers import DriverAdvice, better_told, driver_advice
 from kinfmu.analysis.file_notes import file_notes
 from kinfmu.analysis.findings import as_json
-from kinfmu.analysis.matrices import Matrix, moving_jacobian
+from kinfmu.analysis.matrices import Matrix
 from kinfmu.analysis.named import NamedLoop, find_named
+from kinfmu.analysis.pose_matrices import pose_matrices
 from kinfmu.analysis.run_notes import run_notes
 from kinfmu.analysis.singular import DriverRange, SingularPoint, driver_range
 from kinfmu.analysis.text import lines
 from kinfmu.analysis.way import follow
-from kinfmu.analysis.written import written
-from kinfmu.equations.assembly import assemble, close
-from kinfmu.equations.system import FloatArray, System
-from kinfmu.errors import AssemblyError, KinfmuError, listed
+from kinfmu.equations.system import System
+from kinfmu.errors import AssemblyError, KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
 from kinfmu.redundancy import DependentRow, Redundancy, find_redundancy
-from kinfmu.sweep import solve
-
-SMALL_TURN = math.radians(1.0)  # [rad]; what restores the rank at a singular point
 
 
 @dataclass(frozen=True)
@@ -116,7 +108,7 @@ class Report:
         """The report's matrices: Phi_K,q at the start pose, Phi_q at each singular point and a small turn beside it."""
         if self.plan is None:
             raise self.problem or KinfmuError("there is no plan, so there are no matrices")
-        return _matrices(self, self.plan)
+        return pose_matrices(self.plan, self.redundancy, self.range)
 
 
 def check(mechanism: Mechanism) -> Report:
@@ -146,45 +138,3 @@ def check(mechanism: Mechanism) -> Report:
     return Report(
         mechanism, redundancy, None, plan, ranges, find_named(mechanism, redundancy, ways), None, tuple(notes)
     )
-
-
-def _matrices(report: Report, plan: SolvePlan) -> tuple[Matrix, ...]:
-    system = System(localized(report.mechanism)[0])
-    assembled = assemble(system)
-    moving = [name for name in system.coordinates if name not in plan.fixed]
-    if assembled is None or not moving:
-        return ()
-    joint_rows = list(range(system.joint_row_count))
-    driving = list(range(system.joint_row_count, len(system.rows)))
-    solved = [*report.redundancy.kept, *driving]
-    start = _at(report, assembled.u)
-    told = [moving_jacobian(system, assembled.q, joint_rows, moving, f"Phi_K,q at {start}")]
-    told.append(moving_jacobian(system, assembled.q, solved, moving, f"Phi_q at {start}"))
-    for point in report.range.points if report.range else ():
-        beside = point.value + SMALL_TURN
-        if report.range and report.range.high is not None and beside > report.range.high:
-            beside = point.value - SMALL_TURN
-        for value, note in ((point.value, "singular point"), (beside, "a small turn beside it")):
-            q = _pose(system, plan, value)
-            if q is not None:
-                told.append(moving_jacobian(system, q, solved, moving, f"Phi_q at {_at(report, [value])}, {note}"))
-    return tuple(told)
-
-
-def _at(report: Report, u: Iterable[float]) -> str:
-    """'crank = pi/3 (60 deg)': driver values for a title."""
-    unit, drivers = report.mechanism.length_unit, report.mechanism.drivers
-    return listed(f"{d.name} = {written(float(v), unit, d.quantity.kind)}" for d, v in zip(drivers, u, strict=True))
-
-
-def _pose(system: System, plan: SolvePlan, value: float) -> FloatArray | None:
-    """All coordinates at a driver value, exactly at a limit too: closed from the pose a little before it."""
-    driver = plan.drivers[0]
-    for nearer in (0.0, 1e-9, -1e-9):
-        asked: dict[str, Any] = {driver.inputs[0]: [value + nearer]}
-        run = solve(plan, **asked)
-        if run.good[0]:
-            offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
-            q = np.array([run[name][0] - offset[name.rpartition(".")[2]] for name in system.coordinates])
-            return q if nearer == 0.0 else close(system, q, np.array([value]))[0]
-    return None

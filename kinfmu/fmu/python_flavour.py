@@ -43,14 +43,16 @@ CAPABILITIES = {
     "canSerializeFMUstate": True,
     "providesDirectionalDerivative": False,  # as does it for derivatives of any kind
 }
-RUN_TIME = ("slave.py", "estimated_rates.py")  # of this room
+RUN_TIME = ("slave.py", "layout.py", "fetch.py", "estimated_rates.py", "hold.py")  # of this room
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
-from {package}.fmu.slave import Layout, MechanismSlave, PartLayout, hold
+from {package}.fmu.hold import hold
+from {package}.fmu.layout import Layout, PartLayout
+from {package}.fmu.slave import MechanismSlave
 from {package}.solver import model
 
 hold(globals())

@@ -8,50 +8,23 @@ possible all the same), shows messages only to hosts that instantiate with loggi
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
-from collections.abc import Callable, Sequence
-from operator import itemgetter
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import Sample, estimated_rates
+from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
+from kinfmu.fmu.layout import Layout, Places
 from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
-Row = tuple[float, ...]
-
-NOT_A_NUMBER = math.nan
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 KEPT = 3  # commits that are remembered: estimates use two before the present, and a host may go back by one
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
-
-
-class PartLayout(NamedTuple):
-    """Variables that are computed together: their names, and start values where they have some."""
-
-    name: str
-    variables: tuple[str, ...]
-    starts: tuple[Any, ...] = ()
-
-
-class Layout(NamedTuple):
-    """What a slave must know of its interface: variables in order of value references, and the content token."""
-
-    token: str
-    start_time: float  # [s]
-    parts: tuple[PartLayout, ...]
-
-
-class Fetch(NamedTuple):
-    """How to read one list of Real variables: read one part and the others into a row, pick these places."""
-
-    read: Callable[[], Row]
-    others: tuple[Callable[[], Row], ...]
-    pick: Callable[[Row], Sequence[float]] | None  # None: all of them
 
 
 class Shown:
@@ -100,7 +73,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._parameters: Row = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
         self._driven_by_time: bool = parts["drive"].starts[0]
-        self._references = _Places(self.layout)
+        self._references = Places(self.layout)
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real
         self._last_fetch = self._plan_fetch(())
@@ -270,39 +243,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return tuple(self._solver.model.FIXED.values())
 
     def _plan_fetch(self, vrs: tuple[int, ...]) -> Fetch:
-        """Work out once how a list of Real value references is read."""
-        places = [self._references.real(vr) for vr in vrs]
-        parts = sorted({part for part, _ in places if part is not None})
-        offsets: dict[int, int] = {}
-        width = 0
-        for part in parts:
-            offsets[part] = width
-            width += len(self.layout.parts[part].variables)
-        readers = self._readers([self.layout.parts[part].name for part in parts])
-        indices = []
-        for vr, (found, place) in zip(vrs, places, strict=True):
-            if found is None:
+        """Work out how a list of Real value references is read, and remember it."""
+        for vr in vrs:
+            if self._references.real(vr)[0] is None:
                 self.log(f"value reference {vr} is not a Real variable of this FMU", Fmi2Status.error)
-                indices.append(width)
-            else:
-                indices.append(offsets[found] + place)
-        if width in indices or not readers:
-            readers.append(_no_number)
-        fetch = Fetch(readers[0], tuple(readers[1:]), _picker(indices, width))
+        fetch = plan_fetch(self._references, vrs, lambda part: getattr(self, f"_read_{part}"))
         if len(self._fetches) >= MOST_FETCHES:
             self._fetches.clear()
         self._fetches[vrs] = fetch
         return fetch
-
-    def _readers(self, names: list[str]) -> list[Callable[[], Row]]:
-        """Methods that read these parts, one after another."""
-        readers: list[Callable[[], Row]] = []
-        whole = "values", "rates", "accelerations"
-        while names:
-            count = len(whole) if tuple(names[: len(whole)]) == whole else 1
-            readers.append(self._read_motion if count > 1 else getattr(self, f"_read_{names[0]}"))
-            names = names[count:]
-        return readers
 
     # Get
 
@@ -484,9 +433,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if pose.status > LAST_GOOD:
                 return self._discard(pose, current_time)
             if not self._touched or current_time != self._time:
-                self._shown = self._motion = (
-                    None  # the host holds its inputs, or its clock differs: estimates see another time
-                )
+                self._shown = self._motion = None  # inputs are held, or clocks differ: estimates see another time
             history = self._history
             if len(history) == KEPT and history[-1][0] < current_time:  # _commit, without what is rare
                 self._history = (history[1], history[2], (current_time, pose.u))
@@ -601,52 +548,3 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return dict(json.loads(state))
         except (ValueError, TypeError):
             return {}  # refused when it is set: an exception here would be Fatal for the host
-
-
-def hold(namespace: dict[str, Any]) -> None:
-    """Take a reference to a module's namespace for good.
-
-    pythonfmu 0.7 runs the slave's module once an instance and each time releases a reference to its namespace that it
-    does not own: without this, the third instance of a process finds the namespace freed and crashes.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
-
-
-class _Places:
-    """Where the variable of a value reference is found."""
-
-    _NOT_REAL = ("counts", "drive", "message")
-
-    def __init__(self, layout: Layout) -> None:
-        self._places = [(k, i) for k, part in enumerate(layout.parts) for i in range(len(part.variables))]
-        self._layout = layout
-
-    def real(self, vr: int) -> tuple[int, int] | tuple[None, int]:
-        """Part and place of a Real variable, (None, 0) if the value reference is none of those."""
-        if 0 <= vr < len(self._places):
-            part, place = self._places[vr]
-            if self._layout.parts[part].name not in self._NOT_REAL:
-                return part, place
-        return None, 0
-
-    def name(self, vr: int) -> str:
-        """Name of the variable, empty if there is none."""
-        if 0 <= vr < len(self._places):
-            part, place = self._places[vr]
-            return self._layout.parts[part].variables[place]
-        return ""
-
-
-def _no_number() -> Row:
-    return (NOT_A_NUMBER,)
-
-
-def _picker(indices: list[int], width: int) -> Callable[[Row], Sequence[float]] | None:
-    """Pick these places of a row of that width: a slice if they are neighbours, None if they are all."""
-    if indices == list(range(width)):
-        return None
-    if not indices:
-        return itemgetter(slice(0, 0))
-    if indices == list(range(indices[0], indices[0] + len(indices))):
-        return itemgetter(slice(indices[0], indices[-1] + 1))
-    return itemgetter(*indices)

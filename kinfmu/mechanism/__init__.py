@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from kinfmu.mechanism.body import Body, Point, Start
-from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.run_settings import RunSettings
 
 __all__ = ["Body", "Mechanism", "Parameter", "Point", "RunSettings", "Start"]

@@ -18,10 +18,11 @@ from kinfmu.joints.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.law_table import law_keys, law_lines, read_law
-from kinfmu.mechanism.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.number import written
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.run_settings import RunSettings
 from kinfmu.mechanism.valid import check_name
 from kinfmu.units import METRES, Quantity, unit_of
 

@@ -11,8 +11,10 @@ import kinfmu
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.joints.laws import LAWS
+from kinfmu.mechanism import RunSettings
+from kinfmu.mechanism.checks import MOST_BODIES
 from kinfmu.mechanism.expression import DEEPEST, LONGEST
-from kinfmu.mechanism.mechanism import MOST_BODIES, MOST_PARAMETERS, RunSettings
+from kinfmu.mechanism.resolve import MOST_PARAMETERS
 from kinfmu.mechanism.toml_file import LARGEST_FILE, parse
 from kinfmu.mechanism.valid import LARGEST_NUMBER
 from tests.docs.key_tables import filled

@@ -30,6 +30,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from kinfmu.backends.python.alike import Calls, grouped
 from kinfmu.backends.python.alone import Alone
+from kinfmu.backends.python.binding import bound, parametric
 from kinfmu.backends.python.block_code import (
     assigned_lines,
     indented,
@@ -41,11 +42,11 @@ from kinfmu.backends.python.block_code import (
     unpacking,
 )
 from kinfmu.backends.python.definitions import Definitions, formula
+from kinfmu.backends.python.header import header, places
 from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.trace import is_parameter, parameter_symbol
 
 MANY = 64  # unknowns; beyond, a name for each of their parts would make functions of tens of thousands of names
 
@@ -63,11 +64,7 @@ class _Emitter:
         self.curves = {data: f"CURVE_{k}" for k, data in enumerate(curves, start=1)}
         self.unknowns = plan.unknowns
         self.many = len(self.unknowns) > MANY
-        first = 0
-        self.places: list[tuple[int, int]] = []  # first and last + 1 of each solved block's unknowns
-        for block in self.solved:
-            self.places.append((first, first + len(block.unknowns)))
-            first += len(block.unknowns)
+        self.places = places(self.solved)
         self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
         members = grouped(self.solved, self._rate_of)
         self.calls = {k: Calls(k, self.solved[k], member, self._rate_of) for k, member in members.items()}
@@ -83,7 +80,7 @@ class _Emitter:
                     self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
                 self.position_nodes += [motion[0] for _, motion in block.assigned]
                 self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
-        self.parametric, self.prolog = _parametric(plan)
+        self.parametric, self.prolog = parametric(plan)
         known = [node for node in reachable(self.position_nodes) if node not in self.parametric]
         self.known = {*known, *self.prolog}  # what later stages find computed
         self.definitions = self._defined_by(self.formulas, identifier)
@@ -129,76 +126,8 @@ class _Emitter:
         for lines in later:
             functions += [unpacked if line is _VALUES else line for line in lines]
         if self.plan.parameters:
-            functions = self._bound(functions)
-        return "\n".join([*self._header(), *functions]) + "\n"
-
-    def _bound(self, functions: Sequence[str]) -> list[str]:
-        """The functions inside one that binds the parameters: what depends on nothing else is computed there, once."""
-        names = [identifier(parameter_symbol(parameter.name)) for parameter in self.plan.parameters]
-        writer = Writer(self.names, (), self.prolog)
-        prolog = writer.statements(self.prolog)
-        fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in self.plan.fixed_nodes.items())
-        defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]
-        return [
-            "",
-            "def bound(parameters):",
-            '    """The model for these values of PARAMETERS."""',
-            *unpacking(names, "parameters"),
-            *indented(prolog),
-            f"    FIXED = {{{fixed}}}",
-            *(f"    {line}" if line else "" for text in functions for line in text.split("\n")),
-            "    constants = {name: value for name, value in globals().items() if name.isupper()}",
-            f"    functions = {{{', '.join(f'{name!r}: {name}' for name in defined)}}}",
-            "    return SimpleNamespace(**constants | functions | {'FIXED': FIXED})",
-            "",
-        ]
-
-    def _header(self) -> list[str]:
-        plan = self.plan
-        anchor_u, anchor_z = plan.anchor_values
-        large = [
-            block for block in self.solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)
-        ]
-        rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
-        imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
-        if plan.parameters:
-            imports.append("from types import SimpleNamespace")
-        if self.curves:
-            imports += ["", "from .curve import curve"]
-        if large:
-            imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
-        kinds = tuple(driver.quantity.kind for driver in plan.drivers)
-        factors = tuple(1.0 / block.determinant_scale for block in self.solved)
-        rows, scales = tuple(b.row_names for b in self.solved), tuple(b.row_scales for b in self.solved)
-        reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
-        return [
-            f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
-            "",
-            *imports,
-            "",
-            f"NAME = {plan.mechanism.name!r}",
-            f"SIZE = {plan.size!r}",
-            f"OFFSET = {max(map(abs, plan.origin)) / plan.size!r}  # from the world's origin, in sizes",
-            f"LENGTH_UNIT = {plan.mechanism.length_unit!r}",
-            f"DRIVERS = {tuple(driver.name for driver in plan.drivers)!r}",
-            f"DRIVER_KINDS = {kinds!r}",
-            f"REACH = {reach!r}  # what counts as a step of one, by driver",
-            f"OUTPUTS = {plan.outputs!r}",
-            f"COORDINATE_COUNT = {plan.coordinate_count!r}",
-            f"FIXED = {dict(plan.fixed)!r}",
-            f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
-            f"POSITIVE = {tuple(k for k, constant in enumerate(plan.law_constants) if constant.is_positive)!r}",
-            f"PARAMETERS = {tuple((parameter.name, parameter.value) for parameter in plan.parameters)!r}",
-            f"WATCHES = {plan.watch_names!r}",
-            f"UNKNOWNS = {plan.unknowns!r}",
-            f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
-            f"BLOCKS = {tuple(self.places)!r}",
-            f"ANCHOR = {(anchor_u, anchor_z)!r}",
-            *([f"DETERMINANT_FACTORS = {factors!r}"] if self.many else []),
-            *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
-            *(f"{name} = {data!r}" for data, name in self.curves.items()),
-            "",
-        ]
+            functions = bound(self.plan, self.names, self.prolog, functions)
+        return "\n".join([*header(self.plan, self.curves, many=self.many), *functions]) + "\n"
 
     def _drive(self) -> list[str]:
         writer = Writer(Names(curves=self.curves), ())
@@ -511,21 +440,6 @@ class _Emitter:
 
 _VALUES = "    <values>"
 _Right = Callable[[Block], tuple[Node, ...]]
-
-
-def _parametric(plan: SolvePlan) -> tuple[set[Node], list[Node]]:
-    """Operations that depend on parameters alone, and those of them that others are made of, or outputs."""
-    depends: dict[Node, bool] = {}  # on parameters alone
-    for node in plan.nodes:
-        if node.op == "symbol":
-            depends[node] = is_parameter(node)
-        elif node.op != "constant":
-            on = [arg for arg in node.args if arg.op != "constant"]
-            depends[node] = bool(on) and all(depends[arg] for arg in on)
-    alone = {node for node, is_alone in depends.items() if is_alone and node.args}
-    used = [arg for node in plan.nodes if node not in alone for arg in node.args]
-    used += [*plan.fixed_nodes.values(), *(motion.position for motion in plan.outputs_motion)]
-    return alone, list(dict.fromkeys(node for node in used if node in alone))
 
 
 def _names(targets: Sequence[Node]) -> list[str]:

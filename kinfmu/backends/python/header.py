@@ -1,0 +1,65 @@
+"""The head of the emitted module: imports, and the constants that the solver and the FMU read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+
+from kinfmu.plan import Block, SolvePlan
+from kinfmu.solver.curve import CurveData
+
+
+def header(plan: SolvePlan, curves: Mapping[CurveData, str], *, many: bool) -> list[str]:
+    """Docstring, imports and constants of the module.
+
+    curves: names of the constants that hold the data of curves; many: unknowns are handled in one go.
+    """
+    solved = [block for block in plan.blocks if block.unknowns]
+    anchor_u, anchor_z = plan.anchor_values
+    large = [block for block in solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)]
+    rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
+    imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
+    if plan.parameters:
+        imports.append("from types import SimpleNamespace")
+    if curves:
+        imports += ["", "from .curve import curve"]
+    if large:
+        imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
+    kinds = tuple(driver.quantity.kind for driver in plan.drivers)
+    factors = tuple(1.0 / block.determinant_scale for block in solved)
+    rows, scales = tuple(b.row_names for b in solved), tuple(b.row_scales for b in solved)
+    reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
+    return [
+        f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
+        "",
+        *imports,
+        "",
+        f"NAME = {plan.mechanism.name!r}",
+        f"SIZE = {plan.size!r}",
+        f"OFFSET = {max(map(abs, plan.origin)) / plan.size!r}  # from the world's origin, in sizes",
+        f"LENGTH_UNIT = {plan.mechanism.length_unit!r}",
+        f"DRIVERS = {tuple(driver.name for driver in plan.drivers)!r}",
+        f"DRIVER_KINDS = {kinds!r}",
+        f"REACH = {reach!r}  # what counts as a step of one, by driver",
+        f"OUTPUTS = {plan.outputs!r}",
+        f"COORDINATE_COUNT = {plan.coordinate_count!r}",
+        f"FIXED = {dict(plan.fixed)!r}",
+        f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",
+        f"POSITIVE = {tuple(k for k, constant in enumerate(plan.law_constants) if constant.is_positive)!r}",
+        f"PARAMETERS = {tuple((parameter.name, parameter.value) for parameter in plan.parameters)!r}",
+        f"WATCHES = {plan.watch_names!r}",
+        f"UNKNOWNS = {plan.unknowns!r}",
+        f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
+        f"BLOCKS = {tuple(places(solved))!r}",
+        f"ANCHOR = {(anchor_u, anchor_z)!r}",
+        *([f"DETERMINANT_FACTORS = {factors!r}"] if many else []),
+        *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
+        *(f"{name} = {data!r}" for data, name in curves.items()),
+        "",
+    ]
+
+
+def places(solved: Sequence[Block]) -> list[tuple[int, int]]:
+    """First and last + 1 of each solved block's unknowns among all of them."""
+    ends = list(accumulate(len(block.unknowns) for block in solved))
+    return list(zip([0, *ends], ends, strict=False))

@@ -1,0 +1,169 @@
+"""What no mechanism can mean: names, references and values, each told with its table and key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from kinfmu.drivers import Driver
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.joints import Joint
+from kinfmu.joints.measures import Measure
+from kinfmu.joints.placement import Reference, is_pair
+from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.places import hints_of, told
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_line, check_name
+from kinfmu.units import METRES
+
+if TYPE_CHECKING:
+    from kinfmu.mechanism.mechanism import Mechanism
+
+MOST_BODIES = 20_000  # what an ordinary machine holds
+
+Bodies = Mapping[str, Body]  # by name
+
+
+def check_names_and_unit(mechanism: Mechanism) -> None:
+    """Raise a MechanismError for a unit or a name that cannot be meant: places are found by names."""
+    if mechanism.length_unit not in METRES:
+        raise MechanismError(
+            f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length; known: {listed(METRES)}"
+        )
+    check_name("name =", mechanism.name)
+    if len(mechanism.bodies) > MOST_BODIES:
+        raise MechanismError(f"[bodies] holds {len(mechanism.bodies)} bodies; {MOST_BODIES} at most")
+    check_line("title", mechanism.title)
+    tables: dict[str, Iterable[Body | Joint | Driver]] = {
+        "bodies": mechanism.bodies,
+        "joints": mechanism.joints,
+        "drivers": mechanism.drivers,
+    }
+    for table, members in tables.items():
+        _check_names(table, [member.name for member in members])
+    _check_names("points", mechanism.points)
+
+
+def check_members(mechanism: Mechanism) -> None:
+    """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
+    if not mechanism.moving_bodies:
+        raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
+    for body in mechanism.bodies:
+        _check_body_itself(body)
+    bodies = {body.name: body for body in mechanism.bodies}
+    constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
+    for member in constraining:
+        _check_references(bodies, member)
+        _check_values(mechanism, member)
+    for driver in mechanism.drivers:
+        for name in driver.inputs():
+            if name in mechanism.parameters:
+                raise MechanismError(f"[parameters] {name}: driver '{driver.name}' has an input of this name already")
+    for name, target in mechanism.points.items():
+        _check_point(bodies, f"[points] {name}", target)
+        if name in bodies:
+            raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would mean two things")
+    if isinstance(mechanism.coordinates, str):
+        if mechanism.coordinates not in ("moving", "all"):
+            raise MechanismError(
+                f"[outputs] coordinates = {quoted(mechanism.coordinates)} must be 'moving', 'all' or a list of names"
+            )
+    else:
+        known = dict.fromkeys(mechanism.coordinate_names)
+        for name in mechanism.coordinates:
+            if name not in known:
+                raise MechanismError(
+                    f"[outputs] coordinates: {quoted(name)} is no coordinate of this mechanism"
+                    f"{suggestion(name, known)}; coordinates: {listed(known)}"
+                )
+        if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
+            raise MechanismError("[outputs] coordinates names a coordinate twice")
+
+
+def _check_names(table: str, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        check_name(f"[{table}]", name)
+        if name in seen:
+            raise MechanismError(f"[{table}] '{name}' is there twice")
+        seen.add(name)
+
+
+def _check_body_itself(body: Body) -> None:
+    for name in body.points:
+        check_name(f"[bodies.{body.name}] points", name)
+    if body.is_ground and any(value is not None for value in body.start):
+        raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
+
+
+def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
+    table = "joints" if isinstance(member, Joint) else "drivers"
+    _check_fields(bodies, f"[{table}.{member.name}] ", member)
+    touched = member.bodies()
+    if len(touched) > 1 and len(set(touched)) == 1:
+        raise MechanismError(f"[{table}.{member.name}] joins body '{touched[0]}' to itself")
+    if set(touched) == {GROUND_NAME}:
+        raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
+
+
+def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure) -> None:
+    """What its fields refer to; `before` is said before the key."""
+    cls: object = type(member)
+    hints = hints_of(cls)
+    for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+        where, value = f"{before}{key.name}", getattr(member, key.name)
+        if isinstance(value, Measure):
+            _check_fields(bodies, f"{where}.", value)
+        for said in getattr(hints[key.name], "__metadata__", ()):
+            if isinstance(said, Reference) and not (value is None and key.default is None):
+                _check_reference(bodies, where, value, said, is_pair=is_pair(hints[key.name]))
+
+
+def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
+    """What the member says of its values; expressions in them are told with the parameters that they hold."""
+    table = "joints" if isinstance(member, Joint) else "drivers"
+    try:
+        member.check()
+    except MechanismError as error:
+        at_fault = {place: e for place, e in mechanism.expressions.items() if place[:2] == (table, member.name)}
+        if not at_fault:
+            raise
+        values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
+        said = [f"{told(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
+        said += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
+        raise type(error)(f"{error} ({listed(said)})", **error.data) from None
+
+
+def _check_reference(bodies: Bodies, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:
+    if is_pair and not (isinstance(value, tuple) and len(value) == 2):
+        raise MechanismError(f"{where} = {quoted(value)} must be two points, ('body.point', 'body.point')")
+    for one in value if is_pair else (value,):
+        if not isinstance(one, str):
+            raise MechanismError(f"{where} = {quoted(one)} must be text")
+        if reference.kind == "point":
+            _check_point(bodies, where, one)
+        elif reference.kind == "body":
+            _check_body(bodies, where, one)
+        elif one not in reference.choices:
+            raise MechanismError(f"{where} = {quoted(one)} must be one of {listed(reference.choices)}")
+
+
+def _check_body(bodies: Bodies, where: str, name: str) -> None:
+    if name not in bodies:
+        raise MechanismError(
+            f"{where}: body {quoted(name)} is not in the mechanism{suggestion(name, bodies)}; bodies: {listed(bodies)}"
+        )
+
+
+def _check_point(bodies: Bodies, where: str, name: str) -> None:
+    body_name, dot, point = name.partition(".")
+    if not dot:
+        raise MechanismError(f"{where} = {quoted(name)} must be 'body.point'")
+    _check_body(bodies, where, body_name)
+    known = bodies[body_name].points
+    if point not in known:
+        raise MechanismError(
+            f"{where}: body '{body_name}' has no point {quoted(point)}{suggestion(point, known)}; "
+            f"its points: {listed(known)}"
+        )

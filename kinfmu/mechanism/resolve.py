@@ -1,0 +1,68 @@
+"""Numbers in the place of what was written: texts with a unit, and expressions of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism.dimension import Dimension
+from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.number import written
+from kinfmu.mechanism.parameters import Parameter, dimensions_of, read, resolved
+from kinfmu.mechanism.places import Members, Place, told
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_number
+from kinfmu.units import Quantity
+
+MOST_PARAMETERS = 10_000
+
+
+class Resolved(NamedTuple):
+    """Members that hold numbers alone, parameters with their values, and the expressions by their places."""
+
+    members: Members
+    parameters: dict[str, Parameter]
+    expressions: dict[Place, Expression]
+
+
+def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Resolved:
+    """Put numbers in the place of texts with units and of expressions, and remember the expressions.
+
+    given: parameters as the engineer wrote them; unit: of length. Raises a MechanismError that names the place of what
+    is no number, of a name that is no parameter and of a quantity that does not belong there.
+    """
+    if len(given) > MOST_PARAMETERS:
+        raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")
+    said = {name: read(name, parameter, unit) for name, parameter in given.items()}
+    expressions: dict[Place, Expression] = {}
+    alone: dict[str, set[Quantity]] = {}
+
+    def as_written(place: Place, value: Any, quantity: Quantity) -> Any:
+        number = written(told(place), value, quantity, unit)
+        if isinstance(number, Expression):
+            expressions[place] = number
+            if number.alone:
+                alone.setdefault(number.alone, set()).add(quantity)
+        return number
+
+    members = members.changed(as_written)
+    parameters = resolved(said, alone)
+    values = {name: float(parameter.value) for name, parameter in parameters.items()}
+    dimensions = dimensions_of(parameters)
+
+    def computed(place: Place, value: Any, quantity: Quantity) -> Any:
+        if not isinstance(value, Expression):
+            return value
+        try:
+            found = value.dimension(dimensions)
+            number = float(value.value(values))
+        except MechanismError as error:
+            raise MechanismError(f"{told(place)} = {error}") from None
+        needed = Dimension.of(quantity)
+        if not found.fits(needed):
+            raise MechanismError(f"{told(place)} = {quoted(value.text)} is {found} and must be {needed}")
+        check_number(f"{told(place)} = {quoted(value.text)}", number)
+        return Computed(number, value)
+
+    return Resolved(members.changed(computed), parameters, expressions)
