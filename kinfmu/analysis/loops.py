@@ -25,11 +25,10 @@ class Place(NamedTuple):
 
 
 class Link(NamedTuple):
-    """What keeps two pins of a loop apart: a body, or a distance joint (then is_body is False)."""
+    """What keeps two pins of a loop apart: a body, or a distance joint."""
 
     name: str
     length: float
-    is_body: bool = True
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,7 @@ class _Net:
         for joint in self.joints:  # their ends are pins too
             if isinstance(joint, Distance):
                 a, b = (self._number(self._place(point)) for point in joint.between)
-                self._join(Link(joint.name, float(joint.length), is_body=False), a, b)
+                self._join(Link(joint.name, float(joint.length)), a, b)
         self.guides = self._guided()
         by_body: dict[str, list[tuple[int, Place]]] = {}
         for number, places in enumerate(self.places):

@@ -26,7 +26,6 @@ class Row(NamedTuple):
     label: str
     scale: float  # residual per unit of length; an angle counts as the way of a point at distance `size`
     kind: str  # 'length' or 'angle': what its gap is
-    is_driver: bool = False
 
     @property
     def name(self) -> str:
@@ -66,7 +65,7 @@ class System:
         for driver in mechanism.drivers:
             measure = driver.measured()
             scale = measure.scale(self.size) * per_length[measure.kind]
-            rows.append(Row(driver.name, driver.noun, scale, measure.kind, is_driver=True))
+            rows.append(Row(driver.name, driver.noun, scale, measure.kind))
         self.rows = tuple(rows)
         self.joint_row_count = len(rows) - len(mechanism.drivers)
         self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)

@@ -51,7 +51,7 @@ class _Form(NamedTuple):
 
 
 def grouped(blocks: Sequence[Block], rate_of: Callable[[str, int], str]) -> dict[int, Member]:
-    """Members by index of the block, for blocks that at least SHARED_FROM others are like.
+    """Members by index of the block, where SHARED_FROM blocks or more are alike.
 
     rate_of: name of a coordinate's or driver value's derivative.
     """
