@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, build, moved, secant_zero, zero_near
-from .pose import ALONE, Model, Pose, Vector, directed, on_road
+from .pose import ALONE, Model, Pose, Vector, directed, on_road, tangent_of
 from .road import Blocked, Road
 from .span import REGULAR
 from .status import Status
@@ -17,6 +17,7 @@ SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
 MOST_STEPS = 1_000_000  # of a way: seconds, and more than any motion that is meant
 NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to blame; the way has too many steps
+SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
@@ -67,6 +68,9 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         trial = trusted_step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
+            if trial.margin < REGULAR and one and not is_smooth(model, pose, trial):
+                trial = None
+        if trial is not None:
             if trial.margin < REGULAR and one:
                 road = surveyed(model, pose, trial)
                 if road is not trial.road:
@@ -121,6 +125,21 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
     return trial
+
+
+def is_smooth(model: Model, pose: Pose, trial: Pose) -> bool:
+    """False if the tangent of a single driver jumps between two poses, as it does from one branch to a crossing one.
+
+    Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
+    their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step.
+    """
+    s = trial.u[0] - pose.u[0]
+    zd, zdd = tangent_of(model, pose)
+    there = tangent_of(model, trial)[0]
+    scales = model.UNKNOWN_SCALES
+    largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one an unknown, all
+    jump = max([abs(b - (a + s * aa)) / c for a, aa, b, c in zip(zd, zdd, there, scales)])  # noqa: B905
+    return jump <= SMOOTH * largest
 
 
 def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:

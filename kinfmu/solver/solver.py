@@ -5,7 +5,17 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from .advance import LONGEST_STEP, NEAR_SINGULAR, Limit, advance, limit_message, place, surveyed, trusted_step
+from .advance import (
+    LONGEST_STEP,
+    NEAR_SINGULAR,
+    Limit,
+    advance,
+    is_smooth,
+    limit_message,
+    place,
+    surveyed,
+    trusted_step,
+)
 from .linear import reciprocal_condition
 from .pose import ALONE, EPS, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
@@ -44,7 +54,11 @@ class Solver:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
-                    if margin > NEAR_SINGULAR and surveyed(self.model, start, near) is road:  # nothing new there
+                    if (
+                        margin > NEAR_SINGULAR
+                        and is_smooth(self.model, start, near)
+                        and surveyed(self.model, start, near) is road  # nothing new there
+                    ):
                         return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
