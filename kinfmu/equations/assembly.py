@@ -15,8 +15,10 @@ from kinfmu.errors import AssemblyError, listed
 CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose counts as closed
 SINGULAR = 1e-6  # margin below which a start pose counts as singular: double roots are known to half the digits
 COMFORTABLE = 0.03  # margin below which a pose beside the start makes a better anchor
+COMFORTABLE_WITHOUT_BRIDGES = 1e-3  # the same with several drivers: solved to round-off over the margin
 BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
 MOST_DENSE = 900  # coordinates; what needs all rows at once takes minutes beyond
+_LOOKS = 4  # random poses at which the structure of the rows is seen
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
@@ -153,13 +155,16 @@ def assemble(system: System) -> Assembled | None:
     if gap > CLOSED:
         return None
     found = Assembled(q, u, margin(system, q))
-    if found.margin > COMFORTABLE:
+    if found.margin > comfortable(system):
         return found
     beside = []
     for side in (1.0, -1.0):
         way = side * BESIDE * np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
         if found.margin > SINGULAR:
             near = _walked(system, q, u, way)
+            back = None if near is None else _walked(system, near, u + way, -way)
+            if back is None or np.abs((back - q) / system.column_scales).max() > _APART:
+                near = None  # the way passed a limit or a crossing: another branch
         else:
             near = next(iter(branches(system, q, u + way)), None)
         if near is not None:
@@ -167,15 +172,22 @@ def assemble(system: System) -> Assembled | None:
     return max([found, *beside], key=lambda pose: pose.margin)
 
 
+def comfortable(system: System) -> float:
+    """Margin from which a pose is a good anchor: with one driver outside a bridge's window."""
+    return COMFORTABLE if len(system.mechanism.drivers) == 1 else COMFORTABLE_WITHOUT_BRIDGES
+
+
 def in_order(system: System) -> Ordered:
-    """The order of solving all rows, from where their gradients vanish at a random pose."""
+    """The order of solving all rows, from where their gradients vanish at every one of some random poses.
+
+    At one pose a cam that dwells does not show whom it leads.
+    """
     rng = np.random.default_rng(1989)
-    q = rng.uniform(-1.0, 1.0, len(system.coordinates)) * system.column_scales
+    poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
     meets: list[list[int]] = []
     for member in system.members:
-        for gradient in system.gradients(member, q):
-            seen = [column for column, slope in zip(member.columns, gradient, strict=True) if slope != 0.0]
-            meets.append(seen)
+        slopes = np.any([system.gradients(member, q) != 0.0 for q in poses], axis=0)  # (rows, columns)
+        meets += [[column for column, meet in zip(member.columns, row, strict=True) if meet] for row in slopes]
     return ordered_blocks(meets, len(system.coordinates))
 
 
@@ -196,10 +208,10 @@ def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] 
         if gap > CLOSED:
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} do not close"
         least = min(least, _block_margin(part.jacobian(q[list(columns)])))
-        if least <= COMFORTABLE:
+        if least <= comfortable(system):
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
     open_rows = np.flatnonzero(np.abs(Part(system).residual(q, u)) > CLOSED)
-    if len(open_rows):  # a cam that dwells at the random pose does not show there whom it leads
+    if len(open_rows):  # a cam that dwells at every random pose does not show whom it leads
         return None, f"the rows {listed(system.rows[k].name for k in open_rows[:5])} open when others close"
     return Assembled(q, u, least), ""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import COMFORTABLE, assemble, motion_samples, null_space, rough_start
+from kinfmu.equations.assembly import assemble, comfortable, motion_samples, null_space, rough_start
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System
 
@@ -67,7 +67,7 @@ def find_redundancy(system: System) -> Redundancy:
     """
     assembled = assemble(system)
     free, joint_rows = len(system.coordinates), range(system.joint_row_count)
-    if assembled is not None and assembled.margin > COMFORTABLE and len(system.rows) == free:
+    if assembled is not None and assembled.margin > comfortable(system) and len(system.rows) == free:
         return Redundancy(free - len(joint_rows), tuple(joint_rows), ())  # regular with its drivers: all independent
     start = rough_start(system) if assembled is None else assembled.q
     suspects = _suspects(system, None if assembled is None else assembled.q)

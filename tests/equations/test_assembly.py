@@ -1,0 +1,60 @@
+"""Assembly: the start pose is closed block by block, on its own branch, whatever lies near."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
+from kinfmu.equations.assembly import assemble, in_order, start_targets
+from kinfmu.equations.system import System
+
+
+def near_its_limit() -> Mechanism:
+    """A Stephenson III driven at its output, started so near its limit that 0.1 rad further there is another branch."""
+    return Mechanism(
+        "near_its_limit",
+        [
+            Body("ground", {"O": (0, 0), "C": (1.434, 0), "D": (0.512, -1.677)}),
+            Body("crank", {"O": (0, 0), "P": (0.848, 0)}, (0, 0, 4.71)),
+            Body("coupler", {"P": (0, 0), "Q": (1.455, 0), "R": (-0.718, -0.089)}, (0, -0.85, 0.09)),
+            Body("rocker", {"C": (0, 0), "Q": (0.72, 0)}, (1.43, 0, -1.55)),
+            Body("link", {"R": (0, 0), "S": (1.566, 0)}, (-0.71, -1.0, -1.94)),
+            Body("output", {"D": (0, 0), "S": (1.951, 0)}, (0.51, -1.68, -2.73)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+            Revolute("R", ("coupler.R", "link.R")),
+            Revolute("S", ("link.S", "output.S")),
+            Revolute("D", ("ground.D", "output.D")),
+        ],
+        [AngleDriver("drive", "output", ConstantSpeed(-2.7290198238695482, 1.0))],
+    )
+
+
+def test_an_anchor_beside_the_start_lies_on_the_branch_of_the_start() -> None:
+    start = -2.7290198238695482
+    mechanism = near_its_limit()
+    run = kinfmu.solve(mechanism, drive_angle=[start, start - 0.05, start])
+    assert run.good[0]
+    np.testing.assert_allclose(run["crank.phi"][[0, 2]], np.radians(270.0), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_the_start_of_the_gallery_is_where_the_files_say(name: str) -> None:
+    system = System(kinfmu.load(name))
+    assembled = assemble(system)
+    assert assembled is not None
+    np.testing.assert_array_equal(assembled.u, start_targets(system))
+
+
+def test_every_row_of_the_order_is_there_once() -> None:
+    system = System(kinfmu.load("fourbar_chain:5"))
+    order = in_order(system)
+    assert sorted(row for rows, _ in order.blocks for row in rows) == list(range(len(system.rows)))
+    assert sorted(column for _, columns in order.blocks for column in columns) == list(range(len(system.coordinates)))
+    assert max(len(rows) for rows, _ in order.blocks) == 2
