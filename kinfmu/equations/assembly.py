@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ COMFORTABLE = 0.03  # margin below which a pose beside the start makes a better 
 COMFORTABLE_WITHOUT_BRIDGES = 1e-3  # the same with several drivers: solved to round-off over the margin
 BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
 MOST_DENSE = 900  # coordinates; what needs all rows at once takes minutes beyond
+NEAR = 0.5  # [rad, sizes]; a pose as near as that to what the start poses give is the one that is meant
+_THROWS = 60  # of what the start poses leave out; blocks that alone can close in two ways each need a few
+_DENSE_THROWS = 8
 _LOOKS = 4  # random poses at which the structure of the rows is seen
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
@@ -143,7 +147,10 @@ def assemble(system: System) -> Assembled | None:
     open or singular. None if the rows, all together, do not close near the start pose.
     """
     u = start_targets(system)
-    found, trouble = _assembled_in_order(system, u)
+    found, trouble = _assembled_in_order(system, u, rough_start(system))
+    has_order = bool(in_order(system).blocks)
+    if has_order and (found is None or _off(system, found) > NEAR):
+        found = _thrown_together(system, u, found, has_order)
     if found is not None:
         return found
     if len(system.coordinates) > MOST_DENSE:
@@ -153,7 +160,7 @@ def assemble(system: System) -> Assembled | None:
         )
     q, gap = close(system, rough_start(system), u)
     if gap > CLOSED:
-        return None
+        return None if has_order else _thrown_together(system, u, None, has_order)
     found = Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
@@ -191,8 +198,51 @@ def in_order(system: System) -> Ordered:
     return ordered_blocks(meets, len(system.coordinates))
 
 
-def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] | tuple[None, str]:
-    """The start pose closed block by block, or None and what stands in the way.
+def _thrown_together(system: System, u: FloatArray, first: Assembled | None, has_order: bool) -> Assembled | None:
+    """Of a first pose and regular ones from seeded random values of what the start poses leave out, the one that comes
+    nearest to what they give: the first that comes near, else the nearest of all.
+    """
+    is_open = np.array([value is None for body in system.mechanism.moving_bodies for value in body.start])
+    if not is_open.any():
+        return first
+    ground = next(body for body in system.mechanism.bodies if body.is_ground)
+    middle = np.mean([tuple(point) for point in ground.points.values()] or [(0.0, 0.0)], axis=0)
+    centre = np.tile([*middle, 0.0], len(is_open) // 3)
+    spread = np.tile([1.5 * system.size, 1.5 * system.size, np.pi], len(is_open) // 3)
+    rng = np.random.default_rng(1989)
+    if len(is_open) > MOST_DENSE:
+        return first
+    nearest = first
+    for _ in range(_THROWS if has_order else _DENSE_THROWS):
+        thrown = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), rough_start(system))
+        if has_order:
+            found, _ = _assembled_in_order(system, u, thrown)
+        else:
+            q, gap = close(system, thrown, u)
+            found = Assembled(q, u, margin(system, q)) if gap <= CLOSED else None
+        if found is None or found.margin <= comfortable(system):
+            continue
+        if nearest is None or _off(system, found) < _off(system, nearest):
+            nearest = found
+        if _off(system, nearest) <= NEAR:
+            break
+    return nearest
+
+
+def _off(system: System, found: Assembled) -> float:
+    """How far a pose is from what the start poses give, in radians (without whole turns) and sizes."""
+    largest = 0.0
+    given = (value for body in system.mechanism.moving_bodies for value in body.start)
+    for name, value, q in zip(system.coordinates, given, found.q, strict=True):
+        if value is not None:
+            off = float(q) - value
+            off = math.remainder(off, math.tau) if name.endswith(".phi") else off / system.size
+            largest = max(largest, abs(off))
+    return largest
+
+
+def _assembled_in_order(system: System, u: FloatArray, start: FloatArray) -> tuple[Assembled, str] | tuple[None, str]:
+    """A rough pose closed block by block, or None and what stands in the way.
 
     Never a pose that is nearly singular.
     """
@@ -201,7 +251,7 @@ def _assembled_in_order(system: System, u: FloatArray) -> tuple[Assembled, str] 
         return None, f"nothing determines {listed(system.coordinates[k] for k in order.unmatched_columns[:5])}"
     if order.unmatched_rows:
         return None, f"there are rows to spare: {listed(system.rows[k].name for k in order.unmatched_rows[:5])}"
-    q, least = rough_start(system), 1.0
+    q, least = start.copy(), 1.0
     for rows, columns in order.blocks:
         part = Part(system, rows, columns, q)
         q[list(columns)], gap = close(part, q[list(columns)], u)

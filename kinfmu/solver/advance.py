@@ -139,7 +139,7 @@ def is_smooth(model: Model, pose: Pose, trial: Pose) -> bool:
     scales = model.UNKNOWN_SCALES
     largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one an unknown, all
     jump = max([abs(b - (a + s * aa)) / c for a, aa, b, c in zip(zd, zdd, there, scales)])  # noqa: B905
-    return jump <= SMOOTH * largest
+    return bool(jump <= SMOOTH * largest)
 
 
 def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:

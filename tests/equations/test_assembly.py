@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,27 @@ def test_every_row_of_the_order_is_there_once() -> None:
     assert sorted(row for rows, _ in order.blocks for row in rows) == list(range(len(system.rows)))
     assert sorted(column for _, columns in order.blocks for column in columns) == list(range(len(system.coordinates)))
     assert max(len(rows) for rows, _ in order.blocks) == 2
+
+
+@pytest.mark.parametrize(
+    "name", ["crank_rocker", "slider_crank", "watt_six_bar", "peaucellier", "inverted_slider_crank"]
+)
+def test_without_any_start_pose_a_mechanism_assembles_in_some_regular_way(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    bodies = tuple(Body(body.name, body.points) for body in mechanism.bodies)
+    assembled = assemble(System(replace(mechanism, bodies=bodies)))
+    assert assembled is not None
+    assert assembled.margin > 0.03
+
+
+def test_a_start_angle_alone_chooses_the_assembly() -> None:
+    mechanism = kinfmu.load("crank_rocker")
+    for phi, side in ((1.0, 1), (-1.0, -1)):
+        bodies = tuple(
+            Body(body.name, body.points, (None, None, phi) if body.name == "coupler" else (None, None, None))
+            for body in mechanism.bodies
+        )
+        report = kinfmu.check(replace(mechanism, bodies=bodies))
+        assert report.problem is None, report.problem
+        run = kinfmu.solve(replace(mechanism, bodies=bodies), crank_angle=[0.0, 1.0])
+        assert np.sign(np.sin(run["coupler.phi"][1] - run["rocker.phi"][1])) == -side
