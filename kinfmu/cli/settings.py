@@ -28,6 +28,14 @@ def with_parameters(name: str, settings: tuple[tuple[str, str], ...]) -> Mechani
         return mechanism.with_parameters({parameter: _value(text) for parameter, text in settings})
 
 
+def parted(
+    mechanism: Mechanism, settings: tuple[tuple[str, str], ...]
+) -> tuple[dict[str, float | str], tuple[tuple[str, str], ...]]:
+    """Parameters of a mechanism among the settings, by name, and the other settings as they are."""
+    geometry = {name: _value(text) for name, text in settings if name in mechanism.parameters}
+    return geometry, tuple(setting for setting in settings if setting[0] not in geometry)
+
+
 def as_numbers(settings: tuple[tuple[str, str], ...]) -> dict[str, float | bool]:
     """Settings that are taken as they are: numbers, or true and false. Raises a click.UsageError for others."""
     parameters: dict[str, float | bool] = {}

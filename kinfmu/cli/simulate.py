@@ -10,7 +10,7 @@ from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, SETTING, exists
 from kinfmu.cli.group import about, instead, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import as_numbers
+from kinfmu.cli.settings import as_numbers, parted
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError
 
@@ -60,11 +60,8 @@ def simulate(
         if fmu.suffix != ".fmu":
             mech = gallery.load(MECHANISM.convert(model, None, None))
             with about(model):
-                geometry = {name: text for name, text in settings if name in mech.parameters}
-                changed = mech.with_parameters(geometry).parameters  # reads units
-                settings = tuple(
-                    (name, repr(float(changed[name].value)) if name in geometry else text) for name, text in settings
-                )
+                geometry, settings = parted(mech, settings)
+                mech = mech.with_parameters(geometry)
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
         elif not exists(fmu):
             raise click.UsageError(f"{fmu}: there is no such file")

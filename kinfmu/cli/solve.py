@@ -10,7 +10,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, SETTING, Range
 from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import as_numbers
+from kinfmu.cli.settings import as_numbers, parted
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
 from kinfmu.units import Quantity
@@ -57,8 +57,8 @@ def solve(
         raise click.UsageError("--times and --angle cannot both drive")
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    geometry: dict[str, float | str] = {name: text for name, text in settings if name in mech.parameters}
-    laws = as_numbers(tuple(setting for setting in settings if setting[0] not in geometry))
+    geometry, others = parted(mech, settings)
+    laws = as_numbers(others)
     for name, value in laws.items():
         if isinstance(value, bool):
             raise click.UsageError(f"--set {name}: a law constant is a number")
