@@ -17,6 +17,7 @@ SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
 MOST_STEPS = 1_000_000  # of a way: seconds, and more than any motion that is meant
 NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to blame; the way has too many steps
+CLOSE = 0.1  # determinant below which branches may lie as close as a correction
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
@@ -68,7 +69,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         trial = trusted_step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
-            if trial.margin < REGULAR and one and not is_smooth(model, pose, trial):
+            if trial.margin < CLOSE and one and not is_smooth(model, pose, trial):
                 trial = None
         if trial is not None:
             if trial.margin < REGULAR and one:

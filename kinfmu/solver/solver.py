@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 from .advance import (
+    CLOSE,
     LONGEST_STEP,
     NEAR_SINGULAR,
     Limit,
@@ -56,7 +57,7 @@ class Solver:
                         return near
                     if (
                         margin > NEAR_SINGULAR
-                        and is_smooth(self.model, start, near)
+                        and (margin >= CLOSE or is_smooth(self.model, start, near))
                         and surveyed(self.model, start, near) is road  # nothing new there
                     ):
                         return near

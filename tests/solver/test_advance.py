@@ -6,8 +6,10 @@ import math
 import random
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.solver import Pose, Solver, Status
 
 Errors = Callable[[Solver, Pose], list[float]]
@@ -73,3 +75,13 @@ def test_from_a_pose_at_the_limit_nothing_beyond_it_is_reached_and_all_before_it
     beyond = pendulum.solve(pose, (math.radians(375.0),))
     assert beyond.status == Status.OUTSIDE
     assert "the limit is" in beyond.message
+
+
+def test_a_crossing_that_no_bridge_spans_is_a_limit_and_no_way_to_the_other_branch() -> None:
+    """The gripper's parallelograms cross their other branch 3 mm before their dead centre: no room for a bridge."""
+    piston = np.arange(-44.0, 54.6, 0.25)
+    run = kinfmu.solve(kinfmu.load("parallel_jaw"), piston_position=piston)
+    assert run.good[piston < 51.2].all()
+    np.testing.assert_allclose(run["right_jaw.phi"][run.good], 0.0, rtol=0, atol=1e-9)
+    assert (run.status[piston > 51.25] == Status.OUTSIDE).all()
+    assert any("the limit is piston = 51.22498" in event.text for event in run.events)
