@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import KinfmuError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
@@ -37,7 +38,7 @@ def solve(
     t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
     the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
     and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
-    parameters: those of the mechanism and law constants by name, such as {'crank_length': 0.2, 'crank.speed': 2.0};
+    parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
     if None; what they do not need is not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take
     values, rates and accelerations.
@@ -74,6 +75,7 @@ def run_times(run: RunSettings) -> FloatArray:
 def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[str, float], dict[str, float | str]]:
     """Law constants by name, with those given in place of the file's; and the parameters of the mechanism given."""
     constants = {constant.name: constant.value for constant in plan.law_constants}
+    quantities = {constant.name: constant.quantity for constant in plan.law_constants}
     positive = {constant.name for constant in plan.law_constants if constant.is_positive}
     geometry: dict[str, float | str] = {}
     for name, value in given.items():
@@ -83,12 +85,7 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
         known = [*plan.mechanism.parameters, *constants]
         if name not in constants:
             raise KinfmuError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
-        try:
-            constants[name] = float(value)
-        except (TypeError, ValueError):
-            raise KinfmuError(f"parameter '{name}' = {value!r} must be a number") from None
-        if not np.isfinite(constants[name]):
-            raise KinfmuError(f"parameter '{name}' = {value!r} must be a finite number")
+        constants[name] = measured(f"parameter '{name}'", value, quantities[name], plan.mechanism.length_unit)
         if name in positive and not constants[name] > 0.0:
             raise KinfmuError(f"parameter '{name}' = {value!r} must be positive")
     return constants, geometry

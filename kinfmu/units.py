@@ -35,6 +35,12 @@ def unit_of(quantity: Quantity, length_unit: str) -> str:
     return units[quantity.kind] + per
 
 
+def quantity_in(unit: str, length_unit: str) -> Quantity:
+    """The quantity of a variable that declares this unit: the inverse of `unit_of`, a number for what is not known."""
+    known = every_unit(length_unit)
+    return known[unit][0] if unit in known else Quantity("number")
+
+
 def _power(unit: str, order: int) -> str:
     """'s' and 's2'."""
     return unit if order == 1 else f"{unit}{order}"

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.units import METRES, Quantity, display_units, every_unit, factors, unit_of
+from kinfmu.units import METRES, Quantity, display_units, every_unit, factors, quantity_in, unit_of
 
 EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
 
@@ -77,6 +77,7 @@ def test_plain_numbers_take_no_unit() -> None:
 )
 def test_a_variable_declares_the_unit_used_inside(quantity: Quantity, unit: str) -> None:
     assert unit_of(quantity, "mm") == unit
+    assert quantity_in(unit, "mm") == (Quantity("number") if quantity.kind == "number" else quantity)
 
 
 def test_display_units_are_degrees_and_millimetres() -> None:

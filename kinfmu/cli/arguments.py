@@ -39,7 +39,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
             return value
         name, equals, text = str(value).partition("=")
         if not (name and equals and text):
-            self.fail(f"'{value}' must be NAME=VALUE, such as crank.speed=2.0", param, ctx)
+            self.fail(f"'{value}' must be NAME=VALUE, such as crank.speed=30rpm", param, ctx)
         return name, text
 
 
@@ -80,6 +80,20 @@ class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
         return a, b, x
 
 
+class Time(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+    """A time in seconds, or with its unit."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        if isinstance(value, float):
+            return value
+        try:
+            return _number(str(value), Quantity("time"))
+        except ValueError as error:
+            return self.fail(str(error), param, ctx)
+
+
 def exists(path: Path) -> bool:
     """True if something other than a folder is there; a name that no file can have is not there."""
     try:
@@ -108,3 +122,4 @@ def _number(text: str, quantity: Quantity) -> float:
 
 MECHANISM = MechanismName()
 SETTING = Setting()
+TIME = Time()

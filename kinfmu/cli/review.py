@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from kinfmu.cli.arguments import TIME
 from kinfmu.cli.group import main
 from kinfmu.errors import listed
 
@@ -23,7 +24,7 @@ from kinfmu.errors import listed
     type=click.Path(dir_okay=False, path_type=Path),
     help="Take a picture (.png) with a viewer that needs no screen.",
 )
-@click.option("--at", type=float, help="Time of the picture [s].")
+@click.option("--at", type=TIME, help="Time of the picture [s].")
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
     """Open the Rerun viewer on RUN (.mcap), or on two runs compared."""
     from kinfmu.log import review as reviewed

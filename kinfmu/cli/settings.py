@@ -20,34 +20,28 @@ def with_parameters(name: str, settings: tuple[tuple[str, str], ...]) -> Mechani
     for parameter, text in settings:
         if parameter not in mechanism.parameters:
             known = mechanism.parameters
+            law = "; constants of laws are set in solve and simulate" if "." in parameter else ""
             raise click.UsageError(
                 f"--set {parameter}={text}: {name} has no parameter '{parameter}'{suggestion(parameter, known)}; "
-                f"parameters: {listed(known)}"
+                f"parameters: {listed(known)}{law}"
             )
     with about(name):
         return mechanism.with_parameters({parameter: _value(text) for parameter, text in settings})
 
 
-def parted(
-    mechanism: Mechanism, settings: tuple[tuple[str, str], ...]
-) -> tuple[dict[str, float | str], tuple[tuple[str, str], ...]]:
-    """Parameters of a mechanism among the settings, by name, and the other settings as they are."""
-    geometry = {name: _value(text) for name, text in settings if name in mechanism.parameters}
-    return geometry, tuple(setting for setting in settings if setting[0] not in geometry)
-
-
-def as_numbers(settings: tuple[tuple[str, str], ...]) -> dict[str, float | bool]:
-    """Settings that are taken as they are: numbers, or true and false. Raises a click.UsageError for others."""
-    parameters: dict[str, float | bool] = {}
+def refuse_what_follows(mechanism: Mechanism, settings: tuple[tuple[str, str], ...]) -> None:
+    """Raise a click.UsageError for a law constant that the file gives by an expression: its parameters are to be set."""
     for name, text in settings:
-        if text.lower() in ("true", "false"):
-            parameters[name] = text.lower() == "true"
-            continue
-        try:
-            parameters[name] = float(text)
-        except ValueError:
-            raise click.UsageError(f"--set {name}={text}: '{text}' is not a number") from None
-    return parameters
+        driver, _, key = name.rpartition(".")
+        expression = mechanism.expressions.get(("drivers", driver, "law", key))
+        if expression is not None:
+            raise click.UsageError(f"--set {name}={text}: it follows from '{expression.text}'; set what stands there")
+
+
+def as_values(settings: tuple[tuple[str, str], ...]) -> dict[str, float | str | bool]:
+    """Settings by name: true or false, a number, or text that says a unit."""
+    truths = {"true": True, "false": False}
+    return {name: truths.get(text.lower(), _value(text)) for name, text in settings}
 
 
 def _value(text: str) -> float | str:

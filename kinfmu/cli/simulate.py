@@ -7,26 +7,26 @@ from pathlib import Path
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, SETTING, exists
+from kinfmu.cli.arguments import MECHANISM, SETTING, TIME, exists
 from kinfmu.cli.group import about, instead, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import as_numbers, parted
+from kinfmu.cli.settings import as_values, refuse_what_follows
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError
 
 
 @main.command()
 @click.argument("model", metavar="FMU|MECH")
-@click.option("--start", type=float, help="[s]; from the model if nothing is said, like stop and step.")
-@click.option("--stop", type=float, help="[s]")
-@click.option("--step", type=float, help="Communication step [s].")
+@click.option("--start", type=TIME, help="[s]; from the model if nothing is said, like stop and step.")
+@click.option("--stop", type=TIME, help="[s]")
+@click.option("--step", type=TIME, help="Communication step [s].")
 @click.option(
     "--input",
     "inputs",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="CSV with time and inputs such as crank_angle.",
 )
-@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=2.0.")
+@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=30rpm.")
 @click.option(
     "--mcap", type=click.Path(dir_okay=False, path_type=Path), help="Record; logs/<name>.mcap if nothing is said."
 )
@@ -55,13 +55,16 @@ def simulate(
     for path, suffix in ((mcap, ".mcap"), (rrd, ".rrd")):
         if path is not None and path.suffix.lower() != suffix:
             raise click.UsageError(f"--{suffix[1:]} {path}: such a file ends in {suffix}")
+    parameters = as_values(settings)
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu = Path(model)
         if fmu.suffix != ".fmu":
             mech = gallery.load(MECHANISM.convert(model, None, None))
             with about(model):
-                geometry, settings = parted(mech, settings)
+                refuse_what_follows(mech, settings)
+                geometry = {name: value for name, value in parameters.items() if name in mech.parameters}
                 mech = mech.with_parameters(geometry)
+                parameters = {name: value for name, value in parameters.items() if name not in geometry}
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
         elif not exists(fmu):
             raise click.UsageError(f"{fmu}: there is no such file")
@@ -72,7 +75,7 @@ def simulate(
                 stop=stop,
                 step=step,
                 inputs=inputs,
-                parameters=as_numbers(settings),
+                parameters=parameters,
                 progress=progress,
             )
     name = run.info.get("name") or fmu.stem

@@ -10,7 +10,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, SETTING, Range
 from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import as_numbers, parted
+from kinfmu.cli.settings import as_values, refuse_what_follows
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
 from kinfmu.units import Quantity
@@ -30,7 +30,7 @@ TABLES = (".csv", ".parquet", ".npz")
     help="N values of the driver [rad], or such as 0deg:360deg:361; rates are for 1 rad/s, time counts the samples.",
 )
 @click.option(
-    "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=2.0."
+    "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=30rpm."
 )
 @click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
 @click.option("--engine", type=click.Choice(["auto", "python"]), default="auto", show_default=True)
@@ -57,22 +57,19 @@ def solve(
         raise click.UsageError("--times and --angle cannot both drive")
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    geometry, others = parted(mech, settings)
-    laws = as_numbers(others)
-    for name, value in laws.items():
-        if isinstance(value, bool):
-            raise click.UsageError(f"--set {name}: a law constant is a number")
+    refuse_what_follows(mech, settings)
+    parameters = as_values(settings)
     if angle:
         if len(mech.drivers) != 1:
             raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
         t = None
-        for name in laws:
+        for name in (name for name in parameters if name not in mech.parameters):
             raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
         samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
     else:
         t, samples = (run_times(RunSettings(*times)) if times else None), {}
     with about(mechanism):
-        run = solved(mech, t, parameters=geometry | laws, outputs=wanted, engine=engine, **samples)
+        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, **samples)
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run)

@@ -16,14 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MissingPackageError, listed, suggestion
+from kinfmu.errors import FmuError, MechanismError, MissingPackageError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interrupt import interruptible
+from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.solver.status import Status
+from kinfmu.units import quantity_in
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -41,7 +43,7 @@ def simulate(
     stop: float | None = None,
     step: float | None = None,
     inputs: str | Path | Mapping[str, ArrayLike] | None = None,
-    parameters: Mapping[str, float | bool] | None = None,
+    parameters: Mapping[str, float | str | bool] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
     """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
@@ -49,7 +51,7 @@ def simulate(
     start, stop, step: [s], from the FMU's default experiment where not given; samples at t_k = start + k step, a last
     shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or a mapping
     of such arrays; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name, such
-    as {"crank.speed": 2.0}. progress: called with (samples done, samples in all).
+    as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. progress: called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
 
@@ -113,7 +115,7 @@ def _times(interface: Interface, start: float | None, stop: float | None, step: 
 
 
 def _parameters(
-    interface: Interface, parameters: Mapping[str, float | bool], *, has_inputs: bool, where: str
+    interface: Interface, parameters: Mapping[str, float | str | bool], *, has_inputs: bool, where: str
 ) -> dict[str, float | bool]:
     """The parameters to set, checked: inputs that are given shall drive unless the caller says otherwise."""
     known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
@@ -127,10 +129,12 @@ def _parameters(
             if value not in (False, True):
                 raise FmuError(f"{where}: {name} = {value!r} must be true or false")
             chosen[name] = bool(value)
-        elif isinstance(value, bool) or not np.isfinite(value):
-            raise FmuError(f"{where}: {name} = {value!r} must be a finite number")
         else:
-            chosen[name] = float(value)
+            quantity = quantity_in(known[name].unit or "1", interface.length_unit)
+            try:
+                chosen[name] = measured(f"{where}: {name}", value, quantity, interface.length_unit)
+            except MechanismError as error:
+                raise FmuError(str(error)) from None
     if has_inputs:
         chosen.setdefault("driven_by_time", False)
     return chosen

@@ -50,6 +50,22 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
     return float(value)  # type: ignore[arg-type]  # is_number said so
 
 
+def measured(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
+    """A number, or what text such as '30 rpm' says in the units used inside; expressions are not taken.
+
+    Raises a MechanismError that says what would be valid.
+    """
+    if isinstance(value, str):
+        number = written(where, value, quantity, length_unit)
+        if isinstance(number, Expression):
+            known = factors(quantity, length_unit)
+            valid = f"a number, alone or with a unit: {listed(known)}" if known else "a number"
+            raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
+        return number
+    check_number(where, value)
+    return float(value)  # type: ignore[arg-type]  # check_number said so
+
+
 def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> MechanismError:
     near = suggestion(unit, known)
     valid = f"must be one of {listed(known)}{near}" if known else "does not belong to a pure number"

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from numpy.typing import NDArray
 
 from kinfmu import gallery
 from kinfmu.cli import main
 
 Command = Callable[..., Result]
+
+
+def read_csv(path: Path) -> dict[str, NDArray[np.float64]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    return dict(zip(names, np.array(rows, dtype=float).T, strict=True))
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 import kinfmu
 from kinfmu import gallery, log
 from kinfmu.cli import main
-from tests.cli.conftest import Command
+from tests.cli.conftest import Command, read_csv
 
 ROOT = Path(__file__).parents[2]
 
@@ -115,7 +115,7 @@ def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str], fails:
     assert refuses("simulate", "none.fmu") == "none.fmu: there is no such file"
     assert "'forbar' is not in the gallery" in refuses("simulate", "forbar")
     assert "'none.csv' does not exist" in refuses("simulate", "fourbar", "--input", "none.csv")
-    assert "'fast' is not a valid float" in refuses("simulate", "fourbar", "--step", "fast")
+    assert "'fast' is not a number (units: s, ms, min, h)" in refuses("simulate", "fourbar", "--step", "fast")
     assert fails("build", "fourbar", "-o", "four.fmu", "--outputs", "rocker.fi").startswith(
         "fourbar: outputs: 'rocker.fi' is not one; did you mean 'rocker.phi'?"
     )
@@ -213,6 +213,32 @@ def test_parameters_are_set_for_a_check_and_a_build(command: Command, slider: Pa
     assert (tmp_path / "one.fmu").read_bytes() == (tmp_path / "two.fmu").read_bytes()
 
 
+def test_what_a_check_takes_a_solve_and_a_simulation_take_too(command: Command, slider: Path, tmp_path: Path) -> None:
+    paced = slider.read_text().replace("parameters = { ", 'parameters = { pace = "1 rad/s", ')
+    slider.write_text(paced.replace("law = ", 'speed = "pace", law = '))
+    for setting in ("crank=0.5", "crank=50cm", "rod=5/2*crank + 0 m", "pace=10rpm", "crank.start=60deg"):
+        solved = command("solve", slider, "-o", "run.csv", "--times", "0:20ms:10ms", "--set", setting)
+        assert solved.exit_code == 0, solved.stderr
+        table = read_csv(tmp_path / "run.csv")
+        assert command("simulate", slider, "--stop", "20ms", "--set", setting).exit_code == 0
+        stepped = log.read(tmp_path / "logs" / "slider.mcap")
+        for name in ("crank.phi", "rod.phi", "rod.x"):
+            assert stepped[name] == pytest.approx(table[name], abs=1e-12)
+
+
+def test_a_law_constant_that_follows_from_parameters_is_not_set_itself(
+    slider: Path, refuses: Callable[..., str]
+) -> None:
+    slider.write_text(slider.read_text().replace("law = ", 'speed = "crank*1 rad/s/(1 m)", law = '))
+    for command, *options in (("solve", "-o", "run.csv"), ("simulate",)):
+        assert refuses(command, slider, *options, "--set", "crank.speed=2") == (
+            "--set crank.speed=2: it follows from 'crank*1 rad/s/(1 m)'; set what stands there"
+        )
+    assert refuses("check", slider, "--set", "crank.start=2").endswith(
+        "parameters: crank, rod; constants of laws are set in solve and simulate"
+    )
+
+
 def test_parameters_that_cannot_be_set_are_told(
     slider: Path, fails: Callable[..., str], refuses: Callable[..., str]
 ) -> None:
@@ -220,7 +246,7 @@ def test_parameters_that_cannot_be_set_are_told(
         f"--set crnk=2: {slider} has no parameter 'crnk'; did you mean 'crank'?; parameters: crank, rod"
     )
     assert refuses("build", "fourbar", "--set", "a=2").endswith("fourbar has no parameter 'a'; parameters: none")
-    assert refuses("check", slider, "--set", "crank").endswith("must be NAME=VALUE, such as crank.speed=2.0")
+    assert refuses("check", slider, "--set", "crank").endswith("must be NAME=VALUE, such as crank.speed=30rpm")
     assert fails("check", slider, "--set", "crank=2 deg").startswith(f"{slider}: [parameters] crank = '2 deg': unit")
     assert fails("check", slider, "--set", "crank=rod").endswith("needs itself: crank -> rod -> crank")
     assert fails("check", slider, "--set", "crank=nan").endswith("[parameters] crank = nan must be a finite number")

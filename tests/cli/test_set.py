@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from tests.cli.conftest import Command
-from tests.cli.test_solve import read_csv
+from tests.cli.conftest import Command, read_csv
 
 LINKAGE = """
 name = "press"

@@ -117,6 +117,11 @@ def test_faults_of_a_csv_are_named_with_file_and_line(fourbar: Path, tmp_path: P
     assert "in.csv" in str(caught.value)
 
 
+def test_parameters_may_carry_their_units(fourbar: Path) -> None:
+    run = simulate(fourbar, stop=0.5, step=0.5, parameters={"crank.speed": "30 rpm", "crank.start": "45 deg"})
+    assert run["crank.phi"] == pytest.approx(np.array([0.25, 0.75]) * np.pi)
+
+
 def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
     with pytest.raises(FmuError, match=r"'crank_angle' has shape \(3,\), 'time' has 2 values"):
         simulate(fourbar, inputs={"time": [0.0, 180.0], "crank_angle": [0.0, 1.0, 2.0]})
@@ -127,6 +132,11 @@ def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
     [
         ({"parameters": {"crank.sped": 1.0}}, "'crank.sped' is no parameter of this FMU; did you mean 'crank.speed'"),
         ({"parameters": {"crank.speed": float("nan")}}, "crank.speed = nan must be a finite number"),
+        ({"parameters": {"crank.speed": "2 m"}}, r"four.*\.fmu: crank\.speed = '2 m': unit 'm' must be one of rad/s"),
+        (
+            {"parameters": {"crank.speed": "2*a"}},
+            r"crank\.speed = '2\*a' must be a number, alone or with a unit: rad/s",
+        ),
         ({"parameters": {"driven_by_time": 2}}, "driven_by_time = 2 must be true or false"),
         ({"step": 0.0}, "a positive step"),
         ({"start": 9.0, "stop": 1.0}, "start <= stop"),
