@@ -30,7 +30,7 @@ def with_parameters(name: str, settings: tuple[tuple[str, str], ...]) -> Mechani
 
 
 def refuse_what_follows(mechanism: Mechanism, settings: tuple[tuple[str, str], ...]) -> None:
-    """Raise a click.UsageError for a law constant that the file gives by an expression: its parameters are to be set."""
+    """Raise a click.UsageError for a law constant that the file gives by an expression: that is to be set."""
     for name, text in settings:
         driver, _, key = name.rpartition(".")
         expression = mechanism.expressions.get(("drivers", driver, "law", key))

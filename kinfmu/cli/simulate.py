@@ -24,7 +24,7 @@ from kinfmu.errors import KinfmuError
     "--input",
     "inputs",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="CSV with time and inputs such as crank_angle.",
+    help="CSV with columns time and inputs, such as crank_angle or crank_angle [deg].",
 )
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=30rpm.")
 @click.option(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.fmu.interface import Interface
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.units import Quantity, factors, quantity_in
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 TIME = "time"
+_WITH_UNIT = re.compile(r"(.*?)\s*\[(.*)\]", re.DOTALL)  # 'crank_angle [deg]'
 ROUNDING = 1e-9  # of the range: how far times may lie beyond the table by rounding alone
 
 
@@ -38,11 +43,17 @@ class InputTable:
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
 
 
-def input_table(inputs: str | Path | Mapping[str, ArrayLike], known: Sequence[str]) -> InputTable:
-    """The table in a CSV file (header `time, crank_angle, ...`) or in a mapping of arrays; `known` are the inputs."""
+def input_table(inputs: str | Path | Mapping[str, ArrayLike], interface: Interface) -> InputTable:
+    """The table in a CSV file or in a mapping of arrays, for the inputs of an FMU.
+
+    A file's header is such as `time, crank_angle [deg]`; columns are parted by commas, semicolons or tabs. A column without a unit in brackets is in the unit that the FMU declares.
+    """
+    quantities = {
+        variable.name: quantity_in(variable.unit or "1", interface.length_unit) for variable in interface.part("inputs")
+    }
     if isinstance(inputs, Mapping):
-        return _from_arrays(inputs, known)
-    return _from_csv(Path(inputs), known)
+        return _from_arrays(inputs, tuple(quantities))
+    return _from_csv(Path(inputs), quantities, interface.length_unit)
 
 
 def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> InputTable:
@@ -55,10 +66,14 @@ def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> Input
     return _checked("inputs", columns, [f"sample {k}" for k in range(rows)])
 
 
-def _from_csv(path: Path, known: Sequence[str]) -> InputTable:
+def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) -> InputTable:
+    known = tuple(quantities)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
+            first = next((line for line in file if line.strip()), "")
+            delimiter = next((mark for mark in ("\t", ";") if mark in first), ",")
+            file.seek(0)
+            reader = csv.reader(file, delimiter=delimiter)
             rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except UnicodeDecodeError:
         raise FmuError(f"{path}: is not a text file") from None
@@ -66,19 +81,39 @@ def _from_csv(path: Path, known: Sequence[str]) -> InputTable:
         raise FmuError(f"{path}: cannot be read ({error.strerror})") from None
     if not rows:
         raise FmuError(f"{path}: is empty; its first line must name the columns: {listed((TIME, *known))}")
-    header = [name.strip() for name in rows[0][1]]
+    titles = [_title(name) for name in rows[0][1]]
+    header = [name for name, _ in titles]
     _check_names(str(path), header, known)
+    units = {TIME: Quantity("time")} | dict(quantities)
+    into = [_factor(str(path), name, unit, factors(units[name], length_unit)) for name, unit in titles]
     columns: dict[str, list[float]] = {name: [] for name in header}
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise FmuError(f"{path}, line {line}: {len(row)} values, the header names {len(header)} columns")
-        for name, cell in zip(header, row, strict=True):
+        for name, cell, factor in zip(header, row, into, strict=True):
             try:
-                columns[name].append(float(cell))
+                columns[name].append(float(cell) * factor)
             except ValueError:
                 raise FmuError(f"{path}, line {line}: {name} = '{cell.strip()}' is not a number") from None
     arrays = {name: np.array(values) for name, values in columns.items()}
     return _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
+
+
+def _title(cell: str) -> tuple[str, str]:
+    """'crank_angle' and 'deg' of 'crank_angle [deg]'."""
+    found = _WITH_UNIT.fullmatch(cell.strip())
+    return (found[1], found[2].strip()) if found else (cell.strip(), "")
+
+
+def _factor(where: str, name: str, unit: str, known: Mapping[str, float]) -> float:
+    """From the column's unit into the one used inside."""
+    if not unit:
+        return 1.0
+    if unit not in known:
+        raise FmuError(
+            f"{where}: unit {quoted(unit)} of {name} must be one of {listed(known)}{suggestion(unit, known)}"
+        )
+    return known[unit]
 
 
 def _check_names(where: str, names: list[str], known: Sequence[str]) -> None:

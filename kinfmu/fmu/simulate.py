@@ -49,9 +49,10 @@ def simulate(
     """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
 
     start, stop, step: [s], from the FMU's default experiment where not given; samples at t_k = start + k step, a last
-    shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or a mapping
-    of such arrays; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name, such
-    as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. progress: called with (samples done, samples in all).
+    shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or
+    `crank_angle [deg]` with a unit, or a mapping of arrays by name; linear between rows. Inputs drive then, unless
+    parameters say otherwise. parameters: by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. progress:
+    called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
 
@@ -63,7 +64,7 @@ def simulate(
         about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))
         interface = about.interface
         t = _times(interface, start, stop, step)
-        table = None if inputs is None else input_table(inputs, [v.name for v in interface.part("inputs")])
+        table = None if inputs is None else input_table(inputs, interface)
         chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
         samples = _Samples(interface, len(t))
         if table is None and not _time_drives(interface, chosen):

@@ -92,6 +92,16 @@ def test_csv_inputs_drive_rows_are_met_exactly_and_what_lies_between_is_linear(f
     assert "driven_by_time = False" in run.info["parameters"]
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_columns_of_a_csv_may_name_their_units(fourbar: Path, tmp_path: Path, delimiter: str) -> None:
+    table = tmp_path / "crank.csv"
+    rows = (("time [ms]", "crank_angle [deg]", "crank_speed [rpm]"), ("0", "45", "30"), ("500", "135", "60"))
+    table.write_text("\n".join(delimiter.join(row) for row in rows))
+    run = simulate(fourbar, stop=0.5, step=0.25, inputs=table)
+    assert run["crank.phi"] == pytest.approx(np.array([0.25, 0.5, 0.75]) * np.pi)
+    assert run["crank.omega"] == pytest.approx(np.array([1.0, 1.5, 2.0]) * np.pi)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -105,6 +115,8 @@ def test_csv_inputs_drive_rows_are_met_exactly_and_what_lies_between_is_linear(f
         ("time,crank_angle\n0,1\n5\n", "line 3: 1 values, the header names 2 columns"),
         ("time,crank_angle\n0,1\n2,1\n", "holds 0 to 2 s, the run goes from 0 to 3 s"),
         ("time,crank_angle\n", "holds no samples"),
+        ("time,crank_angle [mm]\n0,1\n5,1\n", r"unit 'mm' of crank_angle must be one of rad, deg, rev"),
+        ("time [deg],crank_angle\n0,1\n5,1\n", r"unit 'deg' of time must be one of s, ms, min, h"),
         ("", "is empty; its first line must name the columns: time, crank_angle"),
         ("\udcff", "is not a text file"),
     ],
