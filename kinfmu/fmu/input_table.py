@@ -46,7 +46,8 @@ class InputTable:
 def input_table(inputs: str | Path | Mapping[str, ArrayLike], interface: Interface) -> InputTable:
     """The table in a CSV file or in a mapping of arrays, for the inputs of an FMU.
 
-    A file's header is such as `time, crank_angle [deg]`; columns are parted by commas, semicolons or tabs. A column without a unit in brackets is in the unit that the FMU declares.
+    A file's header is such as `time, crank_angle [deg]`; columns are parted by commas, semicolons or tabs. A
+    column without a unit in brackets is in the unit that the FMU declares.
     """
     quantities = {
         variable.name: quantity_in(variable.unit or "1", interface.length_unit) for variable in interface.part("inputs")
