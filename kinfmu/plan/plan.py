@@ -15,6 +15,7 @@ from kinfmu.errors import InconsistentError, MechanismError, MobilityError, list
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
+from kinfmu.plan.conditions import Condition, find_conditions
 from kinfmu.plan.origin import localized
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
@@ -64,7 +65,8 @@ class SolvePlan:
     origin: where the plan's own origin lies in the world; only outputs, `fixed` and start values know of the world's.
     outputs: the generalized coordinates q, then the points of interest; fixed_nodes: coordinates that never move, as
     constants or formulas of parameters; blocks in the order of solving; watches: rows set aside as redundant, relative
-    to the size; laws: u, ud, udd of each driver over the symbol `time`; anchor: an assembled, regular pose.
+    to the size; conditions: what parameters set at run time must leave true; laws: u, ud, udd of each driver over the
+    symbol `time`; anchor: an assembled, regular pose.
     """
 
     mechanism: Mechanism
@@ -79,6 +81,7 @@ class SolvePlan:
     coordinate_count: int
     fixed_nodes: Mapping[str, Node]
     watches: tuple[tuple[str, Node], ...]
+    conditions: tuple[Condition, ...]
     anchor: Assembled
 
     @cached_property
@@ -116,7 +119,8 @@ class SolvePlan:
         """Every node that the plan is made of, arguments first."""
         roots = [node for block in self.blocks for node in _nodes(block)]
         roots += [node for motion in (*self.laws, *self.outputs_motion) for node in motion[1:]]
-        return tuple(reachable([*roots, *self.fixed_nodes.values(), *(node for _, node in self.watches)]))
+        roots += [*self.fixed_nodes.values(), *(node for _, node in self.watches)]
+        return tuple(reachable([*roots, *(condition.node for condition in self.conditions)]))
 
     @cached_property
     def text(self) -> str:
@@ -132,6 +136,7 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
+        lines += [f"condition {name} {number[node]} {is_positive}" for name, node, is_positive in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)
 
@@ -249,6 +254,7 @@ def plan_from(
         coordinate_count=coordinate_count,
         fixed_nodes=fixed,
         watches=tuple(watches),
+        conditions=find_conditions(mechanism, tracer),
         anchor=anchor,
     )
 

@@ -33,7 +33,7 @@ class Tracer:
         self.symbols = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
         self.targets = {driver.name: self.graph.symbol(driver.inputs()[0]) for driver in mechanism.drivers}
         own = [name for name, parameter in mechanism.parameters.items() if parameter.expression is None]
-        members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in own})
+        self.members = members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in own})
         self.joints = members.joints
         self.drivers = members.drivers
         self._points = members.body_points

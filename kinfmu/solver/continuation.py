@@ -67,8 +67,8 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
             break
         there = min(s + step, 1.0)
         p = values if there == 1.0 else tuple([a + there * (b - a) for a, b in zip(written, values, strict=True)])
-        ahead = module.bound(p)
         try:
+            ahead = module.bound(p)
             trial = Pose(u, ahead.position(u, pose.z, slope, at_rest, there - s))
         except (ArithmeticError, ValueError) as error:  # diverged, or a root of something negative
             block = error.args[0] if len(error.args) == 2 else block
@@ -105,13 +105,20 @@ def _said(module: Any, values: Vector) -> str:
 
 def _opens(module: Any, values: Vector, u: Vector, pose: Pose, block: int) -> str:
     """Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave."""
+    try:
+        model = module.bound(values)
+    except (ArithmeticError, ValueError) as error:  # a division by zero, a length that is not positive
+        return f"{_said(module, values)}: {error}"
     if block < 0:
         sizes = [abs(determinant) for determinant in pose.determinants]
         block = sizes.index(min(sizes)) if sizes else -1
     if block < 0:
         return f"{_said(module, values)}: the mechanism does not close"
     rows = ", ".join(module.ROWS[block])
-    gap = _gap(module.bound(values), u, pose.z, block)
+    try:
+        gap = _gap(model, u, pose.z, block)
+    except (ArithmeticError, ValueError):  # a length of zero, say, with which another block has no solution at all
+        gap = 0.0
     if gap > 1e-9:
         left = f"{gap * module.SIZE:.4g} {module.LENGTH_UNIT}"
         return f"{_said(module, values)}: the mechanism does not close: rows {rows} stay open by {left}"

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute
+from kinfmu import AngleDriver, Body, ConstantSpeed, Cycloidal, Distance, Gear, Mechanism, Revolute
 from kinfmu.backends.python import load_module
-from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError
+from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError
 from kinfmu.mechanism import Point
 from kinfmu.plan import compile_plan
 from kinfmu.solver import Stuck, with_parameters
@@ -109,6 +109,66 @@ def test_a_redundant_bar_of_another_length_is_refused_with_its_row(tmp_path: Pat
     run = kinfmu.simulate(kinfmu.build(mechanism, tmp_path), parameters={"bar": 1.01})
     assert run.status.tolist() == [Status.INCONSISTENT]
     assert "the redundant row AB.length is open by about 0.01005 m" in run.events[0].text
+
+
+def test_numbers_that_a_file_would_be_refused_for_are_refused_at_run_time(tmp_path: Path) -> None:
+    mechanism = Mechanism(
+        "geared",
+        [
+            Body("ground", {"O": (0, 0), "C": (4, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 1.0)),
+            Body("rocker", {"C": (0, 0), "Q": (3, 0)}, (4, 0, 1.8)),
+            Body("wheel", {"C": (0, 0)}, (4, 0, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("C", ("ground.C", "rocker.C")),
+            Revolute("W", ("ground.C", "wheel.C")),
+            Distance("rod", ("crank.P", "rocker.Q"), "rod"),
+            Gear("mesh", ("crank", "wheel"), ratio="teeth/20"),
+        ],
+        [AngleDriver("crank", "crank", Cycloidal(rise=1.0, duration="1/pace", start=1.0))],
+        parameters={"rod": 3.5, "teeth": 40.0, "pace": 1.0},
+    )
+    fmu = kinfmu.build(mechanism, tmp_path)
+    for name, value, told in (
+        ("rod", -3.5, "[joints.rod] length = -3.5 must be positive"),  # d.d = L^2 would not mind
+        ("teeth", 0.0, "[joints.mesh] ratio = 0.0 must be other than 0"),
+        ("pace", -2.0, "[drivers.crank] duration = -0.5 must be positive"),
+        ("pace", 0.0, "float division by zero"),
+    ):
+        run = kinfmu.simulate(fmu, parameters={name: value})
+        assert run.events[0].text == f"parameters {name} = {value:g}: {told}"
+        assert not run.good.any()
+        with pytest.raises(MechanismError):
+            kinfmu.solve(mechanism, parameters={name: value})
+
+
+def test_lengths_of_zero_that_leave_rows_dependent_are_told(tmp_path: Path) -> None:
+    lengths = {"ground": 2.0, "crank": 1.0, "coupler": 2.0, "rocker": 1.0}
+    parallelogram = linkage(lengths)
+    third = Body("third", {"G": (0, 0), "T": ("crank", 0)}, (1, 0, 1.0))
+    ground, crank, *_ = parallelogram.bodies
+    changed = replace(
+        parallelogram,
+        bodies=(
+            Body("ground", {**ground.points, "G": (1.0, 0.0)}),
+            crank,
+            Body("coupler", {"P": (0, 0), "Q": ("ground", 0), "M": (1, 0)}, (0.5, 0.8, 0)),
+            Body("rocker", {"C": (0, 0), "Q": ("crank", 0)}, (2, 0, 1.0)),
+            third,
+        ),
+        joints=(
+            *parallelogram.joints,
+            Revolute("G", ("ground.G", "third.G")),
+            Revolute("T", ("third.T", "coupler.M")),
+        ),
+    )
+    run = kinfmu.simulate(kinfmu.build(changed, tmp_path), parameters={"crank": 0.0})
+    assert run.events[0].text.startswith("parameters crank = 0: lie behind a singular point, where rows ")
+    assert not run.good.any()
+    with pytest.raises(MobilityError, match="mobility is 3"):
+        kinfmu.solve(changed, parameters={"crank": 0.0})
 
 
 def test_a_name_that_is_no_parameter_is_told(fmu: Path) -> None:

@@ -30,7 +30,14 @@ def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequ
     """The functions inside one that binds the parameters: what depends on nothing else is computed there, once."""
     values = [identifier(parameter_symbol(parameter.name)) for parameter in plan.parameters]
     writer = Writer(names, (), prolog)
-    known = writer.statements(prolog)
+    known = writer.statements([*prolog, *(condition.node for condition in plan.conditions)])
+    for name, node, is_positive in plan.conditions:
+        number = writer.expression(node)
+        sign, meant = (">", "positive") if is_positive else ("!=", "other than 0")
+        known += [
+            f"if not ({number}) {sign} 0.0:",
+            f"    raise ValueError({name + ' = %r must be ' + meant!r} % ({number},))",
+        ]
     fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in plan.fixed_nodes.items())
     defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]
     return [
