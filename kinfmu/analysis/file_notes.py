@@ -6,19 +6,21 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from kinfmu.drivers import DistanceDriver
+from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.errors import listed
+from kinfmu.joints.cam import Cam
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.places import Place, told
 from kinfmu.units import Quantity
 
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a whole turn may be meant
+_LOOKS = 201  # times of a run at which a driver is looked at
 
 
 def file_notes(mechanism: Mechanism) -> Iterator[str]:
     """One line about parameters that stand nowhere, and one for each angle that looks like degrees without a unit.
 
-    And one for each driven distance that begins below 0.
+    And one for each driven distance that begins below 0, and for each cam that the run turns on where its lift ends.
     """
     unused = mechanism.unused_parameters
     if unused:
@@ -31,6 +33,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
                 f"[drivers.{driver.name}] the distance is {first:.6g} {mechanism.length_unit} at the start of the run: "
                 "it counts without its sign, and shrinks as the value grows"
             )
+    yield from _cams(mechanism)
     large: list[tuple[Place, float]] = []
 
     def look(place: Place, value: Any, quantity: Quantity) -> Any:
@@ -45,3 +48,20 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
             f"{told(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
             "a bare angle is in radians; degrees are written such as '60 deg'"
         )
+
+
+def _cams(mechanism: Mechanism) -> Iterator[str]:
+    """One line for each cam that a driver turns by more than a turn, although its lift does not come again."""
+    run = mechanism.run
+    times = [run.start + (run.stop - run.start) * k / (_LOOKS - 1) for k in range(_LOOKS)]
+    drivers = {driver.of: driver for driver in mechanism.drivers if isinstance(driver, AngleDriver)}
+    for joint in mechanism.joints:
+        if not isinstance(joint, Cam) or joint.cam not in drivers:
+            continue
+        why = joint.law.why_no_turn()
+        angles = [float(drivers[joint.cam].law.at(t)) for t in times] if why else []
+        if why and max(angles) - min(angles) > _TURN:
+            yield (
+                f"[joints.{joint.name}] law: {why}; "
+                f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
+            )

@@ -46,6 +46,38 @@ def test_a_driven_distance_below_zero_is_told() -> None:
     ]
 
 
+CAM = """
+name = "ejector"
+bodies.ground = { points = { O = [0, 0] } }
+bodies.cam = { points = { O = [0, 0] } }
+bodies.rod = { points = { P = [0, 0] } }
+[joints]
+O = { type = "revolute", between = ["ground.O", "cam.O"] }
+guide = { type = "translational", between = ["ground.O", "rod.P"] }
+[joints.lift]
+type = "cam_translating"
+between = ["ground.O", "rod.P"]
+cam = "cam"
+law = "sequence"
+segments = [
+    { law = "cycloidal", duration = "180 deg", rise = 1 },
+    { law = "cycloidal", duration = "180 deg", rise = -1 },
+]
+[drivers]
+cam = { type = "angle", of = "cam", law = "constant_speed", speed = "60 rpm" }
+[run]
+stop = 2
+"""
+
+
+def test_a_cam_that_turns_on_where_its_lift_ends_is_told() -> None:
+    note = "[joints.lift] law: its sequence does not repeat; say repeat = true; [run] turns cam by 720 deg"
+    assert list(file_notes(parse(CAM))) == [note]
+    assert note in check(parse(CAM)).notes
+    assert list(file_notes(parse(CAM.replace("stop = 2", "stop = 1")))) == []
+    assert list(file_notes(parse(CAM.replace("segments", "repeat = true\nsegments", 1)))) == []
+
+
 def test_notes_stand_in_the_report_of_a_mechanism_at_fault_too() -> None:
     mechanism = parse(
         CRANK_ROCKER.replace("crank = 1.0", "crank = 1.0\nrod = 3", 1).replace("Q = [3.5, 0]", "Q = [9, 0]")
