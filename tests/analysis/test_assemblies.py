@@ -13,7 +13,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Start, gallery
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.errors import AssemblyError, MobilityError
-from kinfmu.plan import compile_plan
+from kinfmu.plan import SolvePlan, compile_plan
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
@@ -152,10 +152,10 @@ def test_a_mechanism_at_fault_has_no_assemblies() -> None:
         kinfmu.check(loose).assemblies()
 
 
-def all_starts_or_one(mechanism: Mechanism) -> list[list[str]]:
+def all_starts_or_one(plan: SolvePlan) -> list[list[str]]:
     """Bodies whose start poses are left out: each alone, where that takes no seconds, and all together."""
-    bodies = [body.name for body in mechanism.moving_bodies]
-    is_slow = len(mechanism.drivers) > 2 or compile_plan(mechanism).watches
+    bodies = [body.name for body in plan.mechanism.moving_bodies]
+    is_slow = len(plan.drivers) > 2 or plan.watches
     return [bodies] if is_slow else [*([name] for name in bodies), bodies]
 
 
@@ -173,9 +173,10 @@ def all_starts_or_one(mechanism: Mechanism) -> list[list[str]]:
     ids=lambda mechanism: mechanism.name,
 )
 def test_start_poses_left_out_give_an_assembly_that_is_listed(mechanism: Mechanism) -> None:
-    full = found_for(mechanism)
+    whole = compile_plan(mechanism)
+    full = find_assemblies(mechanism, whole)
     known = [np.array(list(one.coordinates.values())) for one in full.found]
-    for left_out in all_starts_or_one(mechanism):
+    for left_out in all_starts_or_one(whole):
         short = started(mechanism, dict.fromkeys(left_out, Start()))
         try:
             plan = compile_plan(short)

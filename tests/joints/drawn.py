@@ -1,12 +1,14 @@
 """Joints and drivers of every class, drawn by hypothesis from the annotations of their fields.
 
-A new joint or driver is picked up by itself; one with a field of a new kind fails here and says which.
+A new joint or driver is picked up by itself; one with a field of a new kind fails here and says which. Strategies are
+made once: hypothesis looks through a new one every time, which takes longer than drawing from it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import cache
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -31,6 +33,7 @@ lengths = st.floats(0.1, 4.0)
 angles = st.floats(-7.0, 7.0).map(lambda x: round(x, 6))
 
 
+@cache
 def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     """Members of a joint or driver class between ground, left and right; `third` is for what a joint needs besides."""
     hints = get_type_hints(cls, include_extras=True)
@@ -41,6 +44,7 @@ def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrateg
     return st.builds(cls, **drawn)
 
 
+@cache
 def _values(cls: type[Any], key: str, hint: Any) -> st.SearchStrategy[Any]:
     if hint is Law:
         if issubclass(cls, Driver):
@@ -68,6 +72,7 @@ def _references(reference: Reference, *, is_pair: bool, beside: bool) -> st.Sear
     return st.sampled_from([(of[a], of[b]) for a, b in bodies])
 
 
+@cache
 def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
     """Laws of a class with drawn constants."""
     numbers = {key: lengths if said.is_positive else coordinates for key, said in number_fields(cls).items()}
@@ -82,6 +87,7 @@ def laws(cls: type[Law]) -> st.SearchStrategy[Law]:
     return st.builds(cls, **numbers)
 
 
+@cache
 def lifts() -> st.SearchStrategy[Law]:
     """Laws of a cam's angle, of moderate slope: derivatives of derivatives are compared to round-off."""
     small, slow = st.floats(-1.0, 1.0).map(lambda x: round(x, 3)), st.floats(2.0, 6.0)
@@ -91,12 +97,14 @@ def lifts() -> st.SearchStrategy[Law]:
     return rises | harmonics | polynomials | splines("natural")
 
 
+@cache
 def pitch_curves() -> st.SearchStrategy[Law]:
     """Radii over a turn."""
     whole = st.builds(Harmonic, st.floats(0.1, 0.5), st.sampled_from([1.0, 2.0]), st.floats(1.0, 2.0), angles)
     return whole | st.builds(lambda r: Polynomial((r,)), st.floats(1.0, 2.0))
 
 
+@cache
 def measures(cls: type[Measure]) -> st.SearchStrategy[Measure]:
     """Measures of a class between the bodies left and right."""
     drawn: dict[str, st.SearchStrategy[Any]] = {}
@@ -112,6 +120,7 @@ def measures(cls: type[Measure]) -> st.SearchStrategy[Measure]:
     return st.builds(cls, **drawn)
 
 
+@cache
 @st.composite
 def splines(draw: st.DrawFn, ends: str) -> Spline:
     """Tables of points at uneven distances."""
@@ -125,6 +134,7 @@ def splines(draw: st.DrawFn, ends: str) -> Spline:
     return Spline(tuple(zip(x, u, strict=True)), ends)
 
 
+@cache
 @st.composite
 def systems(draw: st.DrawFn, member: type[Joint] | type[Driver], **given: st.SearchStrategy[Any]) -> System:
     """A ground and three bodies with a drawn point each, and one drawn joint or driver; `given`: its keys."""
@@ -160,7 +170,11 @@ def regular_poses(system: System) -> st.SearchStrategy[NDArray[np.float64]]:
 
 def poses(system: System) -> st.SearchStrategy[NDArray[np.float64]]:
     """All coordinates q, or their rates."""
-    n = len(system.coordinates)
+    return _rows(len(system.coordinates))
+
+
+@cache
+def _rows(n: int) -> st.SearchStrategy[NDArray[np.float64]]:
     return st.lists(coordinates, min_size=n, max_size=n).map(np.array)
 
 

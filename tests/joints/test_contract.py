@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import cache
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -41,6 +42,7 @@ NO_DRIVERS = np.zeros(0)
 ROUNDING = 1e-14
 
 
+@cache
 def moving(cls: type[Joint]) -> st.SearchStrategy[tuple[str, str]]:
     """The two bodies that move, as points or as bodies after what the joint lies between."""
     is_body = Reference("body") in get_type_hints(cls, include_extras=True)["between"].__metadata__
