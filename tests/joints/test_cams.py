@@ -286,10 +286,18 @@ def test_an_indexer_goes_on_turn_after_turn() -> None:
 
 def test_a_roller_that_starts_on_the_pole_is_told_and_nothing_fails() -> None:
     mechanism = lifted(CamRoller("roller", ("cam.O", "follower.R"), Harmonic(0.25, 1.0, 1.25)))
-    bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}))  # type: ignore[dict-item]
+    bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}, (0, 0, 0)))  # type: ignore[dict-item,arg-type]
     at_pole = Mechanism("cam", bodies, mechanism.joints, mechanism.drivers)
     with pytest.raises(AssemblyError, match=r"'roller' stays open by 1.\d* m; check lengths and start poses"):
         kinfmu.solve(at_pole)
+
+
+def test_a_roller_whose_start_is_left_out_finds_its_way_off_the_pole() -> None:
+    mechanism = lifted(CamRoller("roller", ("cam.O", "follower.R"), Harmonic(0.25, 1.0, 1.25)))
+    bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}))  # type: ignore[dict-item]
+    run = kinfmu.solve(Mechanism("cam", bodies, mechanism.joints, mechanism.drivers), cam_angle=[0.0, 0.5])
+    expected = -1.25 + 0.25 * np.cos([0.0, 0.5])  # below the pole, where the cam is nearest to it
+    np.testing.assert_allclose(run["follower.y"], expected, rtol=0.0, atol=1e-14)
 
 
 WRONG: dict[str, tuple[Joint, str]] = {
