@@ -46,9 +46,10 @@ class Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
 class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
     """A:B:X of numbers, with units where the quantity has any."""
 
-    def __init__(self, quantity: Quantity, last: str) -> None:
+    def __init__(self, quantity: Quantity, last: str, length_unit: str = "m") -> None:
         self.quantity = quantity
         self.last = last
+        self.length_unit = length_unit
         self.name = f"A:B:{last}"
 
     def convert(
@@ -58,12 +59,13 @@ class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
             return value
         parts = str(value).split(":")
         if len(parts) != 3:
-            example = "0deg:360deg:361" if self.last == "N" else "0:1.5:0.01"
+            of_driver = "0deg:360deg:361" if self.quantity.kind == "angle" else "0mm:50mm:101"
+            example = of_driver if self.last == "N" else "0:1.5:0.01"
             self.fail(f"'{value}' must be {self.name}, such as {example}", param, ctx)
         third = Quantity("number") if self.last == "N" else self.quantity
         try:
             numbers = [
-                _number(part, quantity)
+                _number(part, quantity, self.length_unit)
                 for part, quantity in zip(parts, (self.quantity, self.quantity, third), strict=True)
             ]
         except ValueError as error:
@@ -102,9 +104,9 @@ def exists(path: Path) -> bool:
         return False
 
 
-def _number(text: str, quantity: Quantity) -> float:
-    """'360deg' as radians, '1.5' as it is; ValueError says what would be valid."""
-    known = factors(quantity, "m") if quantity.kind != "length" else {}
+def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
+    """'360deg' as radians, '1.5' as it is, '3mm' in the unit of length; ValueError says what would be valid."""
+    known = factors(quantity, length_unit)
     for unit in sorted(known, key=len, reverse=True):
         if text.endswith(unit) and text[: -len(unit)].strip():
             text, factor = text[: -len(unit)], known[unit]

@@ -26,8 +26,11 @@ TABLES = (".csv", ".parquet", ".npz")
 @click.option("--times", type=Range(Quantity("time"), "STEP"), help="Times [s]; the file's run if nothing is said.")
 @click.option(
     "--angle",
-    type=Range(Quantity("angle"), "N"),
-    help="N values of the driver [rad], or such as 0deg:360deg:361; rates are for 1 rad/s, time counts the samples.",
+    "--position",
+    "angle",
+    metavar="A:B:N",
+    help="N values of the driver [rad, or the file's unit of length], or such as 0deg:360deg:361 or 0mm:50mm:101; "
+    "rates are for a driver's speed of 1, time counts the samples.",
 )
 @click.option(
     "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=30rpm."
@@ -38,7 +41,7 @@ def solve(
     mechanism: str,
     output: Path,
     times: tuple[float, float, float] | None,
-    angle: tuple[float, float, float] | None,
+    angle: str | None,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
@@ -65,7 +68,8 @@ def solve(
         t = None
         for name in (name for name in parameters if name not in mech.parameters):
             raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
-        samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(angle[0], angle[1], int(angle[2]))}
+        first, last, count = _driver_values(angle, mech.drivers[0].quantity, mech.length_unit)
+        samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(first, last, int(count))}
     else:
         t, samples = (run_times(RunSettings(*times)) if times else None), {}
     with about(mechanism):
@@ -73,3 +77,10 @@ def solve(
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run)
+
+
+def _driver_values(text: str, quantity: Quantity, length_unit: str) -> tuple[float, float, float]:
+    """First, last and number of a driver's values: what their units may be is known once the mechanism is read."""
+    context = click.get_current_context()
+    option = next(option for option in context.command.params if option.name == "angle")
+    return Range(quantity, "N", length_unit).convert(text, option, context)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from kinfmu.equations.blocks import Ordered, ordered_blocks
 from kinfmu.equations.part import Part
@@ -21,7 +23,9 @@ BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is
 MOST_DENSE = 900  # coordinates; what needs all rows at once takes minutes beyond
 NEAR = 0.5  # [rad, sizes]; a pose as near as that to what the start poses give is the one that is meant
 _THROWS = 60  # of what the start poses leave out; blocks that alone can close in two ways each need a few
+_THROWS_TO_COME_NEARER = 15  # where the first pose is regular and only not near what is given
 _DENSE_THROWS = 8
+_DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zero; so does a weight in a combination
 _LOOKS = 4  # random poses at which the structure of the rows is seen
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
@@ -161,7 +165,7 @@ def assemble(system: System) -> Assembled | None:
     q, gap = close(system, rough_start(system), u)
     if gap > CLOSED:
         return None if has_order else _thrown_together(system, u, None, has_order)
-    found = Assembled(q, u, margin(system, q))
+    found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
     beside = []
@@ -184,10 +188,52 @@ def comfortable(system: System) -> float:
     return COMFORTABLE if len(system.mechanism.drivers) == 1 else COMFORTABLE_WITHOUT_BRIDGES
 
 
-def in_order(system: System) -> Ordered:
-    """The order of solving all rows, from where their gradients vanish at every one of some random poses.
+def _without_spare_rows(system: System, q: FloatArray, u: FloatArray) -> Assembled | None:
+    """A closed pose with its margin by blocks, once rows that depend on earlier ones there are left out.
 
-    At one pose a cam that dwells does not show whom it leads.
+    None if that leaves no order of solving, as at a singular pose, or a block that is nearly singular.
+    """
+    joints = Part(system, range(system.joint_row_count))
+    spare = dependent_rows(joints.jacobian(q))
+    rows = [k for k in range(len(system.rows)) if k not in spare]
+    order = in_order(system, rows) if len(rows) == len(system.coordinates) else Ordered(())
+    if not order.blocks:
+        return None
+    blocks = [(Part(system, members, columns, q), list(columns)) for members, columns in order.blocks]
+    least = min(_block_margin(part.jacobian(q[columns])) for part, columns in blocks)
+    return Assembled(q, u, least) if least > comfortable(system) else None
+
+
+def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
+    """Rows of a matrix that are combinations of earlier rows, each with the earlier independent rows that it needs."""
+    dependent: dict[int, list[int]] = {}
+    independent: list[int] = []
+    directions = np.zeros_like(gradients)  # orthonormal, one an independent row
+    triangle = np.zeros((len(gradients), len(gradients)))  # the independent rows over these directions
+    for index, gradient in enumerate(gradients):
+        count = len(independent)
+        parts, rest = np.zeros(count), gradient
+        for _ in range(2):  # Gram-Schmidt, twice for round-off
+            more = directions[:count] @ rest
+            parts, rest = parts + more, rest - more @ directions[:count]
+        length = float(np.linalg.norm(rest))
+        if length > _DEPENDENT * max(1.0, float(np.linalg.norm(gradient))):
+            directions[count] = rest / length
+            triangle[:count, count], triangle[count, count] = parts, length
+            independent.append(index)
+        else:
+            weights = solve_triangular(triangle[:count, :count], parts)
+            dependent[index] = [
+                row for row, weight in zip(independent, weights, strict=True) if abs(weight) > _DEPENDENT
+            ]
+    return dependent
+
+
+def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
+    """The order of solving rows (all if None), by index into System.rows.
+
+    A row meets the coordinates along which its gradient does not vanish at every one of some random poses: at one pose
+    a cam that dwells does not show whom it leads.
     """
     rng = np.random.default_rng(1989)
     poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
@@ -195,7 +241,13 @@ def in_order(system: System) -> Ordered:
     for member in system.members:
         slopes = np.any([system.gradients(member, q) != 0.0 for q in poses], axis=0)  # (rows, columns)
         meets += [[column for column, meet in zip(member.columns, row, strict=True) if meet] for row in slopes]
-    return ordered_blocks(meets, len(system.coordinates))
+    chosen = range(len(meets)) if rows is None else rows
+    order = ordered_blocks([meets[row] for row in chosen], len(system.coordinates))
+    return Ordered(
+        tuple((tuple(chosen[k] for k in members), columns) for members, columns in order.blocks),
+        tuple(chosen[k] for k in order.unmatched_rows),
+        order.unmatched_columns,
+    )
 
 
 def _thrown_together(system: System, u: FloatArray, first: Assembled | None, has_order: bool) -> Assembled | None:
@@ -213,7 +265,8 @@ def _thrown_together(system: System, u: FloatArray, first: Assembled | None, has
     if len(is_open) > MOST_DENSE:
         return first
     nearest = first
-    for _ in range(_THROWS if has_order else _DENSE_THROWS):
+    throws = _DENSE_THROWS if not has_order else _THROWS if first is None else _THROWS_TO_COME_NEARER
+    for _ in range(throws):
         thrown = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), rough_start(system))
         if has_order:
             found, _ = _assembled_in_order(system, u, thrown)

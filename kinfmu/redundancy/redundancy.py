@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import assemble, comfortable, motion_samples, null_space, rough_start
+from kinfmu.equations.assembly import assemble, comfortable, dependent_rows, motion_samples, rough_start
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System
 
 CONSISTENT = 1e-11  # gap relative to the mechanism's size up to which a dependent row counts as consistent
-_DEPENDENT = 1e-6  # part of a row in a combination that counts; a singular value that counts as zero
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
 _SAMPLES = 6
 
@@ -74,31 +73,48 @@ def find_redundancy(system: System) -> Redundancy:
     kept = list(joint_rows)
     dependent: list[DependentRow] = []
     u = np.zeros(len(system.mechanism.drivers))
-    for index in reversed(suspects):
+    for index, implying in reversed(suspects.items()):
         others = [k for k in kept if k != index]
-        poses = motion_samples(Part(system, others), start, _SAMPLES)
-        if not poses or not all(_in_span(system, pose, index, others) for pose in poses):
+        found = _poses_of_dependence(system, start, index, implying) if implying else None
+        found = found or _poses_of_dependence(system, start, index, others)
+        if found is None:
             continue
+        poses, rows = found
         kept = others
         residuals = [system.residual(pose, u) for pose in poses]
         gap = max((float(system.gaps(phi)[index]) for phi in residuals), key=abs)
-        implied_by = _implied_by(system, poses, index, others)
+        implied_by = _implied_by(system, poses, index, rows)
         consistent = all(system.relative_gaps(phi)[index] <= CONSISTENT for phi in residuals)
         dependent.insert(0, DependentRow(system.rows[index], index, implied_by, gap, consistent))
     return Redundancy(free - len(kept), tuple(kept), tuple(dependent))
 
 
-def _suspects(system: System, closed: FloatArray | None) -> list[int]:
-    """Joint rows that may be dependent: those with a part in a combination of gradients that vanishes.
+def _poses_of_dependence(
+    system: System, start: FloatArray, index: int, others: Sequence[int]
+) -> tuple[list[FloatArray], Sequence[int]] | None:
+    """Poses of the motion that other rows leave at all of which a row depends on them, and those rows; or None.
+
+    Only the bodies that these rows touch move: what a few rows imply they imply in every company.
+    """
+    members = {system.member_of[row] for row in (*others, index)}
+    columns = sorted({column for number in members for column in system.members[number].columns})
+    part = Part(system, others, columns, start)
+    poses = [part.whole(q) for q in motion_samples(part, start[columns], _SAMPLES)]
+    if not poses or not all(_in_span(system, pose, index, others) for pose in poses):
+        return None
+    return poses, others
+
+
+def _suspects(system: System, closed: FloatArray | None) -> dict[int, list[int]]:
+    """Joint rows that may be dependent, each with the rows before it whose gradients give its own at a closed pose.
 
     Where all rows hold together, what is dependent all along the motion is dependent there too. Where they do not
-    close, all rows are suspects.
+    close, all rows are suspects, and nothing is known of what implies them.
     """
-    joint_rows = list(range(system.joint_row_count))
-    if closed is None or not joint_rows:
-        return joint_rows
-    combinations = null_space(Part(system, joint_rows).jacobian(closed).T, _DEPENDENT)  # (rows, combinations)
-    return [k for k in joint_rows if np.abs(combinations[k]).max(initial=0.0) > _DEPENDENT]
+    joint_rows = range(system.joint_row_count)
+    if closed is None:
+        return {index: [] for index in joint_rows}
+    return dependent_rows(Part(system, joint_rows).jacobian(closed))
 
 
 def _in_span(system: System, pose: FloatArray, index: int, others: Sequence[int]) -> bool:

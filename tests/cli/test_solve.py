@@ -138,7 +138,8 @@ def test_a_folder_that_is_missing_is_told(fails: Callable[..., str]) -> None:
 def test_a_value_of_an_option_that_cannot_be_meant_is_wrong_usage(
     option: str, value: str, told: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for '{option}': {told}"
+    called = "'--angle' / '--position'" if option == "--angle" else f"'{option}'"
+    assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for {called}: {told}"
     assert not list(tmp_path.iterdir())
 
 
@@ -167,3 +168,13 @@ def test_a_run_of_too_many_samples_in_the_file_is_told(
 ) -> None:
     told = fails("solve", fourbar_file("step = 1\n", "step = 1e-9\n"), "-o", "run.csv")
     assert told == "[run] 0 to 180 s in steps of 1e-09 s: more than 10000000 samples"
+
+
+def test_driver_values_are_lengths_where_a_length_is_driven(
+    command: Command, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    assert command("solve", "parallel_jaw", "-o", "run.csv", "--position", "-2cm:30mm:3").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["piston_position"].tolist() == [-20.0, 5.0, 30.0]
+    assert "'0deg' is not a number (units: m, mm, cm" in refuses(
+        "solve", "parallel_jaw", "-o", "r.csv", "--angle", "0deg:3:3"
+    )

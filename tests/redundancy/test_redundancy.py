@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, Distance, Mechanism, Revolute
+from kinfmu import AngleDriver, Body, Distance, Mechanism, Point, Revolute
+from kinfmu.chains import fourbar_chain
 from kinfmu.equations import System
 from kinfmu.errors import InconsistentError
 from kinfmu.redundancy import find_redundancy
@@ -72,3 +75,21 @@ def test_of_two_equal_bars_the_later_one_is_set_aside() -> None:
     (row,) = find_redundancy(System(mechanism)).redundant
     assert row.row.owner == "second"
     assert "first" in row.implied_by_joints
+
+
+def test_a_redundant_bar_in_every_loop_of_a_chain_is_found_beside_its_own_loop() -> None:
+    count = 12
+    chain, bodies = fourbar_chain(count), []
+    for body in chain.bodies:
+        points = dict(body.points)
+        if body.name == "ground":
+            points |= {f"X_{k}": Point(k - 0.7, 0.0) for k in range(1, count + 1)}
+        elif body.name.startswith("coupler"):
+            points["X"] = Point(0.3, 0.0)
+        bodies.append(replace(body, points=points))
+    bars = [Distance(f"bar_X_{k}", (f"ground.X_{k}", f"coupler_{k}.X"), 1.0) for k in range(1, count + 1)]
+    redundancy = find_redundancy(System(replace(chain, bodies=tuple(bodies), joints=(*chain.joints, *bars))))
+    assert redundancy.mobility == 1
+    assert [row.row.owner for row in redundancy.redundant] == [bar.name for bar in bars]
+    for k, row in enumerate(redundancy.redundant, start=1):
+        assert row.implied_by_joints == (f"O_{k - 1}", f"O_{k}", f"P_{k}", f"Q_{k}")
