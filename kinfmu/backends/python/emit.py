@@ -268,6 +268,16 @@ class _Emitter:
             f"    return {first}, {second}",
             "",
         ]
+        if self.many:  # a function twice as large would cost more than the calls
+            first_read = [
+                "",
+                "def first_motion(values, ud, udd):",
+                '    """Tangent and motion, for the first reading of a pose."""',
+                "    first, second = tangent(values)",
+                "    return (first, second), motion(values, ud, udd, first, second)",
+                "",
+            ]
+            return [tangent, first_read]
         motion = self._stage("motion", "", (0, 1, 2))
         head, row = motion.index(_VALUES) + 1, motion[-2].removeprefix("    return ")
         first_read = [
