@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Joint
+from kinfmu.joints.joint import Condition, Joint
 from kinfmu.joints.laws import Law
 from kinfmu.joints.laws.law import TURN
 from kinfmu.joints.measures import AngleBetween, Measure
@@ -53,6 +53,9 @@ class Cam(Joint):
         lifts = [abs(self.offset + self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS)]
         return max(lifts) if self.led == "length" else 0.0
 
+    def conditions(self) -> tuple[Condition, ...]:
+        return closing(self.law) if self.law.repeats else ()
+
     def check(self) -> None:
         where = f"[joints.{self.name}]"
         self.law.check(where)
@@ -65,3 +68,8 @@ class Cam(Joint):
             raise MechanismError(
                 f"{where} law: {why}; a follower that goes on turn after turn needs a coupling", joint=self.name
             )
+
+
+def closing(law: Law) -> tuple[Condition, ...]:
+    """What makes a law of an angle come back after a turn."""
+    return tuple(Condition(f"law: {key}", value, "0") for key, value in law.zeros().items())

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value, atan2, sqrt
-from kinfmu.joints.joint import Joint
+from kinfmu.joints.cam import closing
+from kinfmu.joints.joint import Condition, Joint
 from kinfmu.joints.laws import Law
 from kinfmu.joints.laws.law import TURN
 from kinfmu.joints.placement import Placement, PointPair, body_of
@@ -49,6 +50,9 @@ class CamRoller(Joint):
 
     def reach(self) -> float:
         return max(float(self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS))
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return closing(self.law)
 
     def check(self) -> None:
         where = f"[joints.{self.name}]"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints.joint import Held
+from kinfmu.joints.joint import Condition, Held
 from kinfmu.joints.measures import DistanceBetween
 from kinfmu.joints.placement import PointPair
 from kinfmu.units import Length
@@ -38,6 +38,9 @@ class Distance(Held):
                 f"[joints.{self.name}] length = {self.length!r} must be a positive number, {SHORTEST:g} or more",
                 joint=self.name,
             )
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return (Condition("length", self.length, "positive"),)
 
     def measured(self) -> tuple[DistanceBetween, float]:
         return DistanceBetween(self.between), self.length

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Joint
+from kinfmu.joints.joint import Condition, Joint
 from kinfmu.joints.measures import AngleBetween
 from kinfmu.joints.placement import BodyName, BodyPair, Placement
 from kinfmu.units import Number, Radians
@@ -38,6 +38,9 @@ class Gear(Joint):
             raise MechanismError(
                 f"[joints.{self.name}] carrier = '{self.carrier}' must be another body than the gears", joint=self.name
             )
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return (Condition("ratio", self.ratio, "other than 0"),)
 
     def bodies(self) -> tuple[str, ...]:
         return (*self.between, self.carrier)

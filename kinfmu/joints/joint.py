@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.measures.measure import Measure
 from kinfmu.joints.placement import Placement
+
+
+class Condition(NamedTuple):
+    """What a number of a joint must be; it may follow from parameters, so it is in any arithmetic.
+
+    key: how messages call it; meant: 'positive', 'other than 0' or '0' (to NEARLY).
+    """
+
+    key: str
+    value: Value
+    meant: str
 
 
 class Joint(ABC):
@@ -37,6 +48,10 @@ class Joint(ABC):
 
     def check(self) -> None:  # noqa: B027  most joints take any values
         """Raise a MechanismError for values that cannot be meant; numbers are finite and references valid by then."""
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """What `check` asks of numbers alone: where parameters are set without the file, it is asked again."""
+        return ()
 
     def moved(self, dx: float, dy: float) -> Joint:  # noqa: ARG002  absolute joints depend on it
         """The joint when the whole mechanism stands elsewhere; the same unless it is absolute."""

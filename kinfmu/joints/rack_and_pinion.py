@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.joint import Joint
+from kinfmu.joints.joint import Condition, Joint
 from kinfmu.joints.measures import AngleBetween, PositionAlong
 from kinfmu.joints.placement import BodyName, Placement, PointPair, body_of
 from kinfmu.units import Length, Radians
@@ -40,6 +40,9 @@ class RackAndPinion(Joint):
                 f"[joints.{self.name}] pinion = '{self.pinion}' must be another body than the rack and what holds it",
                 joint=self.name,
             )
+
+    def conditions(self) -> tuple[Condition, ...]:
+        return (Condition("radius", self.radius, "other than 0"),)
 
     def bodies(self) -> tuple[str, ...]:
         return (*map(body_of, self.between), self.pinion)

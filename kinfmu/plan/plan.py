@@ -15,7 +15,7 @@ from kinfmu.errors import InconsistentError, MechanismError, MobilityError, list
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
-from kinfmu.plan.conditions import Condition, find_conditions
+from kinfmu.plan.conditions import PlanCondition, find_conditions
 from kinfmu.plan.origin import localized
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
@@ -81,7 +81,7 @@ class SolvePlan:
     coordinate_count: int
     fixed_nodes: Mapping[str, Node]
     watches: tuple[tuple[str, Node], ...]
-    conditions: tuple[Condition, ...]
+    conditions: tuple[PlanCondition, ...]
     anchor: Assembled
 
     @cached_property
@@ -136,7 +136,7 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
-        lines += [f"condition {name} {number[node]} {is_positive}" for name, node, is_positive in self.conditions]
+        lines += [f"condition {name} {number[node]} {meant}" for name, node, meant in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)
 

@@ -15,6 +15,7 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Cycloidal, Distance, Gear, 
 from kinfmu.backends.python import load_module
 from kinfmu.errors import AssemblyError, InconsistentError, KinfmuError, MechanismError, MobilityError
 from kinfmu.mechanism import Point
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
 from kinfmu.solver import Stuck, with_parameters
 from kinfmu.solver.status import Status
@@ -202,3 +203,66 @@ def test_parameters_are_in_the_state_of_an_fmu_and_in_what_depends_on_them(fmu: 
 
 def test_points_may_be_given_as_points() -> None:
     assert linkage().bodies[0].points["C"] == Point(4.0, 0.0)
+
+
+def test_a_cam_whose_lift_would_not_close_after_a_turn_is_refused_at_run_time(tmp_path: Path) -> None:
+    text = """
+        name = "cam"
+        [parameters]
+        rise = "60 deg"
+        dwell = "120 deg"
+        lift = 10
+        drop = 10
+        [bodies.ground]
+        points = { O = [0, 0] }
+        [bodies.cam]
+        points = { O = [0, 0] }
+        [bodies.follower]
+        points = { F = [0, 0] }
+        start = { x = 0, y = 0, phi = 0 }
+        [joints.O]
+        type = "revolute"
+        between = ["ground.O", "cam.O"]
+        [joints.guide]
+        type = "translational"
+        between = ["ground.O", "follower.F"]
+        axis = "90 deg"
+        [joints.lift]
+        type = "cam_translating"
+        between = ["ground.O", "follower.F"]
+        axis = "90 deg"
+        cam = "cam"
+        offset = 30
+        law = "sequence"
+        repeat = true
+        segments = [
+            { law = "cycloidal", rise = "lift", duration = "rise" },
+            { law = "dwell", duration = "dwell" },
+            { law = "cycloidal", rise = "-drop", duration = "rise" },
+            { law = "dwell", duration = "dwell" },
+        ]
+        [drivers.cam]
+        type = "angle"
+        of = "cam"
+        law = "constant_speed"
+        speed = "60 deg/s"
+        [run]
+        stop = 6
+        step = 0.5
+    """
+    mechanism = parse(text)
+    fmu = kinfmu.build(mechanism, tmp_path)
+    both = {"rise": math.radians(80.0), "dwell": math.radians(100.0)}
+    np.testing.assert_allclose(
+        kinfmu.simulate(fmu, parameters=both).values, kinfmu.solve(mechanism, parameters=both).values, atol=1e-12
+    )
+    for settings, told in (
+        ({"rise": both["rise"]}, "durations in all over a turn, less 1, = 0.1111111111"),
+        ({"drop": 9.0}, "rises in all over their size = 0.0743"),
+    ):
+        run = kinfmu.simulate(fmu, parameters=settings)
+        assert f"[joints.lift] law: {told}" in run.events[0].text
+        assert run.events[0].text.endswith(" must be 0")
+        assert not run.good.any()
+        with pytest.raises(MechanismError, match="add up to"):
+            kinfmu.solve(mechanism, parameters=settings)

@@ -26,16 +26,18 @@ def parametric(plan: SolvePlan) -> tuple[set[Node], list[Node]]:
     return alone, list(dict.fromkeys(node for node in used if node in alone))
 
 
+_HOLDS = {"positive": "({}) > 0.0", "other than 0": "({}) != 0.0", "0": "abs({}) <= 1e-9"}
+
+
 def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequence[str]) -> list[str]:
     """The functions inside one that binds the parameters: what depends on nothing else is computed there, once."""
     values = [identifier(parameter_symbol(parameter.name)) for parameter in plan.parameters]
     writer = Writer(names, (), prolog)
     known = writer.statements([*prolog, *(condition.node for condition in plan.conditions)])
-    for name, node, is_positive in plan.conditions:
+    for name, node, meant in plan.conditions:
         number = writer.expression(node)
-        sign, meant = (">", "positive") if is_positive else ("!=", "other than 0")
         known += [
-            f"if not ({number}) {sign} 0.0:",
+            f"if not {_HOLDS[meant].format(number)}:",
             f"    raise ValueError({name + ' = %r must be ' + meant!r} % ({number},))",
         ]
     fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in plan.fixed_nodes.items())

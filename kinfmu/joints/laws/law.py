@@ -90,6 +90,10 @@ class Law(ABC):
         """True if it is meant to repeat: if its table says so."""
         return False
 
+    def zeros(self) -> Mapping[str, Value]:
+        """Numbers that are 0 where f(x + 2 pi) is f(x), by what they are; in any arithmetic, as parameters may be."""
+        return {}
+
     def why_no_turn(self) -> str:
         """Why f(x + 2 pi) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.arithmetic import Value, curve, floor
+from kinfmu.joints.arithmetic import Value, curve, floor, sqrt
 from kinfmu.joints.laws.cycloidal import Cycloidal
 from kinfmu.joints.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
 from kinfmu.joints.laws.modified_sine import ModifiedSine
@@ -112,6 +112,14 @@ class MotionSequence(Law):
     @property
     def repeats(self) -> bool:
         return self.repeat
+
+    def zeros(self) -> Mapping[str, Value]:
+        whole = sum(segment.duration for segment in self.segments)
+        rises = [segment.rise for segment in self.segments if segment.law != DWELL]
+        found = {"durations in all over a turn, less 1,": whole / TURN - 1.0}
+        if rises:
+            found["rises in all over their size"] = sum(rises) / sqrt(sum(rise * rise for rise in rises))
+        return found
 
     def why_no_turn(self) -> str:
         if not self.repeat:
