@@ -162,13 +162,14 @@ def _renamed(block: Block, form: _Form, differs: Sequence[bool], rate_of: Callab
 class Kind:
     """What alike blocks share: one block over names of its own, and the functions made of it.
 
-        position(given..., constants..., z..., p..., held, number) -> coordinates, determinant, error, iterations, hold
-        velocity(hold, rates of given...)                          -> rates of the unknowns
-        acceleration(hold, both of given..., own rates...)         -> accelerations of the unknowns
-        rates, accelerations                                       -> the same of the assigned coordinates
-        jacobian(hold)                                             -> its Jacobian
+        position(given..., constants..., p..., z, first, held, number)
+                                                    -> coordinates, determinant, error, iterations, hold
+        velocity(hold, rates of given...)           -> rates of the unknowns
+        acceleration(hold, both of given..., own rates...)  -> accelerations of the unknowns
+        rates, accelerations                        -> the same of the assigned coordinates
+        jacobian(hold)                              -> its Jacobian
 
-    z: unknowns before the prediction p; hold: what the later functions need of the position.
+    p: predicted unknowns; z[first], ...: the unknowns before; hold: what the later functions need of the position.
     """
 
     label: str
@@ -222,14 +223,13 @@ class _KindEmitter:
         count = len(block.unknowns)
         arguments = [identifier(name) for name in self.kind.given()]
         arguments += [f"c{k}" for k in range(sum(self.kind.differs))]
-        arguments += [f"z{k}" for k in range(count)]
         z = [identifier(name) for name in block.unknowns]
-        lines = newton_lines(writer, block, label, [f"z{k}" for k in range(count)], "held", "number")
+        lines = newton_lines(writer, block, label, [f"z[first + {k}]" for k in range(count)], _HELD, "number")
         own = [identifier(name) for name in block.coordinates]
         about = f"{len(block.residuals)} x {count} from rows {', '.join(block.row_names)}"
         return [
             "",
-            f"def position{label}({', '.join([*arguments, *z, 'held', 'number'])}):",
+            f"def position{label}({', '.join([*arguments, *z, 'z', 'first', 'held', 'number'])}):",
             f'    """One of {self.kind.count} blocks that are alike: {about}."""',
             *indented(lines),
             f"    return {', '.join(own)}, det{label}, error, iteration, {tupled(self.hold)}",
@@ -310,6 +310,7 @@ class _KindEmitter:
 
 
 _HOLD = "    <hold>"
+_HELD = "(held and held >> number & 1)"  # as a rule nothing is held
 _RATES = (".vx", ".vy", ".omega", ".ax", ".ay", ".alpha")
 
 
@@ -327,12 +328,13 @@ class Calls:
         self.rate_of = rate_of
         self.hold = f"hold{number + 1}"
 
-    def position(self, starts: Iterable[str], z: Iterable[str]) -> str:
-        """The block's position, from unknowns before the prediction and predicted ones."""
+    def position(self, first: int) -> str:
+        """The block's position from predictions that stand in its unknowns; first: place of its unknowns in z."""
         given = [*map(identifier, self.member.given), *map(repr, self.member.constants)]
         own = [identifier(name) for name in self.block.coordinates]
         results = [*own, f"det{self.number + 1}", "error", "iteration", self.hold]
-        arguments = [*given, *starts, *z, f"held & {1 << self.number}", str(self.number)]
+        predicted = [identifier(name) for name in self.block.unknowns]
+        arguments = [*given, *predicted, "z", str(first), "held", str(self.number)]
         return f"{', '.join(results)} = position{self.member.kind.label}({', '.join(arguments)})"
 
     def linear(self, order: int, spoken: Callable[[str], str]) -> str:

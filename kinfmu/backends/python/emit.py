@@ -216,7 +216,7 @@ class _Emitter:
         """Statements of a block that needs Newton: its own, or a call of what alike blocks share."""
         starts = [f"z[{place}]" if self.many else f"z{place}" for place in range(*self.places[k])]
         if k in self.calls:
-            lines = [self.calls[k].position(starts, map(identifier, block.unknowns))]
+            lines = [self.calls[k].position(self.places[k][0])]
         else:
             held = f"held & {1 << k}"
             lines = [f"# block {k + 1}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}"]
