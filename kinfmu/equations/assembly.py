@@ -151,10 +151,10 @@ def assemble(system: System) -> Assembled | None:
     open or singular. None if the rows, all together, do not close near the start pose.
     """
     u = start_targets(system)
-    found, trouble = _assembled_in_order(system, u, rough_start(system))
-    has_order = bool(in_order(system).blocks)
-    if has_order and (found is None or _off(system, found) > NEAR):
-        found = _thrown_together(system, u, found, has_order)
+    order = in_order(system)
+    found, trouble = _assembled_in_order(system, u, rough_start(system), order)
+    if order.blocks and (found is None or _off(system, found) > NEAR):
+        found = _thrown_together(system, u, found, order)
     if found is not None:
         return found
     if len(system.coordinates) > MOST_DENSE:
@@ -164,7 +164,7 @@ def assemble(system: System) -> Assembled | None:
         )
     q, gap = close(system, rough_start(system), u)
     if gap > CLOSED:
-        return None if has_order else _thrown_together(system, u, None, has_order)
+        return None if order.blocks else _thrown_together(system, u, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
@@ -250,7 +250,7 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     )
 
 
-def _thrown_together(system: System, u: FloatArray, first: Assembled | None, has_order: bool) -> Assembled | None:
+def _thrown_together(system: System, u: FloatArray, first: Assembled | None, order: Ordered) -> Assembled | None:
     """Of a first pose and regular ones from seeded random values of what the start poses leave out, the one that comes
     nearest to what they give: the first that comes near, else the nearest of all.
     """
@@ -265,11 +265,11 @@ def _thrown_together(system: System, u: FloatArray, first: Assembled | None, has
     if len(is_open) > MOST_DENSE:
         return first
     nearest = first
-    throws = _DENSE_THROWS if not has_order else _THROWS if first is None else _THROWS_TO_COME_NEARER
+    throws = _DENSE_THROWS if not order.blocks else _THROWS if first is None else _THROWS_TO_COME_NEARER
     for _ in range(throws):
         thrown = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), rough_start(system))
-        if has_order:
-            found, _ = _assembled_in_order(system, u, thrown)
+        if order.blocks:
+            found, _ = _assembled_in_order(system, u, thrown, order)
         else:
             q, gap = close(system, thrown, u)
             found = Assembled(q, u, margin(system, q)) if gap <= CLOSED else None
@@ -294,12 +294,13 @@ def _off(system: System, found: Assembled) -> float:
     return largest
 
 
-def _assembled_in_order(system: System, u: FloatArray, start: FloatArray) -> tuple[Assembled, str] | tuple[None, str]:
+def _assembled_in_order(
+    system: System, u: FloatArray, start: FloatArray, order: Ordered
+) -> tuple[Assembled, str] | tuple[None, str]:
     """A rough pose closed block by block, or None and what stands in the way.
 
     Never a pose that is nearly singular.
     """
-    order = in_order(system)
     if order.unmatched_columns:
         return None, f"nothing determines {listed(system.coordinates[k] for k in order.unmatched_columns[:5])}"
     if order.unmatched_rows:
