@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,14 @@ def linkage(lengths: Mapping[str, float] = LENGTHS) -> Mechanism:
         parameters=dict(lengths),
         run=kinfmu.RunSettings(0.0, 6.0, 0.25),
     )
+
+
+@pytest.fixture(scope="module", autouse=True, params=[200, 0], ids=["unrolled", "loops over tables"])
+def code(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Both forms of generated code bind parameters."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(import_module("kinfmu.backends.python.emit"), "MANY", request.param)
+        yield
 
 
 @pytest.fixture(scope="module")

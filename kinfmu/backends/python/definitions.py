@@ -2,48 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
 
 from kinfmu.backends.python.writer import Writer, identifier
 from kinfmu.equations.graph import Node, symbols
 
 
-class Definition(NamedTuple):
-    """Names that become known together, the names that they are made of, and the statements that do it."""
-
-    names: tuple[str, ...]
-    needs: tuple[str, ...]
-    write: Callable[[Writer], list[str]]
-
-
-def formula(name: str, node: Node) -> Definition:
-    """A name that a node defines."""
-
-    def write(writer: Writer) -> list[str]:
-        return [*writer.statements([node]), f"{identifier(name)} = {writer.expression(node)}"]
-
-    return Definition((name,), tuple(symbol.name for symbol in symbols([node])), write)
-
-
 class Definitions:
-    """Definitions in the order of evaluation."""
+    """Formulas by the names that they define, in the order of evaluation."""
 
-    def __init__(self, ordered: Sequence[Definition]) -> None:
-        self._ordered = ordered
-        self._home = {name: k for k, definition in enumerate(ordered) for name in definition.names}
+    def __init__(self, formulas: Mapping[str, Node]) -> None:
+        self._formulas = formulas
+        self._order = {name: k for k, name in enumerate(formulas)}
 
-    def lines(self, writer: Writer, wanted: Iterable[str], done: set[int]) -> list[str]:
-        """Statements for the definitions that the wanted names are made of and that are not done yet.
+    def lines(self, writer: Writer, wanted: Iterable[str], done: set[str]) -> list[str]:
+        """Statements for the names that the wanted ones are made of and that are not done yet.
 
-        done: numbers of definitions already written; it grows.
+        done: names already written; it grows.
         """
-        needed: set[int] = set()
-        stack = [self._home[name] for name in wanted if name in self._home]
+        needed: set[str] = set()
+        stack = [name for name in wanted if name in self._formulas]
         while stack:
-            k = stack.pop()
-            if k not in needed and k not in done:
-                needed.add(k)
-                stack += [self._home[name] for name in self._ordered[k].needs if name in self._home]
+            name = stack.pop()
+            if name not in needed and name not in done:
+                needed.add(name)
+                stack += [symbol.name for symbol in symbols([self._formulas[name]]) if symbol.name in self._formulas]
         done |= needed
-        return [line for k in sorted(needed) for line in self._ordered[k].write(writer)]
+        lines = []
+        for name in sorted(needed, key=self._order.__getitem__):
+            lines += writer.statements([self._formulas[name]])
+            lines.append(f"{identifier(name)} = {writer.expression(self._formulas[name])}")
+        return lines

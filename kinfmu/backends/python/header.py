@@ -1,24 +1,27 @@
-"""The head of the emitted module: imports, and the constants that the solver and the FMU read."""
+"""What every emitted module starts with: imports, constants that the solver and the FMU read, the laws of motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
+from kinfmu.backends.python.block_code import indented, tupled, unpacking
+from kinfmu.backends.python.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.curve import CurveData
 
 
-def header(plan: SolvePlan, curves: Mapping[CurveData, str], *, many: bool) -> list[str]:
+def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str] = ()) -> list[str]:
     """Docstring, imports and constants of the module.
 
-    curves: names of the constants that hold the data of curves; many: unknowns are handled in one go.
+    curves: names of the constants that hold the data of curves; extra: more imports of the standard library.
     """
     solved = [block for block in plan.blocks if block.unknowns]
     anchor_u, anchor_z = plan.anchor_values
     large = [block for block in solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)]
     rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
     imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
+    imports += extra
     if plan.parameters:
         imports.append("from types import SimpleNamespace")
     if curves:
@@ -26,7 +29,6 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], *, many: bool) -> l
     if large:
         imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
     kinds = tuple(driver.quantity.kind for driver in plan.drivers)
-    factors = tuple(1.0 / block.determinant_scale for block in solved)
     rows, scales = tuple(b.row_names for b in solved), tuple(b.row_scales for b in solved)
     reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
     return [
@@ -52,7 +54,6 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], *, many: bool) -> l
         f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
         f"BLOCKS = {tuple(places(solved))!r}",
         f"ANCHOR = {(anchor_u, anchor_z)!r}",
-        *([f"DETERMINANT_FACTORS = {factors!r}"] if many else []),
         *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",
@@ -63,3 +64,28 @@ def places(solved: Sequence[Block]) -> list[tuple[int, int]]:
     """First and last + 1 of each solved block's unknowns among all of them."""
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return list(zip([0, *ends], ends, strict=False))
+
+
+def curve_names(plan: SolvePlan) -> dict[CurveData, str]:
+    """Names of the constants that hold the data of the plan's curves."""
+    data = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
+    return {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
+
+
+def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
+    """The function of the laws of motion."""
+    writer = Writer(Names(curves=curves), ())
+    orders = [[getattr(law, order) for law in plan.laws] for order in ("position", "rate", "acceleration")]
+    flat = [node for nodes in orders for node in nodes]
+    body = writer.statements(flat)
+    constants = [identifier(constant.name) for constant in plan.law_constants]
+    returned = ", ".join(tupled(writer.expression(node) for node in nodes) for nodes in orders)
+    return [
+        "",
+        "def drive(time, constants):",
+        '    """Driver values, speeds and accelerations at a time, by the laws."""',
+        *unpacking(constants, "constants"),
+        *indented(body),
+        f"    return {returned}",
+        "",
+    ]
