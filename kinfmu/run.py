@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -18,6 +18,24 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
+
+
+class Late:
+    """A table of a run that may be given as a function: it is called when the table is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, run: Run | None, owner: type) -> FloatArray:
+        if run is None:
+            raise AttributeError(self._name)  # so that the field has no default
+        table = run.__dict__[self._name]
+        if callable(table):
+            table = run.__dict__[self._name] = table()
+        return table  # type: ignore[no-any-return]  # whatever was given
+
+    def __set__(self, run: Run, table: FloatArray | Callable[[], FloatArray]) -> None:
+        run.__dict__[self._name] = table
 
 
 class Column(NamedTuple):
@@ -36,7 +54,7 @@ class Event(NamedTuple):
     text: str
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Run:
     """n samples of a mechanism's motion.
 
@@ -44,9 +62,10 @@ class Run:
     interest; values, rates, accelerations: (n, m) in the mechanism's unit of length, rad and s. fixed: coordinates that
     a joint holds at a constant. inputs: (n, 3 d): value, speed and acceleration of each driver. status, iterations:
     (n,); residual: (n,) how far the rows of the worst block are open, relative to the mechanism's size; margin: (n,)
-    1 / condition; error: (n, 3) estimated error of q, qd, qdd; watch: (n, w) residual of the rows set aside as
-    redundant, relative to the size.
-    Samples of status 3 to 5 are NaN in values, rates and accelerations.
+    1 / condition; error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the
+    size; watch: (n, w) residual of the rows set aside as redundant, relative to the size. margin and error may be given
+    as functions that compute them when they are first read.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
     """
 
     t: FloatArray
@@ -61,8 +80,8 @@ class Run:
     status: IntArray
     iterations: IntArray
     residual: FloatArray
-    margin: FloatArray
-    error: FloatArray
+    margin: Late = Late()  # a descriptor, not a default
+    error: Late = Late()
     watch_names: tuple[str, ...]
     watch: FloatArray
     length_unit: str = "m"
@@ -94,6 +113,10 @@ class Run:
     def good(self) -> NDArray[np.bool_]:
         """(n,) True where the sample holds numbers (status 0 to 2)."""
         return np.asarray(self.status <= Status.BRIDGED)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All tables as numbers, for copies and for other processes."""
+        return {**self.__dict__, "margin": self.margin, "error": self.error}
 
     def __repr__(self) -> str:
         name = self.info.get("name", "run")
@@ -133,13 +156,13 @@ class Run:
         """The column of that name, (n,); a fixed coordinate is a column of its constant, its rates are zero."""
         if not isinstance(name, str):
             raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
+        for fixed, value in self.fixed.items():
+            for order in range(3):
+                if name == derivative_name(fixed, order):
+                    return np.full(len(self.t), value if order == 0 else 0.0)
         names = []
         for column in self.columns():
             if column.name == name:
                 return column.values
             names.append(column.name)
-        for fixed, value in self.fixed.items():
-            for order in range(3):
-                if name == derivative_name(fixed, order):
-                    return np.full(len(self.t), value if order == 0 else 0.0)
         raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import KinfmuError, listed, suggestion
+from kinfmu.kept import Kept
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
@@ -164,29 +165,29 @@ def _swept(
     tables = _tables(out, (n, m))
     gap: Vector = (_GAP,) * (3 * m)
     motions: list[Vector] = []
-    diagnostics, errors, watches, events = [], [], [], []
+    told, watches, events = [], [], []
+    kept = Kept(solver, driven)
     good, failing = solver.anchor, False
     samples = zip(times.tolist(), *(map(tuple, table.tolist()) for table in driven), strict=True)
     for t, u, ud, udd in samples:
         pose = solver.solve(good, u)
+        kept.add(pose)
         if pose.good:
             good, failing = pose, False
-            diagnostics.append(solver.diagnostics(pose))
+            told.append((pose.status, pose.residual, pose.iterations))
             motions.append(solver.motion(pose, ud, udd))
-            errors.append(solver.errors(pose, ud, udd))
             watches.append(solver.watch(pose))
         else:
             if not failing:
                 events.append(Event(t, "error", pose.message))
             failing = True
-            diagnostics.append((pose.status, _GAP, 0, _GAP))
+            told.append((pose.status, _GAP, 0))
             motions.append(gap)
-            errors.append((_GAP,) * 3)
             watches.append((_GAP,) * len(plan.watches))
     whole = np.array(motions, dtype=float).reshape(n, 3, m)
     for k, array in enumerate(tables):
         array[:] = whole[:, k]
-    told = np.array(diagnostics, dtype=float).reshape(n, 4)
+    diagnostics = np.array(told, dtype=float).reshape(n, 3)
     inputs = np.stack(driven, axis=2).reshape(n, 3 * len(plan.drivers))  # value, speed, acceleration of each driver
     return Run(
         t=times,
@@ -198,11 +199,11 @@ def _swept(
         fixed=solver.model.FIXED,
         input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
         inputs=inputs,
-        status=told[:, 0].astype(np.int64),
-        iterations=told[:, 2].astype(np.int64),
-        residual=told[:, 1],
-        margin=told[:, 3],
-        error=np.array(errors, dtype=float).reshape(n, 3),
+        status=diagnostics[:, 0].astype(np.int64),
+        iterations=diagnostics[:, 2].astype(np.int64),
+        residual=diagnostics[:, 1],
+        margin=kept.margins,
+        error=kept.errors,
         watch_names=plan.watch_names,
         watch=np.array(watches, dtype=float).reshape(n, len(plan.watches)),
         length_unit=plan.mechanism.length_unit,

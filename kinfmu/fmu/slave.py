@@ -214,7 +214,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return (self._asked().residual,)
 
     def _read_margin(self) -> Row:
-        return (self._solver.diagnostics(self._asked())[3],)  # a stage of its own: it costs more than a pose
+        return (self._solver.margin(self._asked()),)  # a stage of its own: it costs more than a pose
 
     def _read_errors(self) -> Row:
         shown = self._look()

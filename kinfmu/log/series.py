@@ -114,8 +114,9 @@ def iterations(run: Run) -> Group:
 
 
 def _logarithmic(path: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
-    """log10 of the curves; `zero` is drawn in the place of 0."""
+    """log10 of the curves; `zero` is drawn in the place of 0, and nothing where nothing is known."""
     table = np.column_stack(list(curves.values()))
+    table[np.isinf(table)] = np.nan
     return Group(
         path=f"solver/{path}",
         title="log10 of residual, watch, estimated error",

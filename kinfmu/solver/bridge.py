@@ -85,9 +85,9 @@ class Bridge:
             return False
         return bool(residual <= CLOSED + 4.0 * EPS * max(abs(self.centre), *map(abs, z)))
 
-    def disagreement(self, u: float) -> tuple[float, float, float]:
-        """Largest difference of the two widths in z and its two derivatives: the error estimate."""
-        return self.span.disagreement(self._place(u))
+    def difference(self, u: float) -> tuple[Vector, Vector, Vector]:
+        """What the wider span says less than the one used, in z and its two derivatives: the error estimate."""
+        return self.span.difference(self._place(u))
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `restored` makes the same bridge."""

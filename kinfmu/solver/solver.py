@@ -17,8 +17,9 @@ from .advance import (
     surveyed,
     trusted_step,
 )
+from .estimate import estimated_errors
 from .linear import reciprocal_condition
-from .pose import ALONE, EPS, Model, Pose, Vector, evaluated, failed, tangent_of
+from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
 from .span import REGULAR
 from .status import Status
@@ -123,40 +124,23 @@ class Solver:
         """Rows set aside as redundant, relative to the size."""
         return tuple(self.model.watches(pose.values))
 
-    def diagnostics(self, pose: Pose) -> tuple[int, float, int, float]:
-        """Status, residual relative to the size, Newton iterations, and margin.
+    def margin(self, pose: Pose) -> float:
+        """The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point.
 
-        margin: the smallest over the blocks of 1 / cond of the equilibrated block; for one unknown, where that says
-        nothing, of |determinant| over the largest that it can be.
+        For one unknown, where that says nothing, |determinant| over the largest that it can be.
         """
         margin = 1.0
         for matrix, determinant in zip(self.model.jacobians(pose.values), pose.determinants, strict=True):
             small = abs(determinant) if len(matrix) == 1 else reciprocal_condition(matrix)
             margin = min(margin, small)
-        return pose.status, pose.residual, pose.iterations, margin
+        return margin
 
     def errors(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
-        """Estimated errors of q, qd, qdd, relative to the size for lengths and in radians.
+        """Estimated errors of q, qd, qdd at driver speeds ud and accelerations udd, the largest among the outputs.
 
-        Newton: eps / m, eps / m^2, eps / m^3 times the rates, with the determinant m as the distance from singular.
-        Bridge: the difference of two widths, and what rounding leaves of the nodes.
+        In radians, and relative to the size for lengths; see estimate.
         """
-        far = EPS * self.model.OFFSET  # what rounding takes from positions far off the origin
-        drive, more = max(map(abs, ud), default=0.0), max(map(abs, udd), default=0.0)
-        if pose.bridge is not None:
-            e0, e1, e2 = pose.bridge.disagreement(pose.u[0])
-            rate = drive
-            floor = 8.0 * EPS / pose.bridge.half
-            error_q = e0 + 8.0 * EPS + far
-            error_qd = (e1 + floor) * rate
-            error_qdd = (e2 + floor / pose.bridge.half) * rate * rate + (e1 + floor) * more
-            return error_q, error_qd, error_qdd
-        speed = max(map(abs, self._first(pose, ud)), default=0.0)
-        speed = drive * max(1.0, speed) if self._one else max(drive, speed)
-        m = max(pose.margin, EPS)
-        error_q = 4.0 * (EPS + pose.residual) / m
-        error_qd = error_q * speed / m
-        return error_q + far, error_qd, (error_qd * speed + error_q * more) / m
+        return estimated_errors(self.model, pose, ud, udd)
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""

@@ -42,13 +42,13 @@ class Span:
             self._inner = _polynomials(self.model, self.half, _INNER, self.nodes[1:5])
         return _read(self._inner, x, self.half)
 
-    def disagreement(self, x: float) -> tuple[float, float, float]:
-        """Largest difference of the two widths in z and its two derivatives: the error estimate."""
+    def difference(self, x: float) -> tuple[Vector, Vector, Vector]:
+        """What the outer nodes say less than the inner ones, in z and its two derivatives: the error estimate."""
         if self._outer is None:
             self._outer = _polynomials(self.model, self.half, _OUTER, [*self.nodes[:2], *self.nodes[4:]])
         a, b = self.read(x), _read(self._outer, x, self.half)
-        largest = [max((abs(p - q) for p, q in zip(v, w, strict=True)), default=0.0) for v, w in zip(a, b, strict=True)]
-        return largest[0], largest[1], largest[2]
+        z, zd, zdd = (tuple([p - q for p, q in zip(v, w, strict=True)]) for v, w in zip(a, b, strict=True))
+        return z, zd, zdd
 
     def middle(self) -> tuple[Vector, Vector]:
         """z at the centre by the inner nodes, and by the outer ones."""

@@ -33,7 +33,7 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     }
     assert solver is not Solver
     calls: dict[str, int] = {}
-    for method in ("solve", "outputs", "rates", "accelerations", "errors", "diagnostics"):
+    for method in ("solve", "outputs", "rates", "accelerations", "errors", "margin"):
         monkeypatch.setattr(solver, method, _counting(getattr(solver, method), method, calls))
     return calls
 

@@ -54,7 +54,8 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
         f"BLOCKS = {tuple(places(solved))!r}",
         f"ANCHOR = {(anchor_u, anchor_z)!r}",
-        *([f"ROWS = {rows!r}", f"ROW_SCALES = {scales!r}"] if plan.parameters else []),
+        f"ROW_SCALES = {scales!r}",
+        *([f"ROWS = {rows!r}"] if plan.parameters else []),
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",
     ]

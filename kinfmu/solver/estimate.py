@@ -1,0 +1,223 @@
+"""Estimated errors of a pose's outputs: what rounding, conditioning and interpolation leave of their digits.
+
+Every solved block is a source. Its rows are known to a few roundings of their terms, so its unknowns z to
+
+    |dz| = |J^-1| R (4 eps + residual + eps |z|)        R: scales of the rows, in lengths
+
+which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried: position,
+velocity and acceleration are formed again at the moved pose, where they take up what a bad condition makes of it, with
+what rounding adds at each stage. The sum over the sources counts. Near a singular point, of determinant m, errors grow
+like 1/m, 1/m^2, 1/m^3. On a bridge the difference of its two widths, and the errors of the poses that carry it, are the
+source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, sqrt
+from typing import NamedTuple
+
+from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
+from .pose import ALONE, AT_REST, EPS, Model, Pose, Vector, evaluated, tangent_of
+
+ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
+MOST_SOURCES = 6  # of a mechanism with more blocks those that move farthest count for all
+NOTHING_KNOWN = inf, inf, inf
+
+
+class Drive(NamedTuple):
+    """How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given."""
+
+    ud: Vector
+    udd: Vector
+    held: int
+
+
+class Rates(NamedTuple):
+    """First and second derivative of the unknowns, and the largest of each in radians and sizes."""
+
+    first: Vector
+    second: Vector
+    speed: float
+    curve: float
+
+
+class Source(NamedTuple):
+    """What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held."""
+
+    z: Vector
+    first: Vector
+    second: Vector
+    given_first: Vector = ()
+    given_second: Vector = ()
+
+
+def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[float, float, float]:
+    """Estimated errors of q, qd, qdd: the largest among the outputs, in radians and sizes, a second and a second^2."""
+    drive = _drive(pose, ud, udd)
+    rates = _rates(model, pose, drive)
+    angles = [abs(value) for value, name in zip(model.outputs(pose.values), model.OUTPUTS) if name[-4:] == ".phi"]  # noqa: B905
+    largest = max(angles, default=0.0)
+    v = max([abs(a) / r for a, r in zip(ud, model.REACH)], default=0.0)  # noqa: B905  one a driver, both
+    a = max([abs(a) / r for a, r in zip(udd, model.REACH)], default=0.0)  # noqa: B905
+    if len(ud) == 1:
+        r = model.REACH[0]
+        speed, curve = rates.speed * r * v, rates.curve * r * r * v * v + rates.speed * r * a
+    else:
+        speed, curve = rates.speed, rates.curve
+    least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
+    squares = [0.0, 0.0, 0.0]
+    here = model.motion(pose.values, ud, udd, rates.first, rates.second)
+    units = [1.0 if name[-4:] == ".phi" else model.SIZE for name in model.OUTPUTS]
+    n = len(units)
+    try:
+        sources = _sources(model, pose, drive, rates)
+        if pose.bridge is not None:
+            sources.append(_of_bridge(model, pose, drive, rates))
+        for source in sources:
+            values, first, second = _moved(model, pose, drive, rates, source)
+            there = model.motion(values, ud, udd, first, second)
+            gaps = [abs(a - b) for a, b in zip(there, here)]  # noqa: B905  three an output, both
+            if not sum(gaps) < inf:
+                return NOTHING_KNOWN
+            for order in range(3):
+                most = max([gap / unit for gap, unit in zip(gaps[order * n :], units)], default=0.0)  # noqa: B905
+                squares[order] += most * most
+    except (ArithmeticError, ValueError):  # exactly singular, or the sine of an overflow
+        return NOTHING_KNOWN
+    return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
+
+
+def _drive(pose: Pose, ud: Vector, udd: Vector) -> Drive:
+    held = 0 if pose.bridge is None else pose.bridge.span.held
+    return Drive(ALONE, AT_REST, held) if len(ud) == 1 else Drive(ud, udd, held)
+
+
+def _rates(model: Model, pose: Pose, drive: Drive) -> Rates:
+    if len(drive.ud) == 1:
+        first, second = tangent_of(model, pose)
+    else:
+        first = tuple(model.velocity(pose.values, drive.ud))
+        second = tuple(model.acceleration(pose.values, drive.ud, drive.udd, first))
+    scales = model.UNKNOWN_SCALES
+    driven = [abs(a) / r for a, r in zip(drive.ud, model.REACH)]  # noqa: B905  one a driver, both
+    speed = max([abs(a) / c for a, c in zip(first, scales)] + driven, default=0.0)  # noqa: B905  one an unknown, both
+    pushed = [abs(a) / r for a, r in zip(drive.udd, model.REACH)]  # noqa: B905
+    curve = max([abs(a) / c for a, c in zip(second, scales)] + pushed + [speed * speed])  # noqa: B905
+    return Rates(first, second, speed, curve)
+
+
+def _sources(model: Model, pose: Pose, drive: Drive, rates: Rates) -> list[Source]:
+    """What each block adds, the worst ones if there are many, and the bridge."""
+    n = len(model.UNKNOWNS)
+    found = []
+    for block, matrix in enumerate(model.jacobians(pose.values)):
+        if drive.held >> block & 1:
+            continue
+        low, high = model.BLOCKS[block]
+        scales = model.UNKNOWN_SCALES[low:high]
+        softness = _softest(matrix, model.ROW_SCALES[block], scales)
+        own = max([abs(a) / c for a, c in zip(pose.z[low:high], scales)])  # noqa: B905
+        moved = (ROUNDINGS * EPS + pose.residual + EPS * own) * max(
+            [abs(a) / c for a, c in zip(softness, scales)]  # noqa: B905
+        )
+        found.append((moved, block, softness, own))
+    count = len(found)
+    found.sort(key=lambda one: -one[0])
+    found = found[:MOST_SOURCES]
+    sources = []
+    still = (0.0,) * len(drive.ud)
+    for _, block, softness, own in found:
+        low, high = model.BLOCKS[block]
+        given = (0.0,) * low + tuple(softness) + (0.0,) * (n - high)
+        all_of = model.velocity(pose.values, still, given, drive.held | 1 << block)
+        c = ROUNDINGS * EPS + pose.residual + EPS * own
+        weight = sqrt(count / len(found))
+        sources.append(
+            Source(
+                tuple([weight * c * a for a in all_of]),
+                tuple([weight * ROUNDINGS * EPS * rates.speed * a for a in all_of]),
+                tuple([weight * ROUNDINGS * EPS * rates.curve * a for a in all_of]),
+            )
+        )
+    return sources
+
+
+def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> list[float]:
+    """J^-1 (s R), signs s chosen so that the unknown that can be moved farthest is."""
+    k = len(scales)
+    columns: list[Sequence[float]]
+    if len(rows) == k == 1:
+        columns = [(rows[0] / matrix[0][0],)]
+    elif len(rows) == k == 2:
+        (a, b), (c, d) = matrix
+        det = a * d - b * c
+        p, q = rows[0] / det, rows[1] / det
+        columns = [(d * p, -c * p), (-b * q, a * q)]
+    else:
+        columns = _inverse(matrix, rows)
+    reach = [sum([abs(column[j]) for column in columns]) / scales[j] for j in range(k)]
+    worst = reach.index(max(reach))
+    total = [0.0] * k
+    for column in columns:
+        sign = 1.0 if column[worst] >= 0.0 else -1.0
+        total = [a + sign * b for a, b in zip(total, column)]  # noqa: B905  one an unknown, both
+    return total
+
+
+def _inverse(matrix: Matrix, rows: Vector) -> list[Sequence[float]]:
+    """Columns of J^-1, of the least-squares inverse if J is tall, each times the scale of its row."""
+    m = len(rows)
+    units = [[scale if j == i else 0.0 for j in range(m)] for i, scale in enumerate(rows)]
+    if m == len(matrix[0]):
+        factors = factor(matrix)
+        return [lu_solve(factors, unit) for unit in units]
+    tall = qr_factor(matrix)
+    return [qr_solve(tall, unit) for unit in units]
+
+
+def _of_bridge(model: Model, pose: Pose, drive: Drive, rates: Rates) -> Source:
+    """What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by."""
+    half = pose.bridge.half
+    nodes = [_of_node(model, node, half) for node in pose.bridge.span.nodes[2:4]]
+    rounding = [max(pair) for pair in zip(*nodes)]  # noqa: B905  one an unknown, both
+    z, zd, zdd = pose.bridge.difference(pose.u[0])
+    given = [
+        tuple([a + (c * e if a >= 0.0 else -c * e) for a, e in zip(gap, rounding)])  # noqa: B905
+        for gap, c in ((z, 1.0), (zd, 1.0 / half), (zdd, 1.0 / half**2))
+    ]
+    still = (0.0,)
+    none = (0.0,) * len(pose.z)
+    moved = tuple(model.velocity(pose.values, still, given[0], drive.held))
+    first = tuple([a + b for a, b in zip(rates.first, given[1])])  # noqa: B905
+    second = tuple([a + b for a, b in zip(rates.second, given[2])])  # noqa: B905
+    return Source(moved, none, none, first, second)
+
+
+def _of_node(model: Model, node: Pose, half: float) -> Vector:
+    """What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together."""
+    drive = _drive(node, ALONE, AT_REST)
+    rates = _rates(model, node, drive)
+    squares = [0.0] * len(node.z)
+    for source in _sources(model, node, drive, rates):
+        _, first, second = _moved(model, node, drive, rates, source)
+        for k, dz in enumerate(source.z):
+            one = abs(dz) + half * abs(first[k] - rates.first[k]) + half**2 * abs(second[k] - rates.second[k])
+            squares[k] += one * one
+    return tuple([sqrt(square) for square in squares])
+
+
+def _moved(model: Model, pose: Pose, drive: Drive, rates: Rates, source: Source) -> tuple[Vector, Vector, Vector]:
+    """Values, first and second derivative at the pose that a source moves to."""
+    z = tuple([a + d for a, d in zip(pose.z, source.z)])  # noqa: B905
+    values = evaluated(model, pose.u, z)[-1]
+    first = model.velocity(values, drive.ud, source.given_first or rates.first, drive.held)
+    first = _added(first, rates.first, source.first)
+    second = model.acceleration(values, drive.ud, drive.udd, first, source.given_second or rates.second, drive.held)
+    return values, first, _added(second, rates.second, source.second)
+
+
+def _added(there: Vector, here: Vector, more: Vector) -> Vector:
+    """There and more, away from here: two errors that happen to cancel are no smaller for it."""
+    along = sum([(a - b) * c for a, b, c in zip(there, here, more)])  # noqa: B905
+    return tuple([a + c for a, c in zip(there, more)]) if along >= 0.0 else tuple([a - c for a, c in zip(there, more)])  # noqa: B905
