@@ -7,6 +7,7 @@
     |-- AssemblyError           the bodies cannot be put together near the start pose
     |   |-- AmbiguousStartError the start pose lies where branches cross and nothing says which one is meant
     |-- PoseError               a sample that cannot be reached, or where the solver gave up
+    |-- CompilerError           compiling generated C
     |-- FmuError                building or stepping an FMU
     |-- LogError                writing or reading a log
     |-- FigureError             drawing a figure
@@ -56,6 +57,10 @@ class AmbiguousStartError(AssemblyError):
 
 class PoseError(KinfmuError):
     """A sample that cannot be reached, or where the solver gave up."""
+
+
+class CompilerError(KinfmuError):
+    """Compiling generated C failed, or there is no compiler."""
 
 
 class FmuError(KinfmuError):

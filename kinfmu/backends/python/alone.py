@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 
-from kinfmu.backends.python.writer import identifier
+from kinfmu.backends.writer import identifier
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
 

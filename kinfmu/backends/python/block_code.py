@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from kinfmu.backends.python.writer import Writer, identifier
+from kinfmu.backends.newton import (
+    ITERATIONS,
+    ROUND_OFF,
+    SETTLED,
+    determinant,
+    is_small,
+    opposite_solution,
+    solution,
+    square,
+)
+from kinfmu.backends.writer import Writer, identifier
 from kinfmu.equations.graph import symbols
 from kinfmu.plan import Block
-
-ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
-SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
-ITERATIONS = 12
 
 
 def assigned_lines(writer: Writer, block: Block) -> list[str]:
@@ -40,7 +46,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     inside += writer.statements([*block.residuals, *entries])
     r = [f"r{i}" for i in range(len(block.residuals))]
     inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
-    inside.append(f"error = {_square(r, block.row_scales)}")
+    inside.append(f"error = {square(r, block.row_scales)}")
     jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
     z = [identifier(name) for name in block.unknowns]
     inside += _determinant(label, jacobian)
@@ -62,11 +68,6 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     ]
 
 
-def is_small(block: Block) -> bool:
-    """True for a square block of one or two unknowns, whose solves are unrolled."""
-    return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
-
-
 def kept_name(block: Block, label: str) -> str:
     """What a block hands on for its linear solves: its determinant, or its factors."""
     return f"det{label}" if is_small(block) else f"factors{label}"
@@ -74,11 +75,8 @@ def kept_name(block: Block, label: str) -> str:
 
 def _determinant(label: str, jacobian: Sequence[Sequence[str]]) -> list[str]:
     m, n = len(jacobian), len(jacobian[0])
-    if m == n == 1:
-        return [f"det{label} = {jacobian[0][0]}"]
-    if m == n == 2:
-        (a, b), (c, d) = jacobian
-        return [f"det{label} = {_product(a, d)} - {_product(b, c)}"]
+    if m == n <= 2:
+        return [f"det{label} = {determinant(jacobian)}"]
     factor = "factor" if m == n else "qr_factor"
     return [f"factors{label} = {factor}({matrix(jacobian)})", f"det{label} = factors{label}.determinant"]
 
@@ -86,14 +84,8 @@ def _determinant(label: str, jacobian: Sequence[Sequence[str]]) -> list[str]:
 def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
     """z -= J^-1 r."""
     m, n = len(jacobian), len(z)
-    if m == n == 1:
-        return [f"{z[0]} -= {r[0]} / det{label}"]
-    if m == n == 2:
-        (a, b), (c, d) = jacobian
-        return [
-            f"{z[0]} -= ({_product(d, r[0])} - {_product(b, r[1])}) / det{label}",
-            f"{z[1]} -= ({_product(a, r[1])} - {_product(c, r[0])}) / det{label}",
-        ]
+    if m == n <= 2:
+        return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, f"det{label}"), strict=True)]
     solve = "lu_solve" if m == n else "qr_solve"
     steps = [f"d{i}" for i in range(n)]
     lines = [f"{tupled(steps)} = {solve}(factors{label}, [{', '.join(r)}])"]
@@ -103,28 +95,11 @@ def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str],
 def solution_lines(label: str, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]) -> list[str]:
     """Z = -J^-1 b."""
     m, n = len(jacobian), len(z)
-    if m == n == 1:
-        return [f"{z[0]} = -{b[0]} / det{label}"]
-    if m == n == 2:
-        (a, c), (d, e) = jacobian
-        return [
-            f"{z[0]} = ({_product(c, b[1])} - {_product(e, b[0])}) / det{label}",
-            f"{z[1]} = ({_product(d, b[0])} - {_product(a, b[1])}) / det{label}",
-        ]
+    if m == n <= 2:
+        solved = opposite_solution(jacobian, b, f"det{label}")
+        return [f"{name} = {value}" for name, value in zip(z, solved, strict=True)]
     solve = "lu_solve" if m == n else "qr_solve"
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
-
-
-def _product(a: str, b: str) -> str:
-    return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
-
-
-def _square(r: Sequence[str], scales: Sequence[float]) -> str:
-    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
-    if len(set(scales)) == 1:
-        total = " + ".join(f"{name} * {name}" for name in r)
-        return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
-    return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
 
 
 def matrix(rows: Sequence[Sequence[str]]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from kinfmu.backends.python.writer import Writer, identifier
+from kinfmu.backends.writer import Writer, identifier
 from kinfmu.equations.graph import Node, symbols
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
 from kinfmu.backends.python.block_code import indented, tupled, unpacking
-from kinfmu.backends.python.writer import Names, Writer, identifier
+from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.curve import CurveData
 

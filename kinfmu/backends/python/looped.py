@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.backends.python.alike import Run, runs_of
-from kinfmu.backends.python.binding import bound, parametric
+from kinfmu.backends.alike import Run, runs_of
+from kinfmu.backends.parametric import parametric
+from kinfmu.backends.python.binding import bound
 from kinfmu.backends.python.block_code import indented, tupled
 from kinfmu.backends.python.header import curve_names, drive, header
 from kinfmu.backends.python.loops import LISTS, Loops
-from kinfmu.backends.python.writer import Names, Writer, identifier
+from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
 from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.backends.python.alike import Kind, positions
+from kinfmu.backends.alike import Kind, positions
 from kinfmu.backends.python.block_code import (
     assigned_lines,
     indented,
@@ -26,7 +26,7 @@ from kinfmu.backends.python.block_code import (
     solution_lines,
     tupled,
 )
-from kinfmu.backends.python.writer import Names, Writer, identifier
+from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
@@ -48,13 +48,14 @@ class Loops:
                 self.names.assign(motion[0], name)
         self.positions = reachable([node for group in positions(kind.blocks) for node in group])
         own = {name: f"k{i}" for i, name in enumerate(kind.coordinates)}
-        given = {f"given{i}.phi": f"g{i}" for i in range(kind.givens)}
-        self.row = tupled([*given.values(), *(f"c{i}" for i in range(kind.constants)), *own.values()])
+        self.row = tupled(
+            [*(f"g{i}" for i in range(len(kind.given))), *(f"c{i}" for i in range(kind.constants)), *own.values()]
+        )
         self.places = {
-            derivative_name(name, order): f"{LISTS[order]}[{place}]"
-            for order in range(3)
-            for name, place in [*given.items(), *own.items()]
+            names[order]: f"{LISTS[order]}[g{i}]" for i, names in enumerate(kind.given) for order in range(3)
         }
+        for order in range(3):
+            self.places |= {derivative_name(name, order): f"{LISTS[order]}[{place}]" for name, place in own.items()}
         self.own = own
         self.hold: dict[str, Node | None] = {}  # names that later functions take from the position
 
@@ -189,7 +190,7 @@ class Loops:
 
     def _import(self, writer: Writer) -> None:
         """Note what a later function takes from the position."""
-        told = {*self.own, *(f"given{i}.phi" for i in range(self.kind.givens))}
+        told = {*self.own, *(names[0] for names in self.kind.given)}
         for node in writer.used:
             if node.op != "symbol":
                 self.hold.setdefault(self.names.of(node), node)

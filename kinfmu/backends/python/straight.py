@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from kinfmu.backends.parametric import parametric
 from kinfmu.backends.python.alone import Alone
-from kinfmu.backends.python.binding import bound, parametric
+from kinfmu.backends.python.binding import bound
 from kinfmu.backends.python.block_code import (
     assigned_lines,
     indented,
@@ -18,7 +19,7 @@ from kinfmu.backends.python.block_code import (
 )
 from kinfmu.backends.python.definitions import Definitions
 from kinfmu.backends.python.header import curve_names, drive, header, places
-from kinfmu.backends.python.writer import Names, Writer, identifier
+from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan

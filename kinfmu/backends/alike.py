@@ -24,13 +24,13 @@ RateOf = Callable[[str, int], str]  # name of a coordinate's or driver value's d
 class Kind:
     """What alike units share: blocks over names of their own, `own0.phi`, `given0.phi`, and `c0` for numbers.
 
-    givens, constants: how many coordinates or driver values come from outside, and how many numbers differ from unit to
-    unit.
+    A unit that is the only one of its kind is itself, under its own names. given: what comes from outside, coordinates
+    or driver values, each with its rate and acceleration; constants: how many numbers differ from unit to unit.
     """
 
     label: str
     blocks: tuple[Block, ...]
-    givens: int
+    given: tuple[tuple[str, str, str], ...]
     constants: int
 
     @property
@@ -86,7 +86,8 @@ def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[Run]:
     for text, numbers in alike.items():
         table = zip(*(forms[k].member.constants for k in numbers), strict=True)
         differs[text] = [len(set(column)) > 1 for column in table]
-        kinds[text] = _kind(f"_{len(kinds) + 1}", units[numbers[0]], forms[numbers[0]], differs[text], rate_of)
+        first = numbers[0]
+        kinds[text] = _kind(f"_{len(kinds) + 1}", units[first], forms[first], differs[text], rate_of, len(numbers))
     runs, solved = [], 0
     for text, row in groupby(forms, key=lambda form: form.text):
         members = []
@@ -166,11 +167,13 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
     return _Form(tuple(lines), nodes, Member(given, tuple(constants), coordinates))
 
 
-def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of: RateOf) -> Kind:
-    """The unit over the kind's own names."""
+def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of: RateOf, count: int) -> Kind:
+    own, given = form.member.own, form.member.given
+    if count == 1:
+        return Kind(label, unit, tuple((name, rate_of(name, 1), rate_of(name, 2)) for name in given), 0)
     graph = Graph()
-    names = {name: f"own{k}{name[name.rindex('.') :]}" for k, name in enumerate(form.member.own)}
-    names |= {name: f"given{k}.phi" for k, name in enumerate(form.member.given)}
+    names = {name: f"own{k}{name[name.rindex('.') :]}" for k, name in enumerate(own)}
+    names |= {name: f"given{k}.phi" for k, name in enumerate(given)}
     spoken = {rate_of(name, k): derivative_name(new, k) for name, new in names.items() for k in range(3)}
     new: dict[Node, Node] = {}
     is_told = iter(differs)
@@ -187,7 +190,8 @@ def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of
         else:
             new[node] = graph.copy(node, *(new[arg] for arg in node.args))
     renamed = tuple(_renamed(block, names, new) for block in unit)
-    return Kind(label, renamed, len(form.member.given), told)
+    outside = tuple((spoken[name], spoken[rate_of(name, 1)], spoken[rate_of(name, 2)]) for name in given)
+    return Kind(label, renamed, outside, told)
 
 
 def _renamed(block: Block, names: dict[str, str], new: dict[Node, Node]) -> Block:

@@ -1,0 +1,117 @@
+"""A shared library from generated C: compiled once by the system's compiler (or zig's), then taken from a cache.
+
+The cache lies in the user's cache folder, or where KINFMU_CACHE says. A library is found again by its sources, the
+flags, the compiler and the processor. Two processes that compile the same at once do not disturb each other: each
+writes a file of its own and moves it into place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from kinfmu.errors import CompilerError
+
+RUNTIME = Path(__file__).with_name("runtime")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
+
+
+def sources(names: Sequence[str]) -> dict[str, str]:
+    """Texts of files of the run time, by name."""
+    return {name: (RUNTIME / name).read_text("utf-8") for name in names}
+
+
+def shared_library(files: Mapping[str, str], flags: Sequence[str] = ()) -> Path:
+    """A shared library of C files (and the headers that they include), by name; compiled if the cache has it not.
+
+    CompilerError if there is no compiler, or if it fails.
+    """
+    compiler = command()
+    wanted = [*FLAGS, *flags]
+    content = [platform.machine(), _processor(), *_version(tuple(compiler)), *wanted]
+    content += [part for name in sorted(files) for part in (name, files[name])]
+    key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
+    folder = cache_folder()
+    library = folder / f"{key}{_suffix()}"
+    if not library.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            made = Path(scratch) / library.name
+            compiled(compiler, files, wanted, made)
+            made.replace(library)
+    return library
+
+
+def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
+    """Run a compiler on C files; CompilerError with its first complaint if it fails."""
+    with tempfile.TemporaryDirectory() as scratch:
+        for name, text in files.items():
+            (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
+        units = sorted(name for name in files if name.endswith(".c"))
+        libraries = [] if os.name == "nt" else ["-lm"]
+        done = subprocess.run(  # noqa: S603  a compiler that we looked up, on sources of our own
+            [*compiler, *flags, *units, "-o", str(output.resolve()), *libraries],
+            cwd=scratch,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if done.returncode != 0:
+        lines = done.stderr.splitlines() or ["no word of why"]
+        complaint = next((line for line in lines if "error" in line), lines[0])
+        raise CompilerError(f"{' '.join(compiler)} cannot compile the generated C: {complaint}")
+
+
+@cache
+def command() -> tuple[str, ...]:
+    """What CC names, cc, gcc, clang, or zig's from the extra `native`; CompilerError if none is there."""
+    named = os.environ.get("CC")
+    for name in [named] if named else ["cc", "gcc", "clang"]:
+        found = shutil.which(name)
+        if found:
+            return (found,)
+    if find_spec("ziglang") is not None:
+        return (sys.executable, "-m", "ziglang", "cc")
+    looked = f"CC names {named!r}, which is not there" if named else "neither cc, gcc nor clang is there"
+    raise CompilerError(f"no C compiler: {looked}; pip install 'kinfmu[native]' brings one")
+
+
+def cache_folder() -> Path:
+    """Where compiled libraries are kept."""
+    given = os.environ.get("KINFMU_CACHE")
+    if given:
+        return Path(given)
+    if os.name == "nt":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kinfmu" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "kinfmu"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kinfmu"
+
+
+def _suffix() -> str:
+    return {"nt": ".dll"}.get(os.name, ".dylib" if sys.platform == "darwin" else ".so")
+
+
+@cache
+def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
+    done = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)  # noqa: S603  as above
+    return (*compiler, done.stdout)
+
+
+@cache
+def _processor() -> str:
+    """What -march=native compiles for: the processor's features where the system tells them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())

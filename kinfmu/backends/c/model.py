@@ -1,0 +1,442 @@
+"""SolvePlan -> C: model.c, the formulas of a mechanism, and sizes.h, how many there are of what.
+
+The same plan gives the same bytes. What the functions mean is told in runtime/kinfmu.h; kinds of units are written by
+`units`, and here are the tables of their runs, the functions that go through them, outputs, laws and names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
+from kinfmu.backends.alike import Run, runs_of
+from kinfmu.backends.c.text import array, assigned, booleans, declared, string
+from kinfmu.backends.c.units import LISTS, Units, rows_of
+from kinfmu.backends.parametric import parametric
+from kinfmu.backends.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node
+from kinfmu.naming import derivative_name
+from kinfmu.plan import SolvePlan
+from kinfmu.plan.trace import is_parameter, parameter_symbol
+from kinfmu.solver.curve import CurveData
+
+
+def emit(plan: SolvePlan) -> dict[str, str]:
+    """Texts of sizes.h and model.c, by file name."""
+    model = _Model(plan)
+    return {"sizes.h": model.sizes(), "model.c": model.source()}
+
+
+class _Model:
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        data = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
+        self.curves: dict[CurveData, str] = {one: f"&curve_{k}" for k, one in enumerate(data, start=1)}
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
+        _, derived = parametric(plan)
+        self.derived = {node: k for k, node in enumerate(derived)}
+        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
+        self.runs = runs_of(plan.blocks, self._rate_of)
+        self.solved = [block for block in plan.blocks if block.unknowns]
+        given_outright = [name for block in plan.blocks for name, _ in block.assigned]
+        self.order = [*plan.unknowns, *given_outright, *(driver.inputs[0] for driver in plan.drivers)]
+        self.place = {name: k for k, name in enumerate(self.order)}
+        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
+        kinds = {run.kind.label: run.kind for run in self.runs}
+        self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in kinds.items()}
+        self.home = {  # of the nodes of units that are alone in their kind
+            node: number
+            for number, run in self._numbered()
+            if len(run.members) == 1 and not run.kind.constants
+            for node in self.units[run.kind.label].positions
+            if node.args and node not in self.derived
+        }
+        readers = [self._outputs(order) for order in range(3)] + [self._watches()]  # they say what is handed on
+        self.unit_sources = {label: units.source() for label, units in self.units.items()}
+        rooms = [len(run.members) * self.units[run.kind.label].room() for run in self.runs]
+        self.holds = [0, *accumulate(rooms)]  # where the numbers that each run hands on stand
+        self.readers = [self._placed(line) for lines in readers for line in lines]
+
+    def _rate_of(self, name: str, order: int) -> str:
+        """Name of a derivative of a coordinate or of a driver's value."""
+        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+
+    def sizes(self) -> str:
+        """sizes.h."""
+        plan = self.plan
+        counts = {
+            "DRIVERS": len(plan.drivers),
+            "UNKNOWNS": len(plan.unknowns),
+            "COORDINATES": len(self.order),
+            "BLOCKS": len(self.solved),
+            "HOLD": self.holds[-1],
+            "OUTPUTS": len(plan.outputs_motion),
+            "WATCHES": len(plan.watches),
+            "FIXED": len(plan.fixed_nodes),
+            "PARAMETERS": len(plan.parameters),
+            "DERIVED": len(self.derived),
+            "CONSTANTS": len(plan.law_constants),
+            "LARGEST_BLOCK": max((len(b.residuals) * len(b.unknowns) for b in self.solved), default=0),
+        }
+        offset = max(map(abs, plan.origin)) / plan.size
+        return "\n".join(
+            [
+                f"/* Sizes of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
+                "#ifndef KF_SIZES_H",
+                "#define KF_SIZES_H",
+                "",
+                *(f"#define KF_{name} {count}" for name, count in counts.items()),
+                f"#define KF_SIZE {plan.size!r} /* of the mechanism, in its unit of length */",
+                f"#define KF_OFFSET {offset!r} /* from the world's origin, in sizes */",
+                "",
+                "#endif",
+                "",
+            ]
+        )
+
+    def source(self) -> str:
+        """model.c."""
+        lines = [
+            f"/* Kinematics of {self.plan.mechanism.name}: generated from its mechanism, not for editing. */",
+            '#include "kinfmu.h"',
+            "",
+            "#include <math.h>",
+            "#include <stdio.h>",
+            "",
+            *self._names(),
+            *self._curves(),
+            "typedef struct {",
+            "    double largest, failed; /* residual, relative to the size and squared */",
+            "    int iterations;",
+            "} kf_newton;",
+            "",
+            *(line for source in self.unit_sources.values() for line in source),
+            *(line for number, run in self._numbered() for line in rows_of(number, run, self.place)),
+            *self._drive(),
+            *self._bind(),
+            *self._position(),
+            *self._solving("velocity", 1),
+            *self._solving("acceleration", 2),
+            *self.readers,
+            *self._fixed(),
+            *self._entries("jacobian"),
+            *self._entries("residuals"),
+        ]
+        return "\n".join(lines) + "\n"
+
+    def _numbered(self) -> list[tuple[int, Run]]:
+        return list(enumerate(self.runs, start=1))
+
+    def _names(self) -> list[str]:
+        plan = self.plan
+        anchor_u, anchor_z = plan.anchor_values
+        kinds = [driver.quantity.kind for driver in plan.drivers]
+        scales = [1.0 if name.endswith(".phi") else plan.size for name in plan.unknowns]
+        ends = list(accumulate(len(block.unknowns) for block in self.solved))
+        return [
+            *array("double kf_anchor_u", anchor_u),
+            *array("double kf_anchor_z", anchor_z),
+            *array("double kf_unknown_scales", scales),
+            *array("double kf_reach", [1.0 if kind == "angle" else plan.size for kind in kinds]),
+            *array("int kf_block_ends", ends),
+            *array("int kf_block_rows", [len(block.residuals) for block in self.solved]),
+            *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),
+            *array("double kf_constants_written", [constant.value for constant in plan.law_constants]),
+            "",
+            f"const char kf_name[] = {string(plan.mechanism.name)};",
+            f"const char kf_length_unit[] = {string(plan.mechanism.length_unit)};",
+            *_strings("kf_driver_names", [driver.name for driver in plan.drivers]),
+            *array("bool kf_driver_is_angle", booleans(kind == "angle" for kind in kinds)),
+            *_strings("kf_unknown_names", plan.unknowns),
+            *array("bool kf_unknown_is_angle", booleans(name.endswith(".phi") for name in plan.unknowns)),
+            *_strings("kf_watch_names", plan.watch_names),
+            *_strings("kf_parameter_names", [parameter.name for parameter in plan.parameters]),
+            *_strings("kf_block_row_names", [", ".join(block.row_names) for block in self.solved]),
+            "",
+        ]
+
+    def _curves(self) -> list[str]:
+        lines: list[str] = []
+        for (breaks, pieces), reference in self.curves.items():
+            name = reference.removeprefix("&")
+            lines += array(f"static double {name}_breaks", breaks)
+            rows = []
+            for k, (origin, coefficients, amplitude, frequency, phase) in enumerate(pieces):
+                lines += array(f"static double {name}_{k}", coefficients)
+                numbers = f"{float(amplitude)!r}, {float(frequency)!r}, {float(phase)!r}"
+                rows.append(f"    {{{float(origin)!r}, {len(coefficients)}, {name}_{k}, {numbers}}},")
+            lines += [f"static const kf_piece {name}_pieces[{len(rows)}] = {{", *rows, "};"]
+            lines += [f"static const kf_curve {name} = {{{len(pieces)}, {name}_breaks, {name}_pieces}};", ""]
+        if self.curves:
+            lines += [
+                "static double curve(const kf_curve *data, int order, double x)",
+                "{",
+                "    return kf_curve_at(data, order, x);",
+                "}",
+                "",
+            ]
+        return lines
+
+    def _function(
+        self, signature: str, lines: Sequence[str], unused: Iterable[str] = (), variables: Iterable[str] = ()
+    ) -> list[str]:
+        return [
+            signature,
+            "{",
+            *(f"    {line}" for line in [*declared(assigned(lines)), *variables]),
+            *(f"    (void){name};" for name in unused),
+            *(f"    {line}" for line in lines),
+            "}",
+            "",
+        ]
+
+    def _drive(self) -> list[str]:
+        writer = Writer(Names(curves=self.curves), ())
+        orders = [[getattr(law, order) for law in self.plan.laws] for order in ("position", "rate", "acceleration")]
+        flat = [node for nodes in orders for node in nodes]
+        body = [f"{line};" for line in writer.statements(flat)]
+        results = []
+        for name, nodes in zip(("u", "ud", "udd"), orders, strict=True):
+            results += [f"{name}[{k}] = {writer.expression(node)};" for k, node in enumerate(nodes)]
+        used = {node.name for node in writer.used if node.op == "symbol"}
+        constants = [
+            f"{identifier(constant.name)} = constants[{k}];"
+            for k, constant in enumerate(self.plan.law_constants)
+            if constant.name in used
+        ]
+        unused = [] if "time" in used else ["time"]
+        unused += [] if constants else ["constants"]
+        signature = "void kf_drive(double time, const double *constants, double *u, double *ud, double *udd)"
+        return self._function(signature, [*constants, *body, *results], unused)
+
+    def _bind(self) -> list[str]:
+        """Parameters and what depends on them alone; why they cannot be had, if they cannot."""
+        signature = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room)"
+        if not self.parameters:
+            return self._function(signature, ["return true;"], ["model", "parameters", "why", "room"])
+        writer = Writer(self.names, (), self.derived)
+        known = [f"{line};" for line in writer.statements([*self.derived, *(c.node for c in self.plan.conditions)])]
+        loads = [
+            f"{identifier(name)} = parameters[{k}];"
+            for name, k in self.parameters.items()
+            if any(node.name == name for node in writer.used if node.op == "symbol")
+        ]
+        lines = [f"model->parameters[{k}] = parameters[{k}];" for k in self.parameters.values()]
+        lines += [*loads, *known]
+        for name, node, meant in self.plan.conditions:
+            number = writer.expression(node)
+            told = string(f"{name.replace('%', '%%')} = %.15g must be {meant}")
+            lines += [
+                f"if (!({_HOLDS[meant].format(number)})) {{",
+                f"    snprintf(why, room, {told}, {number});",
+                "    return false;",
+                "}",
+            ]
+        lines += [f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(self.derived)]
+        unused = [] if self.plan.conditions else ["why", "room"]
+        return self._function(signature, [*lines, "return true;"], unused)
+
+    def _position(self) -> list[str]:
+        lines = [
+            "kf_newton newton = {0.0, 0.0, 0};",
+            "double predicted[KF_ROOM(KF_UNKNOWNS)];",
+            "double watches[KF_ROOM(KF_WATCHES)];",
+            "double *const x = found->x;",
+            "double *const hold = found->hold;",
+            "int k;",
+            "for (k = 0; k < KF_UNKNOWNS; ++k) {",
+            "    predicted[k] = x[k] = z[k] + s * (zd[k] + 0.5 * s * zdd[k]);",
+            "}",
+            "for (k = 0; k < KF_DRIVERS; ++k) {",
+            "    x[KF_COORDINATES - KF_DRIVERS + k] = u[k];",
+            "}",
+        ]
+        for number, run in self._numbered():
+            label, room = run.kind.label, self.units[run.kind.label].room()
+            start = self.holds[number - 1]
+            place = f"hold + {start} + k * {room}" if len(run.members) > 1 else f"hold + {start}"
+            index = "k" if len(run.members) > 1 else "0"
+            block = f"{run.first} + k" if len(run.members) > 1 else f"{run.first}"
+            if run.kind.solved:
+                call = [
+                    f"if (!position{label}(model, &run_{number}[{index}], x, {place}, z, held && held[{block}],",
+                    f"                &found->determinants[{block}], &newton)) {{",
+                    "    found->residual = sqrt(newton.failed);",
+                    f"    return {block};",
+                    "}",
+                ]
+            else:
+                call = [f"position{label}(model, &run_{number}[{index}], x, {place});"]
+            lines += _repeated(call, len(run.members))
+        factors = [1.0 / block.determinant_scale for block in self.solved]
+        lines += [
+            "found->margin = 1.0;",
+            "for (k = 0; k < KF_BLOCKS; ++k) {",
+            "    double size;",
+            "    found->determinants[k] *= determinant_factors[k];",
+            "    size = fabs(found->determinants[k]);",
+            "    found->margin = k == 0 || size < found->margin ? size : found->margin;",
+            "}",
+            "found->residual = sqrt(newton.largest);",
+            "found->iterations = newton.iterations;",
+            "found->moved = 0.0;",
+            "for (k = 0; newton.iterations && k < KF_UNKNOWNS; ++k) {",
+            "    found->moved = fmax(found->moved, fabs(x[k] - predicted[k]) / kf_unknown_scales[k]);",
+            "}",
+            "kf_watches(model, found, watches);",
+            "found->watch = 0.0;",
+            "for (k = 0; k < KF_WATCHES; ++k) {",
+            "    found->watch = fmax(found->watch, fabs(watches[k]));",
+            "}",
+            "return -1;",
+        ]
+        signature = (
+            "int kf_position(const kf_model *model, const double *u, const double *z, const double *zd,"
+            " const double *zdd,\n                double s, const bool *held, kf_found *found)"
+        )
+        unused = [] if self.solved else ["held"]
+        return [
+            *array("static double determinant_factors", factors),
+            "",
+            signature,
+            "{",
+            *(f"    {line}" for line in [*lines[:6], *(f"(void){name};" for name in unused), *lines[6:]]),
+            "}",
+            "",
+        ]
+
+    def _solving(self, name: str, order: int) -> list[str]:
+        """kf_velocity or kf_acceleration."""
+        out, driver = LISTS[order], "u" + "d" * order
+        ready = " const double *x1," if order == 2 else ""
+        signature = (
+            f"void kf_{name}(const kf_model *model, const kf_found *found, const double *{driver},{ready}\n"
+            f"    const double *given, const bool *held, double *{out})"
+        )
+        lines = ["const double *const x = found->x;", "const double *const hold = found->hold;", "int k;"]
+        lines += [
+            "for (k = 0; k < KF_DRIVERS; ++k) {",
+            f"    {out}[KF_COORDINATES - KF_DRIVERS + k] = {driver}[k];",
+            "}",
+        ]
+        for number, run in self._numbered():
+            room, start, many = self.units[run.kind.label].room(), self.holds[number - 1], len(run.members) > 1
+            arguments = [f"&run_{number}[{'k' if many else 0}]", "x", f"hold + {start}{f' + k * {room}' * many}"]
+            if run.kind.solved:
+                arguments += ["given", f"held && held[{run.first}{' + k' * many}]"]
+            arguments += [*LISTS[1:order], out]
+            lines += _repeated([f"{name}{run.kind.label}(model, {', '.join(arguments)});"], len(run.members))
+        unused = [] if self.solved else ["given", "held"]
+        return [signature, "{", *(f"    {line}" for line in [*lines[:3], *(f"(void){u};" for u in unused), *lines[3:]]),
+                "}", ""]  # fmt: skip
+
+    def _placed(self, line: str) -> str:
+        """A statement with the place of what it takes from a unit: '<3:7>' is number 7 of what run 3 hands on."""
+        return re.sub(r"<(\d+):(\d+)>", lambda match: str(self.holds[int(match[1]) - 1] + int(match[2])), line)
+
+    def _expressions(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
+        """Expressions of the targets, and the statements before them."""
+        writer = Writer(self.names, [*self.derived, *self.home])
+        body = [f"{line};" for line in writer.statements(targets)]
+        expressions = [writer.expression(node) for node in targets]
+        return expressions, [*self._loads(writer), *body]
+
+    def _loads(self, writer: Writer) -> list[str]:
+        where = {
+            self._rate_of(name, order): f"{_SOURCES[order]}[{k}]"
+            for name, k in self.place.items()
+            for order in range(3)
+        }
+        lines = []
+        for node in writer.used:
+            if node in self.derived:
+                lines.append(f"{self.names.of(node)} = model->derived[{self.derived[node]}];")
+            elif node in self.home:
+                number = self.home[node]
+                place = self.units[self.runs[number - 1].kind.label].handed_on(node)
+                lines.append(f"{self.names.of(node)} = found->hold[<{number}:{place}>];")
+            elif is_parameter(node):
+                lines.append(f"{identifier(node.name)} = model->parameters[{self.parameters[node.name]}];")
+            else:
+                lines.append(f"{identifier(node.name)} = {where[node.name]};")
+        return lines
+
+    def _outputs(self, order: int) -> list[str]:
+        where = {self._rate_of(name, order): k for name, k in self.place.items()}
+        wanted = [motion[1:][order] for motion in self.plan.outputs_motion]
+        told = [isinstance(node, Node) and node.op == "symbol" and node.name in where for node in wanted]
+        formulas = [node for node, plain in zip(wanted, told, strict=True) if not plain]
+        expressions, lines = self._expressions(formulas)
+        out = ("outputs", "rates", "accelerations")[order]
+        places = [where[node.name] if plain else -1 for node, plain in zip(wanted, told, strict=True)]
+        table = array(f"static int {out}_places", places)
+        copying = [
+            "for (k = 0; k < KF_OUTPUTS; ++k) {",
+            f"    if ({out}_places[k] >= 0) {{",
+            f"        {out}[k] = {_SOURCES[order]}[{out}_places[k]];",
+            "    }",
+            "}",
+        ]
+        rest = [k for k, plain in enumerate(told) if not plain]
+        lines += copying if any(told) else []
+        lines += [f"{out}[{k}] = {text};" for k, text in zip(rest, expressions, strict=True)]
+        name = ("kf_outputs", "kf_output_rates", "kf_output_accelerations")[order]
+        lists = "".join(f" const double *{one}," for one in LISTS[1 : order + 1])
+        signature = f"void {name}(const kf_model *model, const kf_found *found,{lists}\n    double *{out})"
+        unused = _unused(lines, "model", "found", *LISTS[1 : order + 1])
+        return [*table, "", *self._function(signature, lines, unused, ["int k;"] if any(told) else ())]
+
+    def _watches(self) -> list[str]:
+        expressions, lines = self._expressions([node for _, node in self.plan.watches])
+        lines += [f"watches[{k}] = {text};" for k, text in enumerate(expressions)]
+        signature = "void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
+        return self._function(signature, lines, _unused(lines, "model", "found", "watches"))
+
+    def _fixed(self) -> list[str]:
+        expressions, lines = self._expressions(list(self.plan.fixed_nodes.values()))
+        lines += [f"fixed[{k}] = {text};" for k, text in enumerate(expressions)]
+        signature = "void kf_fixed(const kf_model *model, double *fixed)"
+        return self._function(signature, lines, _unused(lines, "model", "fixed"))
+
+    def _entries(self, name: str) -> list[str]:
+        """kf_jacobian or kf_residuals: numbers of one block."""
+        lines = ["const double *const x = found->x;", "const double *const hold = found->hold;"]
+        calls = []
+        for number, run in self._numbered():
+            if run.kind.solved:
+                room, start, count = self.units[run.kind.label].room(), self.holds[number - 1], len(run.members)
+                k = f"block - {run.first}"
+                places = f"&run_{number}[{k}], x, hold + {start} + ({k}) * {room}"
+                calls += [
+                    f"if (block < {run.first + count}) {{",
+                    f"    {name}{run.kind.label}(model, {places}, {name});",
+                    "    return;",
+                    "}",
+                ]
+        signature = f"void kf_{name}(const kf_model *model, const kf_found *found, int block, double *{name})"
+        if not calls:
+            return self._function(signature, [], ["model", "found", "block", name])
+        return [signature, "{", *(f"    {line}" for line in [*lines, *calls]), "}", ""]
+
+
+_HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
+
+
+_SOURCES = ("found->x", "x1", "x2")
+
+
+def _unused(lines: Sequence[str], *arguments: str) -> list[str]:
+    text = "\n".join(lines)
+    return [name for name in arguments if not re.search(rf"\b{name}\b", text)]
+
+
+def _strings(name: str, texts: Sequence[str]) -> list[str]:
+    return array(f"char *const {name}", [string(text) for text in texts])
+
+
+def _repeated(lines: Sequence[str], count: int) -> list[str]:
+    """The lines, in a loop over k where there are several units."""
+    if count == 1:
+        return list(lines)
+    return [f"for (k = 0; k < {count}; ++k) {{", *(f"    {line}" for line in lines), "}"]

@@ -1,0 +1,171 @@
+/* Small dense linear algebra: blocks of three unknowns and more, and least squares. See kinfmu/solver/linear.py. */
+#include "kinfmu.h"
+
+#include <math.h>
+
+/* Factors of A (k, k): the equilibrated rows' LU, row after row; the rows' order; their scales. */
+bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
+{
+    double *const lu = factors;
+    double *const order = factors + k * k;
+    double *const scales = order + k;
+    int i, j, column;
+    *determinant = 1.0;
+    for (i = 0; i < k; ++i) {
+        double square = 0.0, length;
+        for (j = 0; j < k; ++j) {
+            square += matrix[i * k + j] * matrix[i * k + j];
+        }
+        length = sqrt(square);
+        if (!(length > 0.0 && length < INFINITY)) {
+            return false;
+        }
+        order[i] = i;
+        scales[i] = 1.0 / length;
+        for (j = 0; j < k; ++j) {
+            lu[i * k + j] = matrix[i * k + j] / length;
+        }
+    }
+    for (column = 0; column < k; ++column) {
+        int pivot = column;
+        for (i = column + 1; i < k; ++i) {
+            if (fabs(lu[i * k + column]) > fabs(lu[pivot * k + column])) {
+                pivot = i;
+            }
+        }
+        if (lu[pivot * k + column] == 0.0) {
+            return false;
+        }
+        if (pivot != column) {
+            double kept = order[pivot];
+            order[pivot] = order[column];
+            order[column] = kept;
+            for (j = 0; j < k; ++j) {
+                kept = lu[pivot * k + j];
+                lu[pivot * k + j] = lu[column * k + j];
+                lu[column * k + j] = kept;
+            }
+            *determinant = -*determinant;
+        }
+        *determinant *= lu[column * k + column];
+        for (i = column + 1; i < k; ++i) {
+            const double ratio = lu[i * k + column] / lu[column * k + column];
+            lu[i * k + column] = ratio;
+            for (j = column + 1; j < k; ++j) {
+                lu[i * k + j] -= ratio * lu[column * k + j];
+            }
+        }
+    }
+    return true;
+}
+
+/* x with A x = b from the factors of A. */
+void kf_lu_solve(int k, const double *factors, const double *right, double *x)
+{
+    const double *const lu = factors;
+    const double *const order = factors + k * k;
+    const double *const scales = order + k;
+    int i, j;
+    for (i = 0; i < k; ++i) {
+        x[i] = right[(int)order[i]] * scales[(int)order[i]];
+    }
+    for (i = 1; i < k; ++i) {
+        double sum = 0.0;
+        for (j = 0; j < i; ++j) {
+            sum += lu[i * k + j] * x[j];
+        }
+        x[i] -= sum;
+    }
+    for (i = k - 1; i >= 0; --i) {
+        double sum = 0.0;
+        for (j = i + 1; j < k; ++j) {
+            sum += lu[i * k + j] * x[j];
+        }
+        x[i] = (x[i] - sum) / lu[i * k + i];
+    }
+}
+
+/* column -= 2 (reflector . column) / square * reflector */
+static void reflect(int m, const double *reflector, double square, double *column)
+{
+    double weight = 0.0;
+    int i;
+    for (i = 0; i < m; ++i) {
+        weight += reflector[i] * column[i];
+    }
+    weight = 2.0 * weight / square;
+    for (i = 0; i < m; ++i) {
+        column[i] -= weight * reflector[i];
+    }
+}
+
+static double dot(int m, const double *a, const double *b)
+{
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < m; ++i) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+/* Householder factors of A (m, k), m >= k: the columns of R, then the reflectors, column after column. */
+bool kf_qr(int m, int k, const double *matrix, double *factors, double *determinant)
+{
+    double *const columns = factors;
+    double *const reflectors = factors + m * k;
+    int i, j, other;
+    for (j = 0; j < k; ++j) {
+        for (i = 0; i < m; ++i) {
+            columns[j * m + i] = matrix[i * k + j];
+        }
+    }
+    *determinant = 1.0;
+    for (j = 0; j < k; ++j) {
+        double *const column = columns + j * m;
+        double *const reflector = reflectors + j * m;
+        double length = 0.0, alpha, square;
+        const double norm = sqrt(dot(m - j, column + j, column + j));
+        for (i = 0; i < m; ++i) { /* of the column as it was: reflections keep it */
+            length += matrix[i * k + j] * matrix[i * k + j];
+        }
+        length = sqrt(length);
+        if (!(norm > 0.0 && norm < INFINITY)) {
+            return false;
+        }
+        alpha = column[j] > 0.0 ? -norm : norm;
+        for (i = 0; i < m; ++i) {
+            reflector[i] = i < j ? 0.0 : column[i];
+        }
+        reflector[j] -= alpha;
+        square = dot(m, reflector, reflector);
+        for (other = j; other < k; ++other) {
+            reflect(m, reflector, square, columns + other * m);
+        }
+        *determinant *= norm / length;
+    }
+    return true;
+}
+
+/* x that minimizes |A x - b| from the factors of A. */
+void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x)
+{
+    const double *const columns = factors;
+    const double *const reflectors = factors + m * k;
+    double b[KF_ROOM(KF_LARGEST_BLOCK)];
+    int i, j;
+    for (i = 0; i < m; ++i) {
+        b[i] = right[i];
+    }
+    for (j = 0; j < k; ++j) {
+        const double *const reflector = reflectors + j * m;
+        reflect(m, reflector, dot(m, reflector, reflector), b);
+    }
+    for (i = k - 1; i >= 0; --i) {
+        double sum = 0.0;
+        for (j = i + 1; j < k; ++j) {
+            sum += columns[j * m + i] * x[j];
+        }
+        x[i] = (b[i] - sum) / columns[i * m + i];
+    }
+}

@@ -1,0 +1,48 @@
+"""C text: numbers, strings, arrays, declarations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+_WIDTH = 110
+
+
+def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") -> list[str]:
+    """'head a, b, c tail' on as many lines as it takes."""
+    lines, line = [], head
+    for k, item in enumerate(items):
+        piece = item if k == len(items) - 1 else f"{item},"
+        if len(line) + len(piece) + 1 > _WIDTH and line.strip():
+            lines.append(line.rstrip())
+            line = indent
+        line += piece if line.endswith(("{", "(", indent)) else f" {piece}"
+    return [*lines, line + tail]
+
+
+def string(text: str) -> str:
+    """A string literal. Names are ASCII letters, digits, underscores and full stops: nothing is to be escaped."""
+    return f'"{text}"'
+
+
+def array(declaration: str, items: Iterable[object]) -> list[str]:
+    """'const double a[2] = {1.0, 2.0};' of 'double a' and its items; without items there is room for one, zero."""
+    texts = [repr(item) if isinstance(item, float) else str(item) for item in items]
+    storage = "static const" if declaration.startswith("static ") else "const"
+    declaration = declaration.removeprefix("static ")
+    return wrapped(f"{storage} {declaration}[{max(len(texts), 1)}] = {{", texts or ["0"], "};")
+
+
+def booleans(values: Iterable[object]) -> list[str]:
+    return ["true" if value else "false" for value in values]
+
+
+def declared(names: Iterable[str]) -> list[str]:
+    """'double a, b;' of names, each once; nothing for no names."""
+    unique = list(dict.fromkeys(names))
+    return wrapped("double", unique, ";", "       ") if unique else []
+
+
+def assigned(lines: Iterable[str]) -> list[str]:
+    """Names that the statements of a function give values to."""
+    return [match[1] for line in lines if (match := re.match(r"\s*([A-Za-z_]\w*) = ", line))]

@@ -1,0 +1,63 @@
+"""What Newton's loop is in every language: when it ends, and the solves of one and two unknowns, unrolled.
+
+The expressions are plain arithmetic on names and mean the same in Python and in C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kinfmu.plan import Block
+
+ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
+SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
+ITERATIONS = 12
+
+Rows = Sequence[Sequence[str]]
+
+
+def is_small(block: Block) -> bool:
+    """True for a square block of one or two unknowns, whose solves are unrolled."""
+    return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
+
+
+def determinant(jacobian: Rows) -> str:
+    """det J of one or two unknowns."""
+    if len(jacobian) == 1:
+        return jacobian[0][0]
+    (a, b), (c, d) = jacobian
+    return f"{_product(a, d)} - {_product(b, c)}"
+
+
+def solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
+    """J^-1 r of one or two unknowns."""
+    if len(r) == 1:
+        return [f"{r[0]} / {det}"]
+    (a, b), (c, d) = jacobian
+    return [
+        f"({_product(d, r[0])} - {_product(b, r[1])}) / {det}",
+        f"({_product(a, r[1])} - {_product(c, r[0])}) / {det}",
+    ]
+
+
+def opposite_solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
+    """-J^-1 r of one or two unknowns."""
+    if len(r) == 1:
+        return [f"-{r[0]} / {det}"]
+    (a, b), (c, d) = jacobian
+    return [
+        f"({_product(b, r[1])} - {_product(d, r[0])}) / {det}",
+        f"({_product(c, r[0])} - {_product(a, r[1])}) / {det}",
+    ]
+
+
+def square(r: Sequence[str], scales: Sequence[float]) -> str:
+    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
+    if len(set(scales)) == 1:
+        total = " + ".join(f"{name} * {name}" for name in r)
+        return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"
+    return " + ".join(f"{name} * {name} * {scale**-2!r}" for name, scale in zip(r, scales, strict=True))
+
+
+def _product(a: str, b: str) -> str:
+    return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
