@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
+KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
+EPS = 2.220446049250313e-16
+UNSURE = 2.0  # what one term more says may change by this much over the step
 Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
 
 
@@ -18,8 +22,8 @@ def estimated_rates(
     those before t count; one of them gives a slope, none gives 0.
     """
     count = len(samples)
-    if count == 3 and samples[1][0] < t <= samples[2][0] and len(u) == 1:  # most calls: at the last of three samples
-        (first, (a,)), (second, (b,)) = samples[0], samples[1]
+    if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:  # most calls: at the last of all samples
+        (first, (a,)), (second, (b,)) = samples[1], samples[2]
         slope = (u[0] - b) / (t - second)
         curve = 2.0 * (slope - (b - a) / (second - first)) / (t - first)
         return (slope + 0.5 * curve * (t - second),), (curve,)
@@ -40,3 +44,44 @@ def estimated_rates(
         speeds.append(d2 + 0.5 * acceleration * h2)
         accelerations.append(acceleration)
     return tuple(speeds), tuple(accelerations)
+
+
+def errors_of_estimated_rates(
+    samples: Sequence[Sample], t: float, u: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """How far the estimated speed and acceleration of each driver may be off: what one sample more says otherwise.
+
+        v: c3 (t - t2) (t - t1),   a: 2 c3 ((t - t2) + (t - t1)),   c3 the third divided difference
+
+    and what the differences take of the digits of u. Of an acceleration from three samples nothing is known, nor of
+    anything from two: inf.
+    """
+    before = [sample for sample in samples if sample[0] < t][-3:]
+    speeds, accelerations = [], []
+    for k, last in enumerate(u):
+        times, values = [t], [last]
+        for time, known in reversed(before):
+            times.append(time)
+            values.append(known[k])
+        differences = _divided(times, values)
+        speed = acceleration = inf
+        if len(before) > 1:
+            h2, h1 = t - times[1], t - times[2]
+            rounding = EPS * max(map(abs, values))
+            speed = abs(differences[2]) * h2
+            if len(before) > 2:
+                speed = UNSURE * abs(differences[3]) * h2 * h1
+                acceleration = 2.0 * UNSURE * abs(differences[3]) * (h2 + h1) + 4.0 * rounding / (h2 * h1)
+            speed += 2.0 * rounding / h2
+        speeds.append(speed)
+        accelerations.append(acceleration)
+    return tuple(speeds), tuple(accelerations)
+
+
+def _divided(times: Sequence[float], values: Sequence[float]) -> list[float]:
+    """Divided differences of the first value with one more, two more, ... of those that follow."""
+    column, leading = list(values), [values[0]]
+    for order in range(1, len(values)):
+        column = [(column[i] - column[i + 1]) / (times[i] - times[i + order]) for i in range(len(column) - 1)]
+        leading.append(column[0])
+    return leading

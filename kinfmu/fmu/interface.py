@@ -276,7 +276,8 @@ def _margin(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
 
 def _errors(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
     for order, suffix in enumerate(("q", "qd", "qdd")):
-        yield _solver_output(plan, every, f"solver.error_{suffix}", f"Estimated error of {suffix}", order, minimum=0.0)
+        text = f"Estimated error of {suffix}: the largest among the outputs, lengths relative to the mechanism's size"
+        yield _solver_output(plan, every, f"solver.error_{suffix}", text, order, minimum=0.0)
 
 
 def _watches(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:

@@ -16,13 +16,12 @@ from typing import Any, ClassVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from kinfmu.fmu.estimated_rates import Sample, estimated_rates
+from kinfmu.fmu.estimated_rates import KEPT, Sample, errors_of_estimated_rates, estimated_rates
 from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
 from kinfmu.fmu.layout import Layout, Places
 from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
-KEPT = 3  # commits that are remembered: estimates use two before the present, and a host may go back by one
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 
@@ -90,7 +89,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
         self._committed: Pose = self._solver.anchor
         self._committed_inputs: Row = tuple(self._inputs)
-        self._history: tuple[Sample, ...] = ()  # the last three commits, oldest first
+        self._history: tuple[Sample, ...] = ()  # the last commits, KEPT at most, oldest first
 
         self._forget()
 
@@ -106,14 +105,17 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
         if self._driven_by_time:
             return self._solver.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
-        history = self._history
-        if self._touched or not history:
-            t, u = self._time, self._wanted()
-        else:  # nothing set since the commit: still the committed sample, at the time of its doStep
-            t, u = history[-1]
+        t, u = self._moment()
         if self._wired:
             return self._by_inputs(self._inputs, t, u)
-        return u, *estimated_rates(history, t, u)
+        return u, *estimated_rates(self._history, t, u)
+
+    def _moment(self) -> Sample:
+        """The time and u of what the inputs ask for."""
+        history = self._history
+        if self._touched or not history:
+            return self._time, self._wanted()
+        return history[-1]  # nothing set since the commit: still the committed sample, at the time of its doStep
 
     def _by_inputs(self, inputs: Sequence[float], t: float, u: Row) -> tuple[Row, Row, Row]:
         """u, ud, udd at time t, with estimates for the rates that are not wired."""
@@ -220,8 +222,18 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         shown = self._look()
         if shown.errors is None:
             _, ud, udd = self._drive(shown)
-            shown.errors = self._solver.errors(shown.pose, ud, udd)
+            off = None if shown.stale or self._driven_by_time else self._errors_of_drive()
+            shown.errors = self._solver.errors(shown.pose, ud, udd, off)
         return shown.errors
+
+    def _errors_of_drive(self) -> tuple[Row, Row]:
+        """How far ud and udd may be off: those estimated from samples, that is; the others are what was asked for."""
+        speeds, accelerations = errors_of_estimated_rates(self._history, *self._moment())
+        wired = self._wired
+        return (
+            tuple([0.0 if 3 * k + 1 in wired else error for k, error in enumerate(speeds)]),
+            tuple([0.0 if 3 * k + 2 in wired else error for k, error in enumerate(accelerations)]),
+        )
 
     def _read_watch(self) -> Row:
         return self._solver.watch(self._look().pose)
@@ -436,7 +448,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._shown = self._motion = None  # inputs are held, or clocks differ: estimates see another time
             history = self._history
             if len(history) == KEPT and history[-1][0] < current_time:  # _commit, without what is rare
-                self._history = (history[1], history[2], (current_time, pose.u))
+                self._history = (history[1], history[2], history[3], (current_time, pose.u))
                 self._committed = pose
                 self._touched = False
                 if self._wired:
@@ -486,7 +498,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         history = self._history
         while history and history[-1][0] >= t:  # the host went back
             history = history[:-1]
-        self._history = (history[-2], history[-1], (t, pose.u)) if len(history) > 1 else (*history, (t, pose.u))
+        self._history = (*history[1 - KEPT :], (t, pose.u))
         self._committed = pose
         self._committed_inputs = tuple(self._inputs)
         self._touched = False

@@ -21,7 +21,7 @@ from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
 from .pose import ALONE, AT_REST, EPS, Model, Pose, Vector, evaluated, tangent_of
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
-MOST_SOURCES = 6  # of a mechanism with more blocks those that move farthest count for all
+MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest count for all
 NOTHING_KNOWN = inf, inf, inf
 
 
@@ -68,8 +68,7 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
     least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
     squares = [0.0, 0.0, 0.0]
     here = model.motion(pose.values, ud, udd, rates.first, rates.second)
-    units = [1.0 if name[-4:] == ".phi" else model.SIZE for name in model.OUTPUTS]
-    n = len(units)
+    n = len(model.OUTPUTS)
     try:
         sources = _sources(model, pose, drive, rates)
         if pose.bridge is not None:
@@ -77,15 +76,61 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         for source in sources:
             values, first, second = _moved(model, pose, drive, rates, source)
             there = model.motion(values, ud, udd, first, second)
-            gaps = [abs(a - b) for a, b in zip(there, here)]  # noqa: B905  three an output, both
-            if not sum(gaps) < inf:
-                return NOTHING_KNOWN
             for order in range(3):
-                most = max([gap / unit for gap, unit in zip(gaps[order * n :], units)], default=0.0)  # noqa: B905
-                squares[order] += most * most
+                row = slice(order * n, order * n + n)
+                squares[order] += _largest(model, there[row], here[row]) ** 2
     except (ArithmeticError, ValueError):  # exactly singular, or the sine of an overflow
         return NOTHING_KNOWN
+    if not sum(squares) < inf:
+        return NOTHING_KNOWN
     return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
+
+
+def with_drive_errors(
+    model: Model,
+    pose: Pose,
+    ud: Vector,
+    udd: Vector,
+    off: tuple[Vector, Vector],
+    errors: tuple[float, float, float],
+) -> tuple[float, float, float]:
+    """The errors with what drivers add whose speeds and accelerations are off by as much as `off` says, each >= 0."""
+    of_q, of_qd, of_qdd = errors
+    here = _motion(model, pose, ud, udd)
+    n = len(model.OUTPUTS)
+    for k, (speed, acceleration) in enumerate(zip(*off)):  # noqa: B905  one a driver, both
+        if speed == inf:
+            return of_q, inf, inf
+        there = _motion(model, pose, _shifted(ud, k, speed), udd)
+        of_qd += _largest(model, there[n : 2 * n], here[n : 2 * n])
+        of_qdd += _largest(model, there[2 * n :], here[2 * n :])
+        if acceleration == inf:
+            of_qdd = inf
+        else:
+            there = _motion(model, pose, ud, _shifted(udd, k, acceleration))
+            of_qdd += _largest(model, there[2 * n :], here[2 * n :])
+    return of_q, of_qd, of_qdd
+
+
+def _shifted(values: Vector, k: int, more: float) -> Vector:
+    return (*values[:k], values[k] + more, *values[k + 1 :])
+
+
+def _motion(model: Model, pose: Pose, ud: Vector, udd: Vector) -> Vector:
+    """Positions, rates and accelerations of the outputs."""
+    rates = _rates(model, pose, _drive(pose, ud, udd))
+    return model.motion(pose.values, ud, udd, rates.first, rates.second)  # type: ignore[no-any-return]
+
+
+def _largest(model: Model, there: Vector, here: Vector) -> float:
+    """The largest difference of two rows of outputs, in radians and sizes."""
+    largest = 0.0
+    for name, a, b in zip(model.OUTPUTS, there, here):  # noqa: B905  one an output, all
+        gap = abs(a - b) if name[-4:] == ".phi" else abs(a - b) / model.SIZE
+        if gap != gap:
+            return inf
+        largest = max(largest, gap)
+    return largest
 
 
 def _drive(pose: Pose, ud: Vector, udd: Vector) -> Drive:

@@ -17,7 +17,7 @@ from .advance import (
     surveyed,
     trusted_step,
 )
-from .estimate import estimated_errors
+from .estimate import estimated_errors, with_drive_errors
 from .linear import reciprocal_condition
 from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
@@ -135,12 +135,16 @@ class Solver:
             margin = min(margin, small)
         return margin
 
-    def errors(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
+    def errors(
+        self, pose: Pose, ud: Vector, udd: Vector, off: tuple[Vector, Vector] | None = None
+    ) -> tuple[float, float, float]:
         """Estimated errors of q, qd, qdd at driver speeds ud and accelerations udd, the largest among the outputs.
 
-        In radians, and relative to the size for lengths; see estimate.
+        In radians, and relative to the size for lengths; see estimate. off: by how much ud and udd may be off
+        themselves; None if they are exact.
         """
-        return estimated_errors(self.model, pose, ud, udd)
+        errors = estimated_errors(self.model, pose, ud, udd)
+        return errors if off is None else with_drive_errors(self.model, pose, ud, udd, off, errors)
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""

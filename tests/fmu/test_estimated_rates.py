@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinfmu.fmu.estimated_rates import estimated_rates
+from kinfmu.fmu.estimated_rates import errors_of_estimated_rates, estimated_rates
 from tests.fmu.host import Host
 
 
@@ -84,3 +84,50 @@ def test_one_sample_gives_rest_two_give_a_slope_and_samples_of_the_future_do_not
     assert estimated_rates([], 1.0, (3.0,)) == ((0.0,), (0.0,))
     assert estimated_rates([(0.5, (2.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
     assert estimated_rates([(0.5, (2.0,)), (1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
+
+
+def _beside_their_estimates(host: Host, h: float, *, wired: tuple[str, ...] = ()) -> list[list[float]]:
+    """True and estimated errors of qd and qdd at each sample of u = 1 + 0.3 sin 2 t, read before and after a step."""
+    rows = []
+    for k in range(40):
+        t = k * h
+        u, ud, udd = 1 + 0.3 * math.sin(2 * t), 0.6 * math.cos(2 * t), -1.2 * math.sin(2 * t)
+        host.set({"crank_angle": u, **{name: {"crank_speed": ud, "crank_acceleration": udd}[name] for name in wired}})
+        exact = [ud, -math.sin(u) * ud / 2, udd, -(math.sin(u) * udd + math.cos(u) * ud * ud) / 2]  # the size is 2
+        for is_committed in (False, True):
+            if is_committed:
+                assert host.step(t, h)
+            omega, vx, alpha, ax = host.get("rocker.omega", "coupler.vx", "rocker.alpha", "coupler.ax")
+            off = [abs(a - b) for a, b in zip((omega, vx / 2, alpha, ax / 2), exact, strict=True)]
+            rows.append([max(off[:2]), max(off[2:]), *host.get("solver.error_qd", "solver.error_qdd")])
+    return rows
+
+
+def test_error_estimates_hold_what_the_estimated_rates_are_off_by(start: Callable[..., Host]) -> None:
+    rows = _beside_their_estimates(start(), 0.01)
+    assert [row[2] for row in rows[:4]] == [math.inf] * 4  # two samples, before and after their steps
+    assert [row[3] for row in rows[:6]] == [math.inf] * 6
+    assert all(row[2] < 1.0 for row in rows[4:])
+    assert all(row[3] < 1.0 for row in rows[6:])
+    good = [(true, told) for row in rows for true, told in zip(row[:2], row[2:], strict=True) if told < math.inf]
+    assert sum(true <= told for true, told in good) >= 0.99 * len(good)
+    assert sorted(told / true for true, told in good)[len(good) // 2] < 10.0
+
+
+def test_wired_rates_leave_the_errors_of_the_others_alone(start: Callable[..., Host]) -> None:
+    exact = _beside_their_estimates(start(), 0.01, wired=("crank_speed", "crank_acceleration"))
+    assert all(max(row) < 1e-12 for row in exact[2:])  # an acceleration of 0 does not count as wired
+    with_speed = _beside_their_estimates(start(), 0.01, wired=("crank_speed",))
+    assert all(row[2] < 1e-12 for row in with_speed)
+    assert all(1e-4 < row[3] < 1.0 for row in with_speed[6:])
+
+
+def test_errors_of_estimated_rates_are_the_next_term() -> None:
+    samples = [(t, (t**3,)) for t in (0.0, 1.0, 3.0, 4.0)]
+    before = samples[:3]
+    (speed,), (acceleration,) = estimated_rates(before, *samples[3])
+    (speed_error,), (acceleration_error,) = errors_of_estimated_rates(before, *samples[3])
+    assert speed_error == pytest.approx(2.0 * abs(speed - 48.0))  # twice what a cubic tells
+    assert acceleration_error == pytest.approx(2.0 * abs(acceleration - 24.0))
+    assert errors_of_estimated_rates(samples[1:3], *samples[3])[1] == (math.inf,)
+    assert errors_of_estimated_rates(samples[2:3], *samples[3]) == ((math.inf,), (math.inf,))
