@@ -19,8 +19,8 @@ text-align: left; vertical-align: top }}</style></head>
 <p>While <code>driven_by_time</code> is true the law in the mechanism file drives; its constants are parameters. While
 it is false the inputs drive: {inputs}. Outputs follow a set input at once. Speed and acceleration inputs may stay
 unwired: they are then estimated from the samples, with errors that fall with the step as h<sup>2</sup> and h.
-<code>solver.error_qd</code> and <code>solver.error_qdd</code> count these errors; they are infinite at the first two and
-three samples, of which nothing is known.</p>
+<code>solver.error_qd</code> and <code>solver.error_qdd</code> count these errors; they are infinite at the first two
+and three samples, of which nothing is known.</p>
 <h2>When a pose cannot be reached</h2>
 <p><code>solver.status</code> says so, outputs keep the last good values, <code>solver.message</code> names driver,
 value and limit, and the next step is Discard. The host may set other inputs and go on. Status: {statuses}.</p>
