@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import statistics
 import time
 from collections.abc import Callable, Sequence
 
 from kinfmu.backends.python import load_model
+from kinfmu.bench.rounds import samples_in_turn
 from kinfmu.chains import fourbar_chain, open_chain
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import compile_plan
@@ -16,6 +16,7 @@ from kinfmu.solver import Solver
 
 LOOPS = (1, 10, 100, 1000)
 ROUNDS = 15
+MOST = 100  # samples in a row: they stay inside the range
 STEP = 0.01  # [rad]
 FIRST_LOOP = ("bar_1.phi",)
 
@@ -26,7 +27,7 @@ def run() -> str:
     lines.append(f"{'loops':>6}{'compile, s':>12}{'us a sample':>13}{'min':>9}{'max':>9}{'us, first loop only':>21}")
     whole, compiled = zip(*(_ready(fourbar_chain(n)) for n in LOOPS), strict=True)
     first, _ = zip(*(_ready(fourbar_chain(n), FIRST_LOOP) for n in LOOPS), strict=True)
-    times = _in_turn([*whole, *first])
+    times = samples_in_turn([*whole, *first], ROUNDS, MOST)
     for k, n in enumerate(LOOPS):
         of_all, of_first = times[k], times[k + len(LOOPS)]
         lines.append(
@@ -41,7 +42,7 @@ def run() -> str:
     pruned = statistics.median(times[-1]) / statistics.median(times[len(LOOPS)])
     lines.append(f"one output of the first loop: {pruned:.2f} times the cost that it has in a chain of one")
     links, seconds = _ready(open_chain(LOOPS[-1]))
-    (samples,) = _in_turn([links])
+    (samples,) = samples_in_turn([links], ROUNDS, MOST)
     lines.append(
         f"open chain of {LOOPS[-1]} links: compile {seconds:.2f} s, {statistics.median(samples):.2f} us a sample"
     )
@@ -62,21 +63,3 @@ def _ready(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> tuple[
             solver.motion(pose, (1.0,), (0.0,))
 
     return samples, seconds
-
-
-def _in_turn(ways: Sequence[Callable[[int], None]]) -> list[list[float]]:
-    """Microseconds a sample of each, round by round."""
-    gc.freeze()  # the plans stay alive; what they hold is no part of a sample
-    counts = [1] * len(ways)
-    times: list[list[float]] = [[] for _ in ways]
-    for k, way in enumerate(ways):
-        start = time.process_time()
-        way(1)
-        counts[k] = max(5, min(100, int(0.02 / max(time.process_time() - start, 1e-6))))  # 20 ms, and inside the range
-    for _ in range(ROUNDS):
-        for way, count, measured in zip(ways, counts, times, strict=True):
-            start = time.process_time()
-            way(count)
-            measured.append((time.process_time() - start) / count * 1e6)
-    gc.unfreeze()
-    return times

@@ -3,51 +3,39 @@
 from __future__ import annotations
 
 import math
-import statistics
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
-from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
+from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import FmuError
 from kinfmu.fmu.build import build
 from kinfmu.mechanism import Mechanism
 from kinfmu.naming import derivative_name
 
 STEPS = 720  # in a round, of one degree each: whole turns
-ROUNDS = 60  # of each FMU, in turn, so that whatever else the machine does hits both
+ROUNDS = 60
 
 
-class StepCost(NamedTuple):
-    """Microseconds a step (set 1, step, get 15) of one FMU: median and quartiles over the rounds."""
-
-    name: str
-    median: float
-    lower: float
-    upper: float
-
-
-def run(mechanism: Mechanism) -> tuple[StepCost, StepCost]:
-    """Measure mechanism and toy side by side, print a table, return (mechanism, toy)."""
+def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
+    """A table: microseconds a step (set 1, step, get 15) of the mechanism's FMU and of the toy, and their ratio."""
     with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
         ours = build(mechanism, Path(folder) / "ours.fmu", drive="inputs")
         toy = _toy(Path(folder))
         body = mechanism.drivers[0].inputs()[0]
         with _stepper(ours, body, _fifteen(ours)) as step_ours, _stepper(toy, "u", None) as step_toy:
-            rounds = [(step_ours(k), step_toy(k)) for k in range(ROUNDS + 1)][1:]  # the first one warms up
-    costs = tuple(
-        StepCost(name, statistics.median(times), *statistics.quantiles(times, n=4)[::2])
-        for name, times in zip((mechanism.name, "toy (sin, cos)"), zip(*rounds, strict=True), strict=True)
-    )
-    print(f"{'FMU step: set 1, step 1 deg, get 15':38}{'median':>9}{'quartiles':>18}")
-    for cost in costs:
-        print(f"{cost.name:38}{cost.median:6.2f} us{cost.lower:8.2f} to {cost.upper:.2f} us")
-    ratios = [ours / toy for ours, toy in rounds]
-    lower, upper = statistics.quantiles(ratios, n=4)[::2]
-    print(f"{'ratio, round by round':38}{statistics.median(ratios):6.2f}   {lower:8.2f} to {upper:.2f}")
-    return costs[0], costs[1]
+            seconds = in_turn([step_ours, step_toy], rounds)
+    costs = [[value / STEPS * 1e6 for value in row] for row in seconds]
+    lines = [f"{'FMU step: set 1, step 1 deg, get 15':38}{'median':>9}{'quartiles':>18}"]
+    for name, measured in zip((mechanism.name, "toy (sin, cos)"), costs, strict=True):
+        of = spread(measured)
+        lines.append(f"{name:38}{of.median:6.2f} us{of.lower:8.2f} to {of.upper:.2f} us")
+    ratio = spread([a / b for a, b in zip(*costs, strict=True)])
+    lines.append(f"{'ratio, round by round':38}{ratio.median:6.2f}   {ratio.lower:8.2f} to {ratio.upper:.2f}")
+    return "\n".join(lines)
 
 
 def _fifteen(fmu: Path) -> list[str]:
@@ -66,8 +54,8 @@ def _toy(folder: Path) -> Path:
 
 
 @contextmanager
-def _stepper(fmu: Path, input_name: str, outputs: list[str] | None) -> Iterator[Callable[[int], float]]:
-    """A function that steps an FMU through a round and returns microseconds a step."""
+def _stepper(fmu: Path, input_name: str, outputs: list[str] | None) -> Iterator[Callable[[], None]]:
+    """A function that steps an FMU through a round, each going on where the last one ended."""
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
@@ -88,15 +76,14 @@ def _stepper(fmu: Path, input_name: str, outputs: list[str] | None) -> Iterator[
         slave.setupExperiment()
         slave.enterInitializationMode()
         slave.exitInitializationMode()
-        yield lambda k: _round(slave, k * STEPS, inputs, reads)
+        first = count(0, STEPS)
+        yield lambda: _round(slave, next(first), inputs, reads)
         slave.freeInstance()
 
 
-def _round(slave: Any, first: int, inputs: list[int], reads: list[int]) -> float:
+def _round(slave: Any, first: int, inputs: list[int], reads: list[int]) -> None:
     degree = math.pi / 180.0
-    begin = perf_counter()
     for k in range(first, first + STEPS):
         slave.setReal(inputs, [k * degree])
         slave.doStep(k * degree, degree)
         slave.getReal(reads)
-    return (perf_counter() - begin) / STEPS * 1e6

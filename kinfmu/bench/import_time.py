@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import statistics
 import subprocess
 import sys
-import time
+from collections.abc import Callable
+
+from kinfmu.bench.rounds import in_turn, spread
 
 ROUNDS = 21
+STATEMENTS = ("pass", "import kinfmu")
 
 
-def run() -> str:
-    """A table: milliseconds of a whole process, in turn, and the median of the differences."""
-    times: dict[str, list[float]] = {"pass": [], "import kinfmu": []}
-    for _ in range(ROUNDS):
-        for statement, measured in times.items():
-            start = time.perf_counter()
-            subprocess.run([sys.executable, "-c", statement], check=True)
-            measured.append((time.perf_counter() - start) * 1e3)
-    differences = [ours - bare for bare, ours in zip(*times.values(), strict=True)]
-    lines = [f"whole process, {ROUNDS} rounds in turn; ms{'':8}{'median':>9}{'min':>9}{'max':>9}"]
-    for name, measured in (*times.items(), ("difference", differences)):
-        lines.append(f"{name:39}{statistics.median(measured):9.1f}{min(measured):9.1f}{max(measured):9.1f}")
+def run(rounds: int = ROUNDS) -> str:
+    """A table: milliseconds of a whole process, and of the differences round by round."""
+    bare, ours = ([1e3 * value for value in seconds] for seconds in in_turn([_process(s) for s in STATEMENTS], rounds))
+    differences = [b - a for a, b in zip(bare, ours, strict=True)]
+    lines = [f"whole process, {rounds} rounds in turn; ms{'':8}{'median':>9}{'min':>9}{'max':>9}"]
+    for name, measured in zip((*STATEMENTS, "difference"), (bare, ours, differences), strict=True):
+        of = spread(measured)
+        lines.append(f"{name:39}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}")
     return "\n".join(lines)
+
+
+def _process(statement: str) -> Callable[[], object]:
+    return lambda: subprocess.run([sys.executable, "-c", statement], check=True)

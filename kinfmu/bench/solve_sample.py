@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import statistics
-import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from kinfmu.backends.python import load_model
+from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.demo import closed_form
 from kinfmu.equations.reference import solve_reference
 from kinfmu.equations.system import FloatArray, System
@@ -18,11 +17,11 @@ from kinfmu.redundancy import find_redundancy
 from kinfmu.solver import Solver
 from kinfmu.sweep import solve
 
-ROUNDS = 9  # the two are timed in turn, so that a drift of the machine's speed meets both
+ROUNDS = 9
 DEGREES = np.arange(5.0, 176.0)  # away from the singular points, where the dense reference has no answer
 
 
-def run() -> str:
+def run(rounds: int = ROUNDS) -> str:
     """A table: microseconds a sample (median and spread over rounds) and largest error of q, qd, qdd."""
     u = np.radians(DEGREES)
     ways = {
@@ -30,22 +29,14 @@ def run() -> str:
         "python engine, q, qd, qdd": _engine(u),
         "kinfmu.solve, with status and error estimates": _solve(u),
     }
-    times: dict[str, list[float]] = {name: [] for name in ways}
-    errors: dict[str, float] = {}
-    for _ in range(ROUNDS):
-        for name, way in ways.items():
-            start = time.perf_counter()
-            results = way()
-            times[name].append((time.perf_counter() - start) / len(u) * 1e6)
-            errors[name] = _error(results)
-    base = statistics.median(next(iter(times.values())))
-    lines = [f"four-bar, {len(u)} samples of 1 degree, {ROUNDS} rounds in turn; us a sample"]
+    base, *_ = times = [
+        spread([value / len(u) * 1e6 for value in seconds]) for seconds in in_turn(list(ways.values()), rounds)
+    ]
+    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us a sample"]
     lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
-    for name, measured in times.items():
-        median = statistics.median(measured)
-        lines.append(
-            f"{name:48}{median:9.2f}{min(measured):9.2f}{max(measured):9.2f}{base / median:14.1f}{errors[name]:15.1e}"
-        )
+    for (name, way), of in zip(ways.items(), times, strict=True):
+        faster, error = base.median / of.median, _error(way())
+        lines.append(f"{name:48}{of.median:9.2f}{of.low:9.2f}{of.high:9.2f}{faster:14.1f}{error:15.1e}")
     return "\n".join(lines)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +17,11 @@ from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.slides import rails, rods, slides, slots_and_blocks
 from kinfmu.draw.wheels import MeshName, racks, wheels
-from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.draw.writing import write
+from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 
-SUFFIXES = (".svg", ".png")
-DOTS_PER_INCH = 150  # of a PNG
 MOST_NAMES = 90  # more would cover the drawing
 _SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture
 
@@ -38,30 +36,7 @@ def figure(mechanism: Mechanism, path: str | Path) -> None:
     Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib,
     AssemblyError or MechanismError if the mechanism does not close.
     """
-    path = Path(path)
-    check_suffix(path)
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
-
-    shown = instant(mechanism)
-    with mpl.rc_context():
-        mpl.rcdefaults()  # a picture of ours, whatever the user's own settings are
-        mpl.rcParams["svg.fonttype"] = "none"  # text as text
-        mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
-        mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
-        image = _image(sheet_of(shown), path.suffix.lower())
-    try:
-        path.write_bytes(image)
-    except OSError as error:
-        raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def check_suffix(path: Path) -> None:
-    """Raise a FigureError unless the name of a file says what to draw."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise FigureError(f"{path}: '{path.suffix}' is no figure that can be drawn; known: {listed(SUFFIXES)}")
+    write(Path(path), lambda: sheet_of(instant(mechanism)).figure)
 
 
 def sheet_of(shown: Instant) -> Sheet:
@@ -107,13 +82,3 @@ def _marks(shown: Instant) -> list[Mark]:
         *motion(shown),
         *pins(shown, sliding),
     ]
-
-
-def _image(sheet: Sheet, suffix: str) -> bytes:
-    """The sheet as the bytes of a file."""
-    file = io.BytesIO()
-    if suffix == ".svg":
-        sheet.figure.savefig(file, format="svg", metadata={"Date": None})
-    else:
-        sheet.figure.savefig(file, format="png", dpi=DOTS_PER_INCH)
-    return file.getvalue()

@@ -1,0 +1,110 @@
+"""Run time against error: every engine in every setting on several mechanisms, timed in turn."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from kinfmu.bench.case import Case, of_gallery
+from kinfmu.bench.engines import ENGINES, Engine, Way
+from kinfmu.bench.rounds import Spread, samples_in_turn, spread
+from kinfmu.bench.setting import Setting
+from kinfmu.errors import MissingPackageError
+
+MECHANISMS = ("crank_rocker", "slider_crank", "stephenson_six_bar", "jansen_leg", "excavator")
+ROUNDS = 7
+
+Tell = Callable[[str], None]  # what has just been done, one step of `steps` a call
+
+
+class Measured(NamedTuple):
+    """One engine in one setting on one mechanism.
+
+    microseconds: processor time a sample; errors: largest of q, qd, qdd over the samples of the reference, relative to
+    each column's largest magnitude; NaN if a sample was not found.
+    """
+
+    case: str
+    engine: str
+    setting: Setting
+    is_usual: bool
+    microseconds: Spread
+    errors: tuple[float, float, float]
+
+    @property
+    def error(self) -> float:
+        """The largest of the three; NaN if there is one."""
+        return max(self.errors, key=lambda error: (error != error, error))  # noqa: PLR0124  NaN is the largest
+
+
+class Result(NamedTuple):
+    """What was measured, and a line for each engine that was not."""
+
+    measured: tuple[Measured, ...]
+    absent: tuple[str, ...]
+
+
+def measure(
+    mechanisms: Sequence[str] = MECHANISMS,
+    rounds: int = ROUNDS,
+    tell: Tell = lambda _: None,
+    engines: Sequence[Engine] = ENGINES,
+) -> Result:
+    """Errors of one whole sweep of every way; then times, all ways of a mechanism once a round."""
+    measured: list[Measured] = []
+    absent: dict[str, None] = {}
+    for name in mechanisms:
+        case = of_gallery(name)
+        ways: list[tuple[Engine, Setting, Way]] = []
+        for engine in engines:
+            for setting in engine.settings:
+                tell(f"{name}: {engine.name}")
+                way = prepared(engine, case, setting, absent)
+                if way is not None:
+                    ways.append((engine, setting, way))
+        errors = []
+        for engine, _, way in ways:
+            tell(f"{name}: {engine.name}, errors")
+            errors.append(largest(case, engine, way))
+        times = samples_in_turn(
+            [quietly(way) for _, _, way in ways], rounds, len(case.t), each=lambda: tell(f"{name}: times")
+        )
+        measured += [
+            Measured(name, engine.name, setting, setting == engine.usual, spread(microseconds), error)
+            for (engine, setting, _), microseconds, error in zip(ways, times, errors, strict=True)
+        ]
+    return Result(tuple(measured), tuple(absent))
+
+
+def steps(mechanisms: Sequence[str] = MECHANISMS, rounds: int = ROUNDS, engines: Sequence[Engine] = ENGINES) -> int:
+    """How often `measure` tells something, at most."""
+    return len(mechanisms) * (rounds + 2 * sum(len(engine.settings) for engine in engines))
+
+
+def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, None]) -> Way | None:
+    """A way to be measured; None if there is none, with a line in `absent` if a package is missing."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of other people's packages
+            return engine.way(case, setting)
+    except MissingPackageError as error:
+        absent[str(error)] = None
+        return None
+
+
+def quietly(way: Way) -> Way:
+    """The same way without warnings of other people's packages on stderr, such as those of a singular matrix."""
+
+    def take(n: int) -> Sequence[Sequence[float]]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return way(n)
+
+    return take
+
+
+def largest(case: Case, engine: Engine, way: Way) -> tuple[float, float, float]:
+    """Largest error of q, qd, qdd over a whole sweep."""
+    q, qd, qdd = case.errors(quietly(way)(len(case.t))).max(axis=0).tolist()
+    return q, qd, qdd

@@ -1,0 +1,73 @@
+"""CasADi: its rootfinder on the constraint equations of all coordinates, the sweep mapped in its virtual machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from kinfmu.bench.case import Case, Motion
+from kinfmu.bench.engines.dense import start_of
+from kinfmu.bench.engines.engine import Engine, Way
+from kinfmu.bench.setting import Setting
+from kinfmu.equations.system import System
+from kinfmu.errors import MissingPackageError
+from kinfmu.joints import arithmetic
+from kinfmu.redundancy import find_redundancy
+
+FINEST = 1e-13
+
+
+class Casadi(Engine):
+    """`fast_newton` from the last pose, rates by linear solves; the tolerance is `abstol` of the relative residual."""
+
+    name = "CasADi"
+    settings: Sequence[Setting] = tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST))
+    usual = Setting(0, FINEST)
+
+    def way(self, case: Case, setting: Setting) -> Way:
+        try:
+            import casadi
+        except ImportError:
+            raise MissingPackageError("CasADi is not installed: pip install 'kinfmu[bench]'") from None
+        for function in ("sin", "cos", "sqrt"):
+            getattr(arithmetic, function).register(casadi.SX, getattr(casadi, function))
+        system = System(case.mechanism)
+        step = _step(casadi, system, setting.tolerance)
+        start = casadi.DM(start_of(case, system))
+        chosen = [system.coordinates.index(name) for name in case.columns]
+        wanted = [k * len(system.coordinates) + c for k in range(3) for c in chosen]
+        driven = [casadi.DM(np.array(table).T) for table in (case.u, case.ud, case.udd)]
+        swept = cache(lambda n: step.mapaccum(n))
+
+        def take(n: int) -> Motion:
+            _, rows = swept(n)(start, *(table[:, :n] for table in driven))
+            found: Any = np.array(rows)
+            return list(found[wanted].T)
+
+        return take
+
+
+def _step(casadi: Any, system: System, tolerance: float) -> Any:
+    """(q, u, ud, udd) -> (q, [q, qd, qdd]): a sample from the last pose."""
+    rows = [*find_redundancy(system).kept, *range(system.joint_row_count, len(system.rows))]
+    n, d = len(system.coordinates), len(system.mechanism.drivers)
+    q, u, ud, udd, qd = (casadi.SX.sym(name, k) for name, k in (("q", n), ("u", d), ("ud", d), ("udd", d), ("qd", n)))
+    phi = system.evaluate(casadi.vertsplit(q), casadi.vertsplit(u))
+    phi = casadi.vertcat(*(phi[k] / (system.rows[k].scale * system.size) for k in rows))
+    jacobian, by_driver = casadi.jacobian(phi, q), casadi.jacobian(phi, u)
+    where, rate = casadi.vertcat(q, u), casadi.vertcat(qd, ud)
+    second = casadi.jtimes(casadi.jtimes(phi, where, rate), where, rate)
+    velocity = casadi.Function("velocity", [q, u, ud], [casadi.solve(jacobian, -by_driver @ ud)])
+    acceleration = casadi.Function(
+        "acceleration", [q, u, ud, udd, qd], [casadi.solve(jacobian, -second - by_driver @ udd)]
+    )
+    options = {"abstol": tolerance, "max_iter": 50, "error_on_fail": False}
+    position = casadi.rootfinder("position", "fast_newton", {"x": q, "p": u, "g": phi}, options)
+    last, at, speed, more = (casadi.MX.sym(name, k) for name, k in (("last", n), ("u", d), ("ud", d), ("udd", d)))
+    here = position(x0=last, p=at)["x"]
+    moving = velocity(here, at, speed)
+    everything = casadi.vertcat(here, moving, acceleration(here, at, speed, more, moving))
+    return casadi.Function("step", [last, at, speed, more], [here, everything])

@@ -1,0 +1,62 @@
+"""The Python engine bare: generated code with nobody who judges a step, in every setting of Newton."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kinfmu.bench.case import Case, Motion
+from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.setting import Setting, newton
+from kinfmu.bench.stopping import model_with
+from kinfmu.solver import Solver
+
+
+class Generated(Engine):
+    """`position` of the generated model from one sample to the next, and the rates as it gives them."""
+
+    name = "generated Python"
+    settings: Sequence[Setting] = newton()
+    usual = Setting()
+
+    def way(self, case: Case, setting: Setting) -> Way:
+        model = model_with(case.plan, setting)
+        exact = Solver(model_with(case.plan, Setting()))
+        start = exact.solve(exact.anchor, case.u[0])
+        alone = len(case.u[0]) == 1
+        rest = (0.0,) * len(start.z)
+        still = (0.0,) * len(case.u[0])
+        gap = (GAP,) * (3 * len(case.columns))
+        samples = list(zip(case.u, case.ud, case.udd, strict=True))
+
+        def take(n: int) -> Motion:
+            here, z, values, tangent = start.u, start.z, start.values, None
+            rows = []
+            for u, ud, udd in samples[:n]:
+                zd = zdd = rest
+                if alone:
+                    s = u[0] - here[0]
+                    if setting.predictor:
+                        tangent = tangent or model.tangent(values)
+                        zd = tangent[0]
+                        zdd = tangent[1] if setting.predictor > 1 else rest
+                else:
+                    s, way = 1.0, tuple([b - a for a, b in zip(here, u)])  # noqa: B905  one a driver, both
+                    if setting.predictor:
+                        zd = model.velocity(values, way)
+                        zdd = model.acceleration(values, way, still, zd) if setting.predictor > 1 else rest
+                try:
+                    found = model.position(u, z, zd, zdd, s)
+                    if alone:
+                        there, row = model.first_motion(found[-1], ud, udd)
+                    else:
+                        there, first = None, model.velocity(found[-1], ud)
+                        second = model.acceleration(found[-1], ud, udd, first)
+                        row = model.motion(found[-1], ud, udd, first, second)
+                except (ArithmeticError, ValueError):  # diverged: go on from the last pose
+                    rows.append(gap)
+                    continue
+                here, z, values, tangent = u, found[0], found[-1], there
+                rows.append(row)
+            return rows
+
+        return take

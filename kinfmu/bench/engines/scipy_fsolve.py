@@ -1,0 +1,64 @@
+"""What an engineer writes: scipy's fsolve on the closure equations, from the last pose, and the rates by linear solves.
+
+The equations are those of the generated code, in the unknown angles alone, so that only the solver differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+
+from kinfmu.backends.python import load_model
+from kinfmu.bench.case import Case, Motion
+from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.setting import Setting
+from kinfmu.mechanism import Parameter
+from kinfmu.plan import compile_plan
+from kinfmu.solver import Solver
+from kinfmu.solver.pose import evaluated
+
+DEFAULT = 1.49012e-8  # xtol of fsolve, if nothing is said
+FINEST = 1e-15
+UNREAD = "unread"  # a parameter that nothing depends on: models with parameters can tell their residuals
+
+
+class Fsolve(Engine):
+    """MINPACK's hybrid method with its own difference quotients; the tolerance is `xtol`."""
+
+    name = "scipy fsolve"
+    settings: Sequence[Setting] = tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST))
+    usual = Setting(0, DEFAULT)
+
+    def way(self, case: Case, setting: Setting) -> Way:
+        from scipy.optimize import fsolve
+
+        mechanism = case.mechanism
+        telling = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
+        model = load_model(compile_plan(telling, case.columns))
+        solver = Solver(model)
+        start = solver.solve(solver.anchor, case.u[0])
+        alone = len(case.u[0]) == 1
+        gap = (GAP,) * (3 * len(case.columns))
+        samples = list(zip(case.u, case.ud, case.udd, strict=True))
+
+        def closure(z: Sequence[float], u: tuple[float, ...]) -> list[float]:
+            return list(chain.from_iterable(model.residuals(evaluated(model, u, tuple(z))[-1])))
+
+        def take(n: int) -> Motion:
+            z, rows = start.z, []
+            for u, ud, udd in samples[:n]:
+                found, _, success, _ = fsolve(closure, z, (u,), xtol=setting.tolerance, full_output=True)
+                z = tuple(found.tolist())
+                try:
+                    values = evaluated(model, u, z)[-1]
+                    if alone:
+                        rows.append(model.first_motion(values, ud, udd)[1])
+                    else:
+                        first = model.velocity(values, ud)
+                        rows.append(model.motion(values, ud, udd, first, model.acceleration(values, ud, udd, first)))
+                except ArithmeticError:  # exactly singular: there are no rates
+                    rows.append(gap)
+            return rows
+
+        return take

@@ -1,0 +1,38 @@
+"""kinfmu as shipped: the generated code behind a Solver, which guards the branch and bridges singular points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kinfmu.backends.python import load_model
+from kinfmu.bench.case import Case, Motion
+from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.setting import Setting
+from kinfmu.solver import Solver
+
+
+class Shipped(Engine):
+    """What `kinfmu.solve` and the FMU run on: second order prediction, Newton to round-off, every step judged."""
+
+    name = "kinfmu"
+    settings: Sequence[Setting] = (Setting(),)
+    usual = Setting()
+
+    def way(self, case: Case, setting: Setting) -> Way:  # noqa: ARG002  there is one
+        solver = Solver(load_model(case.plan))
+        start = solver.solve(solver.anchor, case.u[0])
+        gap = (GAP,) * (3 * len(case.columns))
+        samples = list(zip(case.u, case.ud, case.udd, strict=True))
+
+        def take(n: int) -> Motion:
+            pose, rows = start, []
+            for u, ud, udd in samples[:n]:
+                found = solver.solve(pose, u)
+                if found.good:
+                    pose = found
+                    rows.append(solver.motion(pose, ud, udd))
+                else:
+                    rows.append(gap)
+            return rows
+
+        return take

@@ -1,0 +1,87 @@
+"""Timing in turn: every way once a round, so that whatever else the machine does meets all of them."""
+
+from __future__ import annotations
+
+import gc
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+SLICE = 0.02  # [s] that a way should run for in a round
+
+
+class Spread(NamedTuple):
+    """Median, smallest and largest of what was measured round by round, and the quartiles between them."""
+
+    median: float
+    low: float
+    high: float
+    lower: float
+    upper: float
+
+
+def spread(measured: Sequence[float]) -> Spread:
+    """Median, range and quartiles of at least one number."""
+    lower, upper = statistics.quantiles(measured, n=4)[::2] if len(measured) > 1 else (measured[0], measured[0])
+    return Spread(statistics.median(measured), min(measured), max(measured), lower, upper)
+
+
+def in_turn(
+    ways: Sequence[Callable[[], object]],
+    rounds: int,
+    clock: Callable[[], float] = time.perf_counter,
+    each: Callable[[], None] | None = None,
+) -> list[list[float]]:
+    """Seconds that each way takes, (ways, rounds), after a round that warms up. each: called after every round."""
+    measured: list[list[float]] = [[] for _ in ways]
+    with _garbage_set_aside():
+        for way in ways:
+            way()
+        for _ in range(rounds):
+            for way, seconds in zip(ways, measured, strict=True):
+                start = clock()
+                way()
+                seconds.append(clock() - start)
+            if each is not None:
+                each()
+    return measured
+
+
+def samples_in_turn(
+    ways: Sequence[Callable[[int], object]],
+    rounds: int,
+    most: int,
+    fewest: int = 5,
+    each: Callable[[], None] | None = None,
+) -> list[list[float]]:
+    """Microseconds of processor time a sample of each way, (ways, rounds).
+
+    A way takes its first n samples; n is what fills a SLICE, from `fewest` to `most`.
+    """
+    counts = []
+    for way in ways:
+        way(1)
+        start = time.process_time()
+        way(fewest)
+        each_takes = max(time.process_time() - start, 1e-6) / fewest
+        counts.append(max(fewest, min(most, int(SLICE / each_takes))))
+    slices = [_slice(way, count) for way, count in zip(ways, counts, strict=True)]
+    measured = in_turn(slices, rounds, time.process_time, each)
+    return [[value / count * 1e6 for value in seconds] for seconds, count in zip(measured, counts, strict=True)]
+
+
+def _slice(way: Callable[[int], object], count: int) -> Callable[[], object]:
+    return lambda: way(count)
+
+
+@contextmanager
+def _garbage_set_aside() -> Iterator[None]:
+    """What lives already, such as plans, is no part of what is measured: the collector does not look at it."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

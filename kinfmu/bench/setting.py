@@ -1,0 +1,47 @@
+"""Settings of a Newton solver: how a sample is predicted, and when correcting it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+ROUND_OFF = 0.0  # tolerance: as far as rounding lets it
+PREDICTORS = ("last pose", "velocity", "velocity and acceleration")
+
+
+class Setting(NamedTuple):
+    """predictor: 0, 1 or 2 terms of the Taylor series beyond the last pose; tolerance: residual relative to the size at
+    which correcting ends; corrections: their number if it is fixed; chord: the Jacobian of the prediction serves for
+    all corrections of a sample, rates take that of the pose.
+    """
+
+    predictor: int = 2
+    tolerance: float = ROUND_OFF
+    corrections: int | None = None
+    chord: bool = False
+
+    @property
+    def stop(self) -> str:
+        """'round-off', '1e-06' or '2 corrections'."""
+        if self.corrections is not None:
+            return f"{self.corrections} correction{'s' * (self.corrections != 1)}"
+        return f"{self.tolerance:.0e}" if self.tolerance else "round-off"
+
+
+CORRECTIONS = (0, 1, 2, 3, 4)
+TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12, ROUND_OFF)
+CHORD = (2, 3)  # corrections; one is the same with and without
+
+
+def newton(orders: Sequence[int] = range(len(PREDICTORS))) -> tuple[Setting, ...]:
+    """Every combination of a predictor with a number of corrections, a tolerance, chord or full Newton."""
+    return tuple(
+        setting
+        for order in orders
+        for setting in (
+            *(Setting(order, corrections=n) for n in CORRECTIONS if order + n > 0),
+            *(Setting(order, tolerance) for tolerance in TOLERANCES),
+            *(Setting(order, corrections=n, chord=True) for n in CHORD),
+            Setting(order, chord=True),
+        )
+    )

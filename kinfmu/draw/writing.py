@@ -1,0 +1,58 @@
+"""Writing a figure of matplotlib's into a file: the same picture on every computer, whatever its settings are."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinfmu.errors import FigureError, MissingPackageError, listed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".svg", ".png")
+DOTS_PER_INCH = 150  # of a PNG
+
+
+def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
+    """Write what `draw` gives into a .svg or .png file, or the same figure into several; equal figures, equal bytes.
+
+    Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib.
+    """
+    paths = paths if isinstance(paths, tuple) else (paths,)
+    for path in paths:
+        check_suffix(path)
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise MissingPackageError(f"{paths[0]}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
+    with mpl.rc_context():
+        mpl.rcdefaults()  # a picture of ours, whatever the user's own settings are
+        mpl.rcParams["svg.fonttype"] = "none"  # text as text
+        mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
+        mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
+        figure = draw()
+        images = [_image(figure, path.suffix.lower()) for path in paths]
+    for path, image in zip(paths, images, strict=True):
+        try:
+            path.write_bytes(image)
+        except OSError as error:
+            raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def check_suffix(path: Path) -> None:
+    """Raise a FigureError unless the name of a file says what to draw."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise FigureError(f"{path}: '{path.suffix}' is no figure that can be drawn; known: {listed(SUFFIXES)}")
+
+
+def _image(figure: Figure, suffix: str) -> bytes:
+    """A figure as the bytes of a file."""
+    file = io.BytesIO()
+    if suffix == ".svg":
+        figure.savefig(file, format="svg", metadata={"Date": None})
+    else:
+        figure.savefig(file, format="png", dpi=DOTS_PER_INCH)
+    return file.getvalue()
