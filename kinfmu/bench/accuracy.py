@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
@@ -35,7 +37,7 @@ class Measured(NamedTuple):
     @property
     def error(self) -> float:
         """The largest of the three; NaN if there is one."""
-        return max(self.errors, key=lambda error: (error != error, error))  # noqa: PLR0124  NaN is the largest
+        return max(self.errors, key=lambda error: (math.isnan(error), error))
 
 
 class Result(NamedTuple):
@@ -66,10 +68,8 @@ def measure(
         errors = []
         for engine, _, way in ways:
             tell(f"{name}: {engine.name}, errors")
-            errors.append(largest(case, engine, way))
-        times = samples_in_turn(
-            [quietly(way) for _, _, way in ways], rounds, len(case.t), each=lambda: tell(f"{name}: times")
-        )
+            errors.append(largest(case, way))
+        times = samples_in_turn([quietly(way) for _, _, way in ways], rounds, len(case.t), each=partial(tell, name))
         measured += [
             Measured(name, engine.name, setting, setting == engine.usual, spread(microseconds), error)
             for (engine, setting, _), microseconds, error in zip(ways, times, errors, strict=True)
@@ -104,7 +104,7 @@ def quietly(way: Way) -> Way:
     return take
 
 
-def largest(case: Case, engine: Engine, way: Way) -> tuple[float, float, float]:
+def largest(case: Case, way: Way) -> tuple[float, float, float]:
     """Largest error of q, qd, qdd over a whole sweep."""
     q, qd, qdd = case.errors(quietly(way)(len(case.t))).max(axis=0).tolist()
     return q, qd, qdd

@@ -5,19 +5,23 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from kinfmu import gallery
-from kinfmu.backends.python import load_module
+from kinfmu.backends.python import load_model
+from kinfmu.equations.system import System
 from kinfmu.mechanism import Mechanism
 from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.redundancy import find_redundancy
 from kinfmu.run import FloatArray
+from kinfmu.solver import Pose, Solver
 from kinfmu.solver.pose import Vector
 from kinfmu.sweep import run_times
 
-STEPS_BETWEEN = 10  # steps of a sweep from one sample of the reference to the next
+STEPS_BETWEEN = 5  # steps of a sweep from one sample of the reference to the next
 
 Motion = Sequence[Sequence[float]]  # a sample as it comes: q, qd, qdd of all columns in one row
 
@@ -50,15 +54,33 @@ class Case:
         """Names of the generalized coordinates."""
         return self.plan.outputs
 
-    def errors(self, rows: Motion, columns: Sequence[int] = ()) -> FloatArray:
-        """(k, 3) largest relative error of q, qd, qdd at each known sample; NaN where there are no numbers.
+    @cached_property
+    def start(self) -> Pose:
+        """The pose at the first sample, to round-off: where every engine starts from."""
+        solver = Solver(load_model(self.plan))
+        return solver.solve(solver.anchor, self.u[0])
 
-        columns: those that were solved for; all if none are named.
-        """
-        chosen = list(columns) or list(range(len(self.columns)))
-        found = np.array([rows[k] for k in self.known], dtype=float).reshape(len(self.known), 3, len(chosen))
-        relative = np.abs(found - self.exact[:, :, chosen]) / self.scale[:, chosen]
-        return np.asarray(relative.max(axis=2))
+    @cached_property
+    def system(self) -> System:
+        """All constraint rows, for engines that work on them."""
+        return System(self.mechanism)
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """As many independent rows of the system as there are coordinates."""
+        return (*find_redundancy(self.system).kept, *range(self.system.joint_row_count, len(self.system.rows)))
+
+    @cached_property
+    def start_coordinates(self) -> FloatArray:
+        """All coordinates of the system at the first sample, (n,)."""
+        model = load_model(self.plan)
+        known = {**model.FIXED, **dict(zip(self.columns, model.outputs(self.start.values), strict=True))}
+        return np.array([known[name] for name in self.system.coordinates])
+
+    def errors(self, rows: Motion) -> FloatArray:
+        """(k, 3) largest relative error of q, qd, qdd at each known sample; NaN where there are no numbers."""
+        found = np.array([rows[k] for k in self.known], dtype=float).reshape(self.exact.shape)
+        return np.asarray((np.abs(found - self.exact) / self.scale).max(axis=2))
 
 
 def of_gallery(name: str) -> Case:
@@ -80,10 +102,9 @@ def of_gallery(name: str) -> Case:
     between = second - first  # steps of the run
     stride = next(k for k in range(max(1, between // STEPS_BETWEEN), between + 1) if between % k == 0)
     t = grid[first : grid.index(times[-1]) + 1 : stride]
-    module = load_module(plan)
     constants = tuple(constant.value for constant in plan.law_constants)
-    model = module.bound(tuple(value for _, value in module.PARAMETERS)) if plan.parameters else module
-    u, ud, udd = (list(column) for column in zip(*(model.drive(value, constants) for value in t), strict=True))
+    drive = load_model(plan).drive
+    u, ud, udd = (list(column) for column in zip(*(drive(value, constants) for value in t), strict=True))
     return Case(name, plan, t, u, ud, udd, [t.index(value) for value in times], exact, _scale(plan.outputs, exact))
 
 
@@ -95,14 +116,15 @@ def along_driver(
     Errors are absolute, in radians and the mechanism's unit of length.
     """
     exact = np.array([closed_form(u[k]) for k in known])
-    ones, none = [(1.0,)] * len(u), [(0.0,)] * len(u)
+    ones: list[Vector] = [(1.0,)] * len(u)
+    none: list[Vector] = [(0.0,)] * len(u)
     scale = np.ones(exact.shape[1:])
     return Case(name, plan, list(u), [(value,) for value in u], ones, none, list(known), exact, scale)
 
 
 def _scale(names: Sequence[str], exact: FloatArray) -> FloatArray:
     """(3, m) the largest magnitude of each column; where it is zero all along that of its kind, else 1."""
-    largest = np.abs(exact).max(axis=0)
+    largest: FloatArray = np.abs(exact).max(axis=0)
     angles = np.array([name.endswith(".phi") for name in names])
     for order in range(3):
         for kind in (angles, ~angles):

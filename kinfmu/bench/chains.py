@@ -21,13 +21,13 @@ STEP = 0.01  # [rad]
 FIRST_LOOP = ("bar_1.phi",)
 
 
-def run() -> str:
+def run(rounds: int = ROUNDS) -> str:
     """A table: seconds to compile and microseconds a sample, for all outputs and for one output of the first loop."""
-    lines = [f"chain of four-bars, q, qd, qdd of all bodies, {ROUNDS} rounds in turn; processor time"]
+    lines = [f"chain of four-bars, q, qd, qdd of all bodies, {rounds} rounds in turn; processor time"]
     lines.append(f"{'loops':>6}{'compile, s':>12}{'us a sample':>13}{'min':>9}{'max':>9}{'us, first loop only':>21}")
     whole, compiled = zip(*(_ready(fourbar_chain(n)) for n in LOOPS), strict=True)
     first, _ = zip(*(_ready(fourbar_chain(n), FIRST_LOOP) for n in LOOPS), strict=True)
-    times = samples_in_turn([*whole, *first], ROUNDS, MOST)
+    times = samples_in_turn([*whole, *first], rounds, MOST)
     for k, n in enumerate(LOOPS):
         of_all, of_first = times[k], times[k + len(LOOPS)]
         lines.append(
@@ -42,7 +42,7 @@ def run() -> str:
     pruned = statistics.median(times[-1]) / statistics.median(times[len(LOOPS)])
     lines.append(f"one output of the first loop: {pruned:.2f} times the cost that it has in a chain of one")
     links, seconds = _ready(open_chain(LOOPS[-1]))
-    (samples,) = samples_in_turn([links], ROUNDS, MOST)
+    (samples,) = samples_in_turn([links], rounds, MOST)
     lines.append(
         f"open chain of {LOOPS[-1]} links: compile {seconds:.2f} s, {statistics.median(samples):.2f} us a sample"
     )

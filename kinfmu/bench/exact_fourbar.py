@@ -1,8 +1,9 @@
 """A four-bar in 80 digits, also where its branches cross: the oracle of the bench there. Needs mpmath.
 
-    P = a (cos u, sin u),   d = (g, 0) - P,   Q = P + (e d + h d_turned_left / |d|) / |d|...
+    P = a (cos u, sin u),   d = (g, 0) - P,   Q - P = e d + h d_turned_left
+    e = (b^2 - c^2 + d.d) / (2 d.d),   h^2 = b^2 / d.d - e^2
 
-with e the foot of Q on d and h its height; q' and q'' from the loop's derivatives, linear in them.
+q' and q'' solve the derivatives of the loop P + (Q - P) = C + (Q - C), which are linear in them.
 """
 
 from __future__ import annotations

@@ -5,7 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
+import kinfmu
 from kinfmu.bench.rounds import in_turn, spread
 
 ROUNDS = 21
@@ -24,4 +26,5 @@ def run(rounds: int = ROUNDS) -> str:
 
 
 def _process(statement: str) -> Callable[[], object]:
-    return lambda: subprocess.run([sys.executable, "-c", statement], check=True)
+    beside = Path(kinfmu.__file__).parents[1]  # where it is found, installed or not
+    return lambda: subprocess.run([sys.executable, "-c", statement], check=True, cwd=beside)

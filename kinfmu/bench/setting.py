@@ -28,20 +28,24 @@ class Setting(NamedTuple):
         return f"{self.tolerance:.0e}" if self.tolerance else "round-off"
 
 
-CORRECTIONS = (0, 1, 2, 3, 4)
+CORRECTIONS = (0, 1, 2, 3)
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12, ROUND_OFF)
 CHORD = (2, 3)  # corrections; one is the same with and without
 
 
-def newton(orders: Sequence[int] = range(len(PREDICTORS))) -> tuple[Setting, ...]:
-    """Every combination of a predictor with a number of corrections, a tolerance, chord or full Newton."""
+def newton(
+    corrections: Sequence[int] = CORRECTIONS,
+    tolerances: Sequence[float] = TOLERANCES,
+    chord: Sequence[int] = CHORD,
+) -> tuple[Setting, ...]:
+    """Each predictor with numbers of corrections, with tolerances, and with chord Newton, to round-off too."""
     return tuple(
         setting
-        for order in orders
+        for order in range(len(PREDICTORS))
         for setting in (
-            *(Setting(order, corrections=n) for n in CORRECTIONS if order + n > 0),
-            *(Setting(order, tolerance) for tolerance in TOLERANCES),
-            *(Setting(order, corrections=n, chord=True) for n in CHORD),
+            *(Setting(order, corrections=n) for n in corrections if order + n > 0),
+            *(Setting(order, tolerance) for tolerance in tolerances),
+            *(Setting(order, corrections=n, chord=True) for n in chord),
             Setting(order, chord=True),
         )
     )

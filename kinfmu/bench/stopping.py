@@ -49,10 +49,9 @@ class _Rewriter(ast.NodeTransformer):
         if not (isinstance(loop.target, ast.Name) and loop.target.id == "iteration"):
             return loop
         self.loops += 1
-        (place,) = (k for k, line in enumerate(loop.body) if isinstance(line, ast.If))
-        stop = loop.body[place]
-        assert isinstance(stop, ast.If)
-        assert isinstance(stop.test, ast.BoolOp)
+        place, stop = next((k, line) for k, line in enumerate(loop.body) if isinstance(line, ast.If))
+        if not (isinstance(stop.test, ast.BoolOp) and len(stop.test.values) == 3):
+            raise KinfmuError(f"the generated loop stops by another rule than is known here: {ast.unparse(stop.test)}")
         small, held, settled = stop.test.values
         if self.setting.corrections is not None:
             stop.test.values = [_expression(f"iteration >= {self.setting.corrections}"), held]
@@ -62,28 +61,22 @@ class _Rewriter(ast.NodeTransformer):
             stop.test.values = [small, held, settled]
         loop.iter = _expression(f"range({MOST})")
         if self.setting.chord:
-            loop.body = _chord(loop.body, place)
+            loop.body = _chord(loop.body, place, stop)
         return loop
 
 
-def _chord(body: list[ast.stmt], place: int) -> list[ast.stmt]:
+def _chord(body: list[ast.stmt], place: int, stop: ast.If) -> list[ast.stmt]:
     """The body of a loop with what its correction takes from the Jacobian as it was in the first iteration."""
-    evaluation, stop, last, correction = body[:place], body[place], body[place + 1], body[place + 2 :]
-    assert isinstance(stop, ast.If)
-    factoring = [line for line in evaluation if _assigned(line).startswith(("factors", "det")) and _factors(evaluation)]
-    stop.body = [*factoring, *stop.body]  # rates are solved with the factors of the pose itself
+    evaluation, last, correction = body[:place], body[place + 1], body[place + 2 :]
+    is_factored = any(_assigned(line).startswith("factors") for line in evaluation)
+    factoring = [line for line in evaluation if is_factored and _assigned(line).startswith(("factors", "det"))]
     evaluation = [line for line in evaluation if line not in factoring]
     known = {_assigned(line) for line in body[:place]}
     taken = sorted({name for name in _loaded(correction) if name in known and not _is_residual(name)})
-    freeze = ast.parse("\n".join(["if iteration == 0:", *(f"    first_{name} = {name}" for name in taken)])).body[0]
-    assert isinstance(freeze, ast.If)
-    freeze.body = [*factoring, *freeze.body]
+    first = [*factoring, *ast.parse("\n".join(f"first_{name} = {name}" for name in taken)).body]
+    stop.body = [*factoring, *stop.body]  # rates are solved with the factors of the pose itself
     renamed = [_Renamer(frozenset(taken)).visit(line) for line in correction]
-    return [*evaluation, stop, last, freeze, *renamed]
-
-
-def _factors(evaluation: list[ast.stmt]) -> bool:
-    return any(_assigned(line).startswith("factors") for line in evaluation)
+    return [*evaluation, stop, last, ast.If(_expression("iteration == 0"), first, []), *renamed]
 
 
 class _Renamer(ast.NodeTransformer):

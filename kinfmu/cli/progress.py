@@ -12,9 +12,11 @@ LONG_RUN = 2000  # samples from which a progress bar is worth a line
 
 
 class Progress:
-    """A progress bar on stderr for long runs, where somebody sees it."""
+    """A progress bar on stderr for what has at least `least` steps, where somebody sees it."""
 
-    def __init__(self) -> None:
+    def __init__(self, label: str = "simulating", least: int = LONG_RUN) -> None:
+        self.label = label
+        self.least = least
         self._bar: Any = None
         self._done = 0
 
@@ -27,9 +29,9 @@ class Progress:
 
     def _show(self, done: int, count: int) -> None:
         if self._bar is None:
-            if count < LONG_RUN or not sys.stderr.isatty():
+            if count < self.least or not sys.stderr.isatty():
                 return
-            self._bar = click.progressbar(length=count, label="simulating", file=sys.stderr)
+            self._bar = click.progressbar(length=count, label=self.label, file=sys.stderr)
             self._bar.render_progress()
         if done - self._done >= count // 200 or done == count:
             self._bar.update(done - self._done)

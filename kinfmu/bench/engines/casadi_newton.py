@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.dense import start_of
 from kinfmu.bench.engines.engine import Engine, Way
 from kinfmu.bench.setting import Setting
-from kinfmu.equations.system import System
 from kinfmu.errors import MissingPackageError
 from kinfmu.joints import arithmetic
-from kinfmu.redundancy import find_redundancy
 
 FINEST = 1e-13
 
@@ -34,9 +31,9 @@ class Casadi(Engine):
             raise MissingPackageError("CasADi is not installed: pip install 'kinfmu[bench]'") from None
         for function in ("sin", "cos", "sqrt"):
             getattr(arithmetic, function).register(casadi.SX, getattr(casadi, function))
-        system = System(case.mechanism)
-        step = _step(casadi, system, setting.tolerance)
-        start = casadi.DM(start_of(case, system))
+        system = case.system
+        step = _step(casadi, case, setting.tolerance)
+        start = casadi.DM(case.start_coordinates)
         chosen = [system.coordinates.index(name) for name in case.columns]
         wanted = [k * len(system.coordinates) + c for k in range(3) for c in chosen]
         driven = [casadi.DM(np.array(table).T) for table in (case.u, case.ud, case.udd)]
@@ -50,13 +47,13 @@ class Casadi(Engine):
         return take
 
 
-def _step(casadi: Any, system: System, tolerance: float) -> Any:
+def _step(casadi: Any, case: Case, tolerance: float) -> Any:
     """(q, u, ud, udd) -> (q, [q, qd, qdd]): a sample from the last pose."""
-    rows = [*find_redundancy(system).kept, *range(system.joint_row_count, len(system.rows))]
+    system = case.system
     n, d = len(system.coordinates), len(system.mechanism.drivers)
     q, u, ud, udd, qd = (casadi.SX.sym(name, k) for name, k in (("q", n), ("u", d), ("ud", d), ("udd", d), ("qd", n)))
     phi = system.evaluate(casadi.vertsplit(q), casadi.vertsplit(u))
-    phi = casadi.vertcat(*(phi[k] / (system.rows[k].scale * system.size) for k in rows))
+    phi = casadi.vertcat(*(phi[k] / (system.rows[k].scale * system.size) for k in case.rows))
     jacobian, by_driver = casadi.jacobian(phi, q), casadi.jacobian(phi, u)
     where, rate = casadi.vertcat(q, u), casadi.vertcat(qd, ud)
     second = casadi.jtimes(casadi.jtimes(phi, where, rate), where, rate)

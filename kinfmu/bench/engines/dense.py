@@ -6,15 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.backends.python import load_model
 from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import GAP, Engine, Way
-from kinfmu.bench.setting import Setting, newton
+from kinfmu.bench.setting import ROUND_OFF, Setting, newton
 from kinfmu.equations.reference import Solution
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import PoseError
-from kinfmu.redundancy import find_redundancy
-from kinfmu.solver import Solver
 
 FLOOR = 1e-14  # residual relative to the size at which kinfmu.equations.reference stops
 MOST = 60  # iterations
@@ -24,26 +21,22 @@ class Dense(Engine):
     """Newton and the two linear solves with numpy on the rows kept, as `equations.reference` does."""
 
     name = "dense reference"
-    settings: Sequence[Setting] = newton()
+    settings: Sequence[Setting] = newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,))  # the slowest
     usual = Setting()
 
     def way(self, case: Case, setting: Setting) -> Way:
-        system = System(case.mechanism)
-        rows = list(find_redundancy(system).kept) + list(range(system.joint_row_count, len(system.rows)))
+        system, rows, q0 = case.system, case.rows, case.start_coordinates
         chosen = [system.coordinates.index(name) for name in case.columns]
-        q0 = start_of(case, system)
         gap = (GAP,) * (3 * len(chosen))
-        samples = [
-            (t, *map(np.array, driven)) for t, *driven in zip(case.t, case.u, case.ud, case.udd, strict=True)
-        ]
+        u, ud, udd = (np.array(table) for table in (case.u, case.ud, case.udd))  # (n, d) each
 
         def take(n: int) -> Motion:
             last, last_t = Solution(q0, 0.0 * q0, 0.0 * q0, 0), case.t[0]
             motion: list[Sequence[float]] = []
-            for t, u, ud, udd in samples[:n]:
+            for k, t in enumerate(case.t[:n]):
                 q = _predicted(last, t - last_t, setting.predictor)
                 try:
-                    last = solved(system, rows, q, u, ud, udd, setting)
+                    last = solved(system, rows, q, u[k], ud[k], udd[k], setting)
                 except (PoseError, np.linalg.LinAlgError):  # go on from the last pose
                     motion.append(gap)
                     continue
@@ -73,20 +66,13 @@ def solved(
             break
         if np.abs(residual).max() <= bound if setting.corrections is None else iteration == setting.corrections:
             jacobian = system.jacobian(q)[chosen]
-            qd = np.linalg.solve(jacobian, system.nu(q, u, ud)[chosen])
-            qdd = np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen])
+            qd = np.asarray(np.linalg.solve(jacobian, system.nu(q, u, ud)[chosen]), dtype=float)
+            qdd = np.asarray(np.linalg.solve(jacobian, system.gamma(q, qd, u, ud, udd)[chosen]), dtype=float)
             return Solution(q, qd, qdd, iteration)
         if jacobian is None or not setting.chord:
             jacobian = system.jacobian(q)[chosen]
         q = q + np.linalg.solve(jacobian, -residual)
     raise PoseError(f"Newton did not end: residual {np.abs(residual).max():.2g}")
-
-
-def start_of(case: Case, system: System) -> FloatArray:
-    """All coordinates at the first sample, (n,)."""
-    solver = Solver(load_model(case.plan))
-    found = dict(zip(case.columns, solver.outputs(solver.solve(solver.anchor, case.u[0])), strict=True))
-    return np.array([{**solver.model.FIXED, **found}[name] for name in system.coordinates])
 
 
 def _predicted(last: Solution, h: float, order: int) -> FloatArray:

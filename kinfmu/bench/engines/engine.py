@@ -36,7 +36,3 @@ class Engine(ABC):
 
         Raises MissingPackageError if its package is not installed.
         """
-
-    def columns(self, case: Case) -> Sequence[int]:
-        """The columns of a case that the engine gives; all as a rule."""
-        return range(len(case.columns))

@@ -8,7 +8,6 @@ from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import GAP, Engine, Way
 from kinfmu.bench.setting import Setting, newton
 from kinfmu.bench.stopping import model_with
-from kinfmu.solver import Solver
 
 
 class Generated(Engine):
@@ -20,8 +19,7 @@ class Generated(Engine):
 
     def way(self, case: Case, setting: Setting) -> Way:
         model = model_with(case.plan, setting)
-        exact = Solver(model_with(case.plan, Setting()))
-        start = exact.solve(exact.anchor, case.u[0])
+        start = case.start
         alone = len(case.u[0]) == 1
         rest = (0.0,) * len(start.z)
         still = (0.0,) * len(case.u[0])

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import chain
+from typing import Any
 
 from kinfmu.backends.python import load_model
 from kinfmu.bench.case import Case, Motion
@@ -15,12 +17,19 @@ from kinfmu.bench.engines.engine import GAP, Engine, Way
 from kinfmu.bench.setting import Setting
 from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Solver
 from kinfmu.solver.pose import evaluated
 
 DEFAULT = 1.49012e-8  # xtol of fsolve, if nothing is said
 FINEST = 1e-15
 UNREAD = "unread"  # a parameter that nothing depends on: models with parameters can tell their residuals
+
+
+@lru_cache(maxsize=1)
+def _telling(case: Case) -> Any:
+    """The generated model of a case, with a function that gives its residuals."""
+    mechanism = case.mechanism
+    telling = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
+    return load_model(compile_plan(telling, case.columns))
 
 
 class Fsolve(Engine):
@@ -33,11 +42,7 @@ class Fsolve(Engine):
     def way(self, case: Case, setting: Setting) -> Way:
         from scipy.optimize import fsolve
 
-        mechanism = case.mechanism
-        telling = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
-        model = load_model(compile_plan(telling, case.columns))
-        solver = Solver(model)
-        start = solver.solve(solver.anchor, case.u[0])
+        model = _telling(case)
         alone = len(case.u[0]) == 1
         gap = (GAP,) * (3 * len(case.columns))
         samples = list(zip(case.u, case.ud, case.udd, strict=True))
@@ -46,9 +51,9 @@ class Fsolve(Engine):
             return list(chain.from_iterable(model.residuals(evaluated(model, u, tuple(z))[-1])))
 
         def take(n: int) -> Motion:
-            z, rows = start.z, []
+            z, rows = case.start.z, []
             for u, ud, udd in samples[:n]:
-                found, _, success, _ = fsolve(closure, z, (u,), xtol=setting.tolerance, full_output=True)
+                found, *_ = fsolve(closure, z, (u,), xtol=setting.tolerance, full_output=True)
                 z = tuple(found.tolist())
                 try:
                     values = evaluated(model, u, z)[-1]

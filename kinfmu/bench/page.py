@@ -1,0 +1,164 @@
+"""What was measured as Markdown, and the places in a page that it goes to."""
+
+from __future__ import annotations
+
+import math
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from kinfmu import gallery
+from kinfmu.bench.accuracy import Measured
+from kinfmu.bench.engines import ENGINES
+from kinfmu.bench.setting import PREDICTORS
+from kinfmu.bench.singular import DISTANCES, Near
+from kinfmu.errors import KinfmuError
+
+PAGE, SETTINGS_PAGE = "accuracy.md", "accuracy-settings.md"
+PARTS = ("conditions", "engines", "singular points")
+TOLD = (1e-1, 1e-3, 1e-5, 1e-8)  # [rad], of DISTANCES
+
+
+def begin(name: str) -> str:
+    """The comment before a generated part of a page."""
+    return f"<!-- generated: {name} -->"
+
+
+def end(name: str) -> str:
+    """The comment behind a generated part of a page."""
+    return f"<!-- end: {name} -->"
+
+
+def check(folder: Path) -> None:
+    """Raise a KinfmuError if PAGE is in a folder without a place for each generated part."""
+    page = folder / PAGE
+    if page.exists():
+        filled(page.read_text(encoding="utf-8"), dict.fromkeys(PARTS, ""), page)
+
+
+def write(folder: Path, parts: Mapping[str, str], settings: str) -> tuple[Path, ...]:
+    """Fill the generated parts of PAGE in a folder, or make a page of them alone; write SETTINGS_PAGE beside it."""
+    page, other = folder / PAGE, folder / SETTINGS_PAGE
+    text = page.read_text(encoding="utf-8") if page.exists() else _bare()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        page.write_text(filled(text, parts, page), encoding="utf-8", newline="\n")
+        other.write_text(settings, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise KinfmuError(f"{error.filename}: cannot be written ({error.strerror})") from None
+    return page, other
+
+
+def filled(page: str, parts: Mapping[str, str], path: Path) -> str:
+    """The page with its generated parts written anew. Raises KinfmuError if a place for one is missing."""
+    for name, text in parts.items():
+        if page.count(begin(name)) != 1 or page.count(end(name)) != 1:
+            raise KinfmuError(f"{path}: must have {begin(name)} and {end(name)}, once each")
+        before, _, rest = page.partition(begin(name))
+        page = f"{before}{begin(name)}\n\n{text}\n\n{end(name)}{rest.partition(end(name))[2]}"
+    return page
+
+
+def _bare() -> str:
+    places = "\n\n".join(f"{begin(name)}\n{end(name)}" for name in PARTS)
+    return f"# Accuracy\n\n{places}\n"
+
+
+def conditions(rounds: int) -> str:
+    """A sentence on where and how times were taken."""
+    where = f"{_processor()}, Python {platform.python_version()}"
+    return f"Measured on {where}; processor time, median of {rounds} rounds in which all take their turn."
+
+
+def _processor() -> str:
+    """What the processor calls itself."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        told = ""
+    names = re.findall(r"^model name\s*: (.+)$", told, re.MULTILINE)
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def parts(measured: Sequence[Measured], near: Sequence[Near], rounds: int) -> dict[str, str]:
+    """The generated parts of PAGE by name."""
+    return dict(zip(PARTS, (conditions(rounds), engines_table(measured), singular_table(near)), strict=True))
+
+
+def engines_table(measured: Sequence[Measured]) -> str:
+    """Every engine in its usual setting, one column a mechanism: time and error."""
+    cases = list(dict.fromkeys(one.case for one in measured))
+    lines = [f"| | {' | '.join(_titled(case) for case in cases)} |", f"|---|{'---|' * len(cases)}"]
+    usual = {(one.engine, one.case): one for one in measured if one.is_usual}
+    for engine in ENGINES:
+        cells = [_cell(usual.get((engine.name, case))) for case in cases]
+        if any(cells):
+            lines.append(f"| {engine.name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _cell(one: Measured | None) -> str:
+    return f"{duration(one.microseconds.median)} us, {number(one.error)}" if one else ""
+
+
+def _titled(case: str) -> str:
+    return f"[`{case}`](../fmus/{case}/README.md)" if case in gallery.names() else case
+
+
+def settings_page(measured: Sequence[Measured], rounds: int) -> str:
+    """A page with every measurement."""
+    parts = [
+        "# Run time against error: every engine in every setting",
+        f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) says what it means. {conditions(rounds)} Errors are "
+        "the largest over the samples of a mechanism's reference.csv, relative to each column's largest magnitude.",
+    ]
+    for case in dict.fromkeys(one.case for one in measured):
+        lines = [
+            "| engine | predictor | Newton | stops at | us a sample | quartiles | q | qd | qdd |",
+            f"|{'---|' * 9}",
+        ]
+        lines += [f"| {' | '.join(_row(one))} |" for one in measured if one.case == case]
+        parts += [f"## {gallery.load(case).title}", "\n".join(lines)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _row(one: Measured) -> tuple[str, ...]:
+    of, setting = one.microseconds, one.setting
+    has_newton = one.engine != "pylinkage"
+    return (
+        f"**{one.engine}**" if one.is_usual else one.engine,
+        PREDICTORS[setting.predictor] if has_newton else "",
+        ("chord" if setting.chord else "full") if has_newton else "closed forms",
+        setting.stop if has_newton else "",
+        duration(of.median),
+        f"{duration(of.lower)} to {duration(of.upper)}",
+        *map(number, one.errors),
+    )
+
+
+def singular_table(near: Sequence[Near]) -> str:
+    """Error of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
+    told = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in TOLD]
+    heads = [*(f"{d:.0e}" for d in TOLD), "at it", f"{TOLD[-1]:.0e} beyond", f"{TOLD[0]:.0e} beyond", "us a sample"]
+    parts = []
+    for point in dict.fromkeys(one.point for one in near):
+        lines = [f"| {point} | {' | '.join(heads)} |", f"|{'---|' * (len(heads) + 1)}"]
+        for one in (one for one in near if one.point == point):
+            samples = [*(one.before[k] for k in told), one.at, one.beyond[told[-1]], one.beyond[told[0]]]
+            cells = [", ".join(number(float(error)) for error in sample) for sample in samples]
+            lines.append(f"| {one.engine} | {' | '.join(cells)} | {duration(one.microseconds.median)} |")
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
+
+
+def duration(microseconds: float) -> str:
+    """Three digits: '4.52', '45.2', '1610'."""
+    return f"{microseconds:.3g}" if microseconds < 1000.0 else f"{microseconds:.0f}"
+
+
+def number(error: float) -> str:
+    """'1e-15', '0', or a dash where there was no number."""
+    if math.isnan(error):
+        return "-"
+    return "0" if error == 0.0 else f"{error:.0e}"

@@ -1,0 +1,128 @@
+"""kinfmu bench: run time against error, and what a sample, a step, an import and long chains cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kinfmu import gallery
+from kinfmu.cli.group import main
+from kinfmu.cli.progress import Progress
+from kinfmu.errors import MissingPackageError, listed, suggestion
+
+MEASUREMENTS = ("accuracy", "sample", "step", "import", "chains")
+ALL = "all"
+
+
+class Named(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+    """One of a few names; a wrong one is told with what comes near."""
+
+    def __init__(self, name: str, what: str, known: Callable[[], list[str]]) -> None:
+        self.name = name
+        self.what = what
+        self.known = known
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        known = self.known()
+        if value in known:
+            return str(value)
+        message = f"'{value}' is not {self.what}{suggestion(str(value), known)}; known: {listed(known)}"
+        return self.fail(message, param, ctx)
+
+
+def _with_reference() -> list[str]:
+    """Mechanisms of the gallery that have a reference.csv."""
+    return [name for name in gallery.names() if (gallery.folder() / name / "reference.csv").is_file()]
+
+
+@main.command()
+@click.argument("what", nargs=-1, type=Named("WHAT", "a measurement", lambda: [*MEASUREMENTS, ALL]))
+@click.option(
+    "--mechanism",
+    "mechanisms",
+    multiple=True,
+    metavar="NAME",
+    type=Named("NAME", "a mechanism of the gallery with a reference", _with_reference),
+    help="For accuracy: a mechanism of the gallery; may be given again. Five if nothing is said.",
+)
+@click.option("--rounds", type=click.IntRange(1), help="Rounds in which all ways take their turn.")
+@click.option(
+    "-o",
+    "folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Where accuracy writes tables and charts: docs/ of a checkout or the current folder if nothing is said.",
+)
+def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
+    r"""Measure on this machine, side by side with other ways.
+
+    \b
+    accuracy  run time against error of every engine in every setting, and past singular points: the
+              tables of docs/accuracy.md, docs/accuracy-settings.md, and their charts
+    sample    a sample of solve beside a dense numpy Newton
+    step      a step of the FMU beside the smallest pythonfmu FMU
+    import    `import kinfmu` beside bare Python
+    chains    chains of up to a thousand loops
+    all       all of these
+
+    Accuracy if nothing is said.
+    """
+    wanted = MEASUREMENTS if ALL in what else what or MEASUREMENTS[:1]
+    if "accuracy" not in wanted and (mechanisms or folder is not None):
+        raise click.UsageError(f"{'--mechanism' if mechanisms else '-o'} is for accuracy, not for {listed(wanted)}")
+    given = {} if rounds is None else {"rounds": rounds}
+    for name in dict.fromkeys(wanted):
+        if name == "accuracy":
+            _accuracy(mechanisms, given, folder or _docs())
+        elif name == "sample":
+            from kinfmu.bench import solve_sample
+
+            click.echo(solve_sample.run(**given))
+        elif name == "step":
+            from kinfmu.bench import fmu_step
+
+            click.echo(fmu_step.run(gallery.load("fourbar"), **given))
+        elif name == "import":
+            from kinfmu.bench import import_time
+
+            click.echo(import_time.run(**given))
+        else:
+            from kinfmu.bench import chains
+
+            click.echo(chains.run(**given))
+
+
+def _docs() -> Path:
+    """docs/ of the checkout that this is run from, else the current folder."""
+    checkout = gallery.folder().parent / "docs"
+    return checkout if (checkout / "accuracy.md").is_file() else Path()
+
+
+def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) -> None:
+    """Measure, print the short tables, write all tables and charts."""
+    from kinfmu.bench import accuracy, page, pictures, singular
+
+    mechanisms = mechanisms or accuracy.MECHANISMS
+    rounds = given.get("rounds", accuracy.ROUNDS)
+    page.check(folder)
+    with Progress("measuring", 1) as show:
+        done, all_steps = count(1), accuracy.steps(mechanisms, rounds) + singular.steps()
+
+        def tell(_: str) -> None:
+            show(min(next(done), all_steps), all_steps)
+
+        measured, absent = accuracy.measure(mechanisms, rounds, tell)
+        near, absent_too = singular.measure(rounds, tell)
+    for line in dict.fromkeys((*absent, *absent_too)):
+        click.echo(f"left out: {line}", err=True)
+    parts = page.parts(measured, near, rounds)
+    click.echo("\n\n".join(parts.values()))
+    written = list(page.write(folder, parts, page.settings_page(measured, rounds)))
+    try:
+        written += [*pictures.draw_work_precision(folder, measured), *pictures.draw_singular(folder, near)]
+    except MissingPackageError as error:
+        click.echo(f"left out: {error}", err=True)
+    click.echo(f"\nwritten: {listed(map(str, written))}")

@@ -1,0 +1,52 @@
+"""Paper for charts: log-log axes in the house's look, and names that stand beside what they name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from kinfmu.draw.sheet import FONT, GREY, INK, ink
+from kinfmu.shapes.palette import Colour
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LIGHT: Colour = (228, 228, 228)
+SMALL = 8.0  # [pt]
+
+
+class Look(NamedTuple):
+    """How the curves of one engine are drawn."""
+
+    colour: Colour
+    width: float = 1.4  # [pt]
+    marker: str = "o"
+
+
+def dress(axes: Axes, title: str) -> None:
+    """Grey scales, a faint grid of decades, no frame."""
+    grey = ink(GREY)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_linewidth(0.6)
+        spine.set_color(grey)
+    axes.tick_params(labelsize=SMALL, length=3.0, width=0.6, color=grey, labelcolor=grey)
+    axes.tick_params(which="minor", length=0.0)
+    axes.grid(visible=True, which="major", linewidth=0.5, color=ink(LIGHT))
+    axes.set_axisbelow(True)
+    axes.set_title(title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+
+
+def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **where: Any) -> None:
+    """A name beside its curve, in its colour, on a bit of paper."""
+    axes.annotate(
+        text,
+        at,
+        xytext=where.pop("offset", (0.0, 0.0)),
+        textcoords="offset points",
+        color=ink(colour),
+        fontsize=SMALL,
+        parse_math=False,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
+        zorder=10.0,
+        **where,
+    )

@@ -1,0 +1,197 @@
+"""kinfmu bench: what is measured, where it is written, and what is told when something is missing or wrong."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from kinfmu.bench import accuracy, case, chains, singular
+from kinfmu.bench.engines import ENGINES, Shipped
+from kinfmu.bench.page import PAGE, SETTINGS_PAGE
+from kinfmu.bench.singular_points import POINTS
+from tests.cli.conftest import Command
+
+QUICK = ["kinfmu", "generated Python", "scipy fsolve"]
+PICTURES = [f"accuracy-{name}.{kind}" for name in ("singular", "work-precision") for kind in ("png", "svg")]
+
+
+@pytest.fixture(scope="module")
+def measured() -> tuple[accuracy.Result, tuple[tuple[singular.Near, ...], tuple[str, ...]]]:
+    """What is measured on one mechanism in one round by the quick engines."""
+    engines = [engine for engine in ENGINES if engine.name != "dense reference"]
+    with pytest.MonkeyPatch.context() as patch:
+        for package in ("casadi", "pylinkage"):
+            patch.setitem(sys.modules, package, None)
+        return accuracy.measure(["slider_crank"], 1, engines=engines), singular.measure(1, engines=engines)
+
+
+@pytest.fixture
+def once(measured: tuple[object, object], monkeypatch: pytest.MonkeyPatch) -> None:
+    """`kinfmu bench accuracy` takes what was measured before."""
+    monkeypatch.setattr(accuracy, "measure", lambda *_: measured[0])
+    monkeypatch.setattr(singular, "measure", lambda *_: measured[1])
+
+
+@pytest.fixture(autouse=True)
+def only_what_comes_with_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CasADi and pylinkage count as not installed, whether they are or not."""
+    for package in ("casadi", "pylinkage"):
+        monkeypatch.setitem(sys.modules, package, None)
+
+
+def quick(command: Command, *more: object) -> tuple[str, str]:
+    """Output and messages of one round on one mechanism."""
+    result = command("bench", "accuracy", "--mechanism", "slider_crank", "--rounds", 1, *more)
+    assert result.exit_code == 0
+    return result.stdout, result.stderr
+
+
+def rows_of(table: str) -> dict[str, list[str]]:
+    """Cells of a Markdown table by the first one of their line."""
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if line[:1] == "|"]
+    return {cells[0]: cells[1:] for cells in lines}
+
+
+def test_tables_and_charts_are_written_where_it_is_said(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(case, "STEPS_BETWEEN", 1)
+    monkeypatch.setattr(singular, "POINTS", POINTS[:1])
+    stdout, stderr = quick(command, "-o", "there")
+    files = sorted(path.name for path in (tmp_path / "there").iterdir())
+    assert files == sorted([PAGE, SETTINGS_PAGE, *PICTURES])
+    *_, told = stdout.splitlines()
+    assert told.startswith("written: ")
+    assert set(re.findall(r"there/([\w.-]+)", told)) == set(files)
+    assert stderr.splitlines() == [
+        "left out: CasADi is not installed: pip install 'kinfmu[bench]'",
+    ]
+    page = (tmp_path / "there" / PAGE).read_text(encoding="utf-8")
+    for part in ("engines", "singular points", "conditions"):
+        (text,) = re.findall(f"<!-- generated: {part} -->\n\n(.*?)\n\n<!-- end: {part} -->", page, re.DOTALL)
+        assert text in stdout
+    assert "| dense reference |" in page
+
+
+@pytest.mark.usefixtures("once")
+def test_the_tables_hold_every_engine_with_a_time_and_a_small_error(command: Command, tmp_path: Path) -> None:
+    quick(command, "-o", tmp_path)
+    page = (tmp_path / PAGE).read_text(encoding="utf-8")
+    engines = rows_of(page.split("<!-- generated: engines -->")[1].split("<!-- end")[0])
+    assert list(engines)[2:] == QUICK
+    for engine in list(engines)[2:]:
+        (cell,) = engines[engine]
+        microseconds, error = map(float, re.fullmatch(r"([\d.]+) us, ([\de.-]+)", cell).groups())  # type: ignore[union-attr]
+        assert microseconds > 0.1
+        assert error <= 1e-6
+    settings = (tmp_path / SETTINGS_PAGE).read_text(encoding="utf-8")
+    lines = [line for line in settings.splitlines() if line.startswith("| ")][1:]
+    assert len(lines) > 40
+    assert all(len(line.strip("|").split("|")) == 9 for line in lines)
+    for point in POINTS:
+        assert f"| {point.title} |" in page
+
+
+@pytest.mark.usefixtures("once")
+def test_a_page_of_ones_own_keeps_what_stands_between_its_tables(command: Command, tmp_path: Path) -> None:
+    marks = "\n".join(
+        f"word {name}\n<!-- generated: {name} -->old<!-- end: {name} -->"
+        for name in ("singular points", "engines", "conditions")
+    )
+    (tmp_path / PAGE).write_text(marks, encoding="utf-8")
+    quick(command)
+    page = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "old" not in page
+    assert re.findall(r"^word .*$", page, re.MULTILINE) == ["word singular points", "word engines", "word conditions"]
+
+
+def test_a_page_without_a_place_for_a_table_is_refused(fails: Callable[..., str], tmp_path: Path) -> None:
+    (tmp_path / PAGE).write_text("<!-- generated: conditions --><!-- end: conditions -->", encoding="utf-8")
+    told = fails("bench", "accuracy", "-o", ".")
+    assert told == "accuracy.md: must have <!-- generated: engines --> and <!-- end: engines -->, once each"
+
+
+@pytest.mark.usefixtures("once")
+def test_without_matplotlib_the_tables_are_written_and_it_is_told(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    _, stderr = quick(command)
+    assert "drawing needs matplotlib: pip install 'kinfmu[figures]'" in stderr.splitlines()[-1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([PAGE, SETTINGS_PAGE])
+
+
+@pytest.mark.usefixtures("once")
+def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: Path) -> None:
+    quick(command)
+    chart = (tmp_path / "accuracy-work-precision.svg").read_text(encoding="utf-8")
+    near = (tmp_path / "accuracy-singular.svg").read_text(encoding="utf-8")
+    for engine in QUICK:
+        assert f">{engine}<" in chart
+        assert f">{engine}<" in near
+    assert ">slider crank: 1 unknown<" in chart
+    assert f">{POINTS[0].title}: q<" in near
+    assert (tmp_path / "accuracy-singular.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ("accurcy",),
+            "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
+            "known: accuracy, sample, step, import, chains, all",
+        ),
+        (
+            ("--mechanism", "slidercrank"),
+            "Invalid value for '--mechanism': 'slidercrank' is not a mechanism of the gallery with a reference; "
+            "did you mean 'slider_crank'?; known: cam_roller,",
+        ),
+        (("--rounds", "0"), "Invalid value for '--rounds': 0 is not in the range x>=1."),
+        (("sample", "--mechanism", "fourbar"), "--mechanism is for accuracy, not for sample"),
+        (("step", "import", "-o", "there"), "-o is for accuracy, not for step, import"),
+    ],
+)
+def test_wrong_words_are_refused_with_what_would_be_right(
+    arguments: tuple[str, ...], told: str, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    assert refuses("bench", *arguments).startswith(told)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("what", "lines"),
+    [
+        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve"]),
+        ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
+        ("import", ["pass", "import kinfmu", "difference"]),
+    ],
+)
+def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list[str], command: Command) -> None:
+    result = command("bench", what, "--rounds", 2)
+    assert result.exit_code == 0
+    head, *rows = result.stdout.splitlines()
+    assert head
+    assert len(rows) >= len(lines)
+    for line, name in zip(rows[-len(lines) :], lines, strict=True):
+        assert line.startswith(name)
+        assert re.search(r"\d+\.\d", line)
+
+
+def test_chains_tell_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chains, "LOOPS", (1, 2, 3, 4))
+    stdout = command("bench", "chains", "--rounds", 2).stdout
+    assert [line.split()[0] for line in stdout.splitlines()[2:6]] == ["1", "2", "3", "4"]
+    assert re.search(r"exponent from 2 to 4 loops, round by round: -?\d+\.\d{3} \(", stdout)
+
+
+@pytest.mark.usefixtures("once")
+def test_the_engine_that_is_shipped_comes_first(command: Command, tmp_path: Path) -> None:
+    quick(command)
+    table = (tmp_path / SETTINGS_PAGE).read_text(encoding="utf-8")
+    first = next(line for line in table.splitlines() if line.startswith("| **"))
+    assert first.startswith(f"| **{Shipped().name}** | velocity and acceleration | full | round-off |")
