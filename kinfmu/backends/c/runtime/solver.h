@@ -38,10 +38,10 @@ typedef enum {
 
 /* A pose that was found. If it is not good, nothing but its status says anything.
  *
- * x1, x2: derivatives of the coordinates with respect to the single driver, if has_tangent; low, high: the stretch around
- * the pose that is free of windows of bridges; road: what is known of singular points, -1: nothing; bridge: the one that
- * the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on by: the next way starts from its
- * base, the last regular pose before it, to which road, low and high then belong.
+ * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low, high:
+ * the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1: nothing;
+ * bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on by: the next
+ * way starts from its base, the last regular pose before it, to which road, low and high then belong.
  */
 typedef struct {
     kf_found found;
@@ -51,8 +51,9 @@ typedef struct {
     double base_u[KF_DRIVERS];
     double base_z[KF_ROOM(KF_UNKNOWNS)];
     kf_status status;
+    int derivatives;
     int road, bridge, base_bridge;
-    bool has_tangent, has_base;
+    bool has_base;
 } kf_pose;
 
 #define KF_POSE_U(pose) ((pose)->found.x + KF_COORDINATES - KF_DRIVERS) /* its driver values */
@@ -77,24 +78,35 @@ typedef struct {
     double u[KF_NODES]; /* of the nodes, moved; the window is between the third and the fourth */
 } kf_bridge;
 
-/* What is known of the singular points on the way of a single driver: see kinfmu/solver/road.py. */
-#define KF_KEPT 8
+/* A stretch where no zero of a block's determinant is to be sought (again). */
 typedef struct {
-    int bridges, places;
+    double low, high;
+    int block;
+} kf_searched;
+
+/* What is known of the singular points on the way of a single driver: see kinfmu/solver/road.py. */
+#define KF_KEPT 32 /* of each kind, the latest */
+typedef struct {
+    int bridges, stretches;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
-    double blocked[KF_KEPT][2];
+    kf_searched searched[KF_KEPT];
 } kf_road;
 
-/* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new. */
-#define KF_ROADS 4
+/* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
+ * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
+ * not bridged.
+ */
+#define KF_ROADS (KF_DRIVERS == 1 ? 4 : 1)
 #define KF_BRIDGES (KF_DRIVERS == 1 ? 3 * KF_KEPT + 1 : 1)
+#define KF_SPANS (KF_DRIVERS == 1 ? KF_KEPT + 8 : 1)
 
 /* What does not outlive a call. */
 typedef struct {
-    kf_pose way[5], walk[2], near[2], node, moved;
+    kf_pose base, way[4], walk[2], beside, located;
     kf_model ahead;
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
-    int live[3];
+    double determinants[2][KF_ROOM(KF_BLOCKS)]; /* of the nodes next to a zero */
+    int live[3]; /* roads that are needed */
 } kf_scratch;
 
 /* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor: where
@@ -108,7 +120,7 @@ typedef struct {
     char message[KF_MESSAGE];
     kf_road roads[KF_ROADS];
     kf_bridge bridges[KF_BRIDGES];
-    kf_span spans[KF_BRIDGES];
+    kf_span spans[KF_SPANS];
     kf_scratch scratch;
 } kf_solver;
 
@@ -122,10 +134,11 @@ void kf_solver_start(kf_solver *solver);
  */
 bool kf_solver_bind(kf_solver *solver, const double *parameters);
 
-/* The pose at driver values u (KF_DRIVERS), followed from the good pose `start` in a straight line of the driver values;
- * `start` stays as it is. The status is that of the pose; if it is not good, the solver's message says why, in one line.
+/* The pose at driver values u (KF_DRIVERS), followed from the good pose `start`, another one, in a straight line of the
+ * driver values. The start stays what it is; derivatives that it has not been asked for yet are added to it. The status is
+ * that of the pose; if it is not good, the solver's message says why, in one line.
  */
-kf_status kf_solve(kf_solver *solver, const kf_pose *start, const double *u, kf_pose *pose);
+kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 
 /* Outputs, their rates and accelerations (KF_OUTPUTS each) at driver speeds ud and accelerations udd (KF_DRIVERS each);
  * NULL: not wanted, and nothing is computed for it (ud and udd may be NULL where nothing needs them).
