@@ -1,0 +1,66 @@
+"""The stress suite at length: `python -m tests.stress`, or scripts/stress."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import sys
+import time
+
+from kinfmu.mechanism.toml_file import text
+from tests.stress.families import FAMILIES
+from tests.stress.report import Report, details
+from tests.stress.trial import judged, trial
+
+CHUNK = 10  # trials handed to a process at a time
+TOLD = 5.0  # [s] between two lines about the progress
+
+
+def main() -> int:
+    """Try random mechanisms and print what is found; 1 if anything is wrong."""
+    parser = argparse.ArgumentParser(
+        prog="scripts/stress",
+        description="Random mechanisms over random steps, against closed forms of 50 digits: each number is a mechanism.",
+        epilog=f"Families: {', '.join(FAMILIES)}.",
+    )
+    parser.add_argument("--count", type=int, help="mechanisms; 10000, or 1 with --seed alone, which shows every sample")
+    parser.add_argument("--seed", type=int, help="of the first mechanism, the others count on from it; 0")
+    parser.add_argument("--family", choices=list(FAMILIES), metavar="NAME", help="one family alone")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
+    given = parser.parse_args()
+    if given.count is None:
+        given.count = 10_000 if given.seed is None else 1
+    first = given.seed or 0
+    if given.count == 1:
+        return _one(first, given.family)
+    return _many(range(first, first + given.count), given.family, given.jobs)
+
+
+def _one(seed: int, family: str | None) -> int:
+    one = trial(seed, family)
+    verdict = one.judged()
+    print(text(one.drawn.mechanism))
+    print("\n".join(details(verdict, one.inputs[0].tolist())))
+    return 1 if verdict.faults else 0
+
+
+def _many(seeds: range, family: str | None, jobs: int) -> int:
+    begun = told = time.monotonic()
+    report = Report()
+    tasks = [(seed, family) for seed in seeds]
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        for done, verdict in enumerate(pool.imap(judged, tasks, CHUNK), start=1):
+            report.take(verdict)
+            if time.monotonic() - told > TOLD:
+                told = time.monotonic()
+                print(f"{done} of {len(tasks)}, {told - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
+    command = "scripts/stress" + (f" --family '{family}'" if family else "")
+    print("\n".join(report.lines(command)))
+    print(f"\n{len(tasks)} mechanisms in {time.monotonic() - begun:.0f} s on {jobs} processes", end="; ")
+    print("nothing is wrong" if report.is_right else f"{report.faulty.total()} are at fault")
+    return 0 if report.is_right else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

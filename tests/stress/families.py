@@ -1,0 +1,530 @@
+"""Families of random mechanisms: each draws a sketch, from a random generator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from random import Random
+
+from kinfmu import (
+    AngleDriver,
+    ConstantSpeed,
+    Distance,
+    DistanceDriver,
+    Gear,
+    PointOnLine,
+    SlideDriver,
+    Translational,
+)
+from kinfmu.drivers import Driver
+from kinfmu.joints import Joint
+from tests.stress.drawn import Frame, Pose, Sketch, framed, standing, world
+from tests.stress.jets import Exact, Jet, Numbers, Vector, turned
+from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_slide
+
+ENDS = (0.0, math.pi)  # of an arm: stretched toward its pivot and away from it
+KINDS = ("double crank", "crank-rocker", "double rocker", "rocker-crank", "triple rocker")
+O: tuple[Exact, Exact] = (0, 0)
+Poses = Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
+
+
+class RedrawError(Exception):
+    """What was drawn is no mechanism of its family."""
+
+
+class Draw(Random):
+    """A random generator, and the parts of a unit that it draws lengths in."""
+
+    parts = 1000  # decimals, of which most are no doubles; 1024: exact as doubles, sums with whole numbers too
+
+
+def drawn_length(rng: Draw, low: float, high: float) -> Fraction:
+    """A length in thousandths, or whatever parts are drawn in."""
+    return Fraction(rng.randint(math.ceil(rng.parts * low), math.floor(rng.parts * high)), rng.parts)
+
+
+def _place(rng: Draw, reach: float) -> tuple[Fraction, Fraction]:
+    return drawn_length(rng, -reach, reach), drawn_length(rng, -reach, reach)
+
+
+def _side(rng: Draw) -> int:
+    return rng.choice((1, -1))
+
+
+def _turns(body: str) -> Callable[[Frame, Sequence[float]], tuple[Driver, ...]]:
+    return lambda _, start: (AngleDriver("drive", body, ConstantSpeed(start[0], 1.0)),)
+
+
+# ---------------------------------------------------------------------------------------------------- four-bars
+
+
+def grashof(rng: Draw, kind: str) -> tuple[Fraction, ...]:
+    """Ground, crank, coupler and rocker of one of Grashof's kinds."""
+    while True:
+        shortest, second, third = sorted(drawn_length(rng, 0.3, 3.0) for _ in range(3))
+        edge = second + third - shortest  # of the longest: beyond it the linkage is not Grashof's any more
+        is_triple = kind == "triple rocker"
+        low, high = (max(third, edge), edge + 2 * shortest) if is_triple else (third, edge)
+        if high - low < Fraction(1, 100) or len({shortest, second, third}) < 3:
+            continue
+        longest = low + (high - low) * Fraction(rng.randint(20, 980), 1000)
+        others = [second, third, Fraction(round(longest * rng.parts), rng.parts)]
+        rng.shuffle(others)
+        place = rng.randrange(4) if is_triple else KINDS.index(kind)
+        return (*others[:place], shortest, *others[place:])
+
+
+def changing(rng: Draw) -> tuple[Fraction, ...]:
+    """Ground, crank, coupler and rocker of a four-bar with change points: shortest + longest = the other two."""
+    shape = rng.choice(("parallelogram", "rhombus", "kite", "any", "any"))
+    a, b = drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.3, 2.0)
+    if shape == "rhombus":
+        return a, a, a, a
+    if a == b:
+        raise RedrawError
+    if shape == "parallelogram":
+        return a, b, a, b
+    if shape == "kite":
+        return rng.choice(((a, a, b, b), (a, b, b, a)))
+    middle = a + b + drawn_length(rng, 0.0, 1.0)
+    bars = [a, b, middle, a + b - middle if rng.random() < 0.5 else middle + abs(a - b)]
+    if min(bars) <= Fraction(1, 20):
+        bars = [a, middle, b, a + middle - b]  # a + middle = b + last
+    if min(bars) <= Fraction(1, 20) or not _changes(bars):
+        raise RedrawError
+    rng.shuffle(bars)
+    return tuple(bars)
+
+
+def _changes(bars: Sequence[Fraction]) -> bool:
+    return 2 * (min(bars) + max(bars)) == sum(bars)
+
+
+def fourbar(bars: Sequence[Fraction], driven: str, side: int, frame: tuple[Exact, Exact] = O) -> Sketch:
+    """A four-bar between (0, 0) and (ground, 0), driven at one of its three bars; frame: of the coupler's pin P."""
+    g, a, b, c = bars
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        if driven == "crank":
+            way = on_arm(closing, (g, a, b, c), side, u[0])
+            crank, coupler, rocker = u[0], way.first.heading(), way.second.heading()
+            p = turned(u[0], numbers.number(a))
+        elif driven == "coupler":
+            way = on_arm(closing, (g, b, a, c), side, u[0])
+            crank, coupler, rocker = way.first.heading(), u[0], way.second.heading()
+            p = way.first
+        else:  # the rocker's own way is that of an arm half a turn on
+            way = on_arm(closing, (g, c, a, b), side, u[0] + numbers.pi)
+            crank, coupler, rocker = way.first.heading(), (-way.second.x, -way.second.y), u[0]
+            coupler = Vector(*coupler).heading()
+            p = way.first
+        zero = u[0] * numbers.number(0)
+        return {
+            "crank": Pose(Vector(0, 0), crank),
+            "coupler": framed(numbers, p, coupler, frame),
+            "rocker": Pose(Vector(zero + numbers.number(g), zero), rocker),
+        }
+
+    points = {
+        "ground": {"O": O, "C": (g, 0)},
+        "crank": {"O": O, "P": (a, 0)},
+        "coupler": {"P": frame, "Q": (frame[0] + b, frame[1])},
+        "rocker": {"C": O, "Q": (c, 0)},
+    }
+    return Sketch(points, poses, _turns(driven), marks=ENDS)
+
+
+def _driven(rng: Draw) -> str:
+    return rng.choice(("crank", "crank", "coupler", "rocker"))
+
+
+def _shifted(rng: Draw) -> tuple[Exact, Exact]:
+    return O if rng.random() < 0.5 else _place(rng, 1.0)
+
+
+def four_bars(rng: Draw) -> Sketch:
+    return fourbar(grashof(rng, rng.choice(KINDS)), _driven(rng), _side(rng), _shifted(rng))
+
+
+def change_points(rng: Draw) -> Sketch:
+    return fourbar(changing(rng), _driven(rng), _side(rng), _shifted(rng))
+
+
+def near_change_points(rng: Draw) -> Sketch:
+    bars = list(changing(rng))
+    bars[rng.randrange(4)] += _gap(rng)
+    return fourbar(bars, _driven(rng), _side(rng))
+
+
+def _gap(rng: Draw) -> Fraction:
+    """A small difference, 1e-11 to 1e-2, either way; where lengths are exact as doubles, so is this."""
+    if rng.parts != 1000:
+        return Fraction(_side(rng), 2 ** rng.randint(8, 28))
+    return Fraction(_side(rng) * rng.randint(1, 9), 10 ** rng.randint(3, 11))
+
+
+# ------------------------------------------------------------------------------------------------- slider-cranks
+
+
+def slider_crank(
+    lengths: tuple[Fraction, Fraction, Fraction], driven: str, side: int, *, has_block: bool = True
+) -> Sketch:
+    """A crank about (0, 0) and a rod whose end stays on y = offset, in a block or as a pin in a slot."""
+    a, b, offset = lengths
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        if driven == "crank":
+            rod = on_level(closing, a, b, offset, side, u[0])
+            crank = turned(u[0], numbers.number(a))
+            angles = u[0], rod.heading()
+        elif driven == "rod":
+            crank = on_level(closing, b, a, offset, side, u[0])
+            rod = turned(u[0], numbers.number(b))
+            angles = crank.heading(), u[0]
+        else:
+            way = on_slide(closing, a, b, offset, side, u[0])
+            crank, rod = way.first, way.second.times(-1)
+            angles = crank.heading(), rod.heading()
+        moving = {"crank": Pose(Vector(0, 0), angles[0]), "rod": Pose(crank, angles[1])}
+        if has_block:
+            end = crank + rod
+            zero = u[0] * numbers.number(0)
+            moving["block"] = Pose(Vector(end.x, zero + numbers.number(offset)), zero)
+        return moving
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        if has_block:
+            return (Translational("slide", ("ground.way", "block.S"), frame.angle, frame.angle),)
+        return (PointOnLine("slot", ("ground.way", "rod.S"), frame.angle),)
+
+    def drivers(frame: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        law = ConstantSpeed(start[0], 1.0)
+        if driven == "slide":
+            return (SlideDriver("drive", ("ground.way", "block.S" if has_block else "rod.S"), frame.angle, law),)
+        return (AngleDriver("drive", driven, law),)
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": O, "way": (0, offset)},
+        "crank": {"O": O, "P": (a, 0)},
+        "rod": {"P": O, "S": (b, 0)},
+    }
+    if has_block:
+        points["block"] = {"S": O}
+    if driven == "slide":
+        far = float(a + b)
+        return Sketch(points, poses, drivers, joints, ("length",), (0.0,), reach=(-far, far))
+    return Sketch(points, poses, drivers, joints, marks=(-0.5 * math.pi, 0.5 * math.pi))
+
+
+def slider_cranks(rng: Draw) -> Sketch:
+    lengths = drawn_length(rng, 0.2, 2.0), drawn_length(rng, 0.5, 4.0), drawn_length(rng, -1.5, 1.5)
+    driven = rng.choice(("crank", "crank", "rod", "slide"))
+    if lengths[0] == lengths[1] and driven == "slide":
+        raise RedrawError
+    return slider_crank(lengths, driven, _side(rng), has_block=rng.random() < 0.6)
+
+
+def crank_and_rod(rng: Draw) -> Sketch:
+    """Slider-cranks with change points, or close to them: crank = rod in line, or as much apart as the offset."""
+    a = drawn_length(rng, 0.3, 2.0)
+    offset = Fraction(0) if rng.random() < 0.5 else _side(rng) * drawn_length(rng, 0.1, 1.0)
+    b = a + abs(offset)
+    driven = rng.choice(("crank", "rod", "slide")) if offset else "crank"
+    if driven == "rod":
+        a, b = b, a
+    if rng.random() < 0.3:
+        b += _gap(rng)
+    return slider_crank((a, b, offset), driven, _side(rng), has_block=rng.random() < 0.6)
+
+
+def pins_in_slots(rng: Draw) -> Sketch:
+    """Inverted slider-cranks: the crank's pin in a slot of a lever, at times with change points."""
+    g, a, e = drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.0, 0.8)
+    chance = rng.random()
+    if chance < 0.2:
+        e = abs(g - a)
+    elif chance < 0.3:
+        e = abs(g - a) + _gap(rng)
+    elif chance < 0.4:
+        g, e = a, Fraction(0)
+    elif chance < 0.6:
+        e = Fraction(0)
+    if e == 0 and g == a and chance >= 0.4:
+        raise RedrawError
+    side, has_block = _side(rng), rng.random() < 0.5
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        lever = in_slot(closing, g, a, e, side, u[0]).heading()
+        zero = u[0] * numbers.number(0)
+        moving = {
+            "crank": Pose(Vector(0, 0), u[0]),
+            "lever": Pose(Vector(zero + numbers.number(g), zero), lever),
+        }
+        if has_block:
+            moving["block"] = Pose(turned(u[0], numbers.number(a)), lever)
+        return moving
+
+    def joints(_: Frame) -> tuple[Joint, ...]:
+        if has_block:
+            return (Translational("slide", ("lever.slot", "block.P")),)
+        return (PointOnLine("slot", ("lever.slot", "crank.P")),)
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": O, "C": (g, 0)},
+        "crank": {"O": O, "P": (a, 0)},
+        "lever": {"C": O, "slot": (0, e)},
+    }
+    if has_block:
+        points["block"] = {"P": O}
+    return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
+
+
+# ----------------------------------------------------------------------------------------------------- six-bars
+
+
+def _any_bars(rng: Draw) -> tuple[Fraction, ...]:
+    return changing(rng) if rng.random() < 0.25 else grashof(rng, rng.choice(KINDS))
+
+
+def watt_six_bars(rng: Draw) -> Sketch:
+    """Watt I: a four-bar with two more bars, from a third pin of its coupler and of its rocker."""
+    bars, side = _any_bars(rng), _side(rng)
+    r, s, t = _place(rng, 2.0), _place(rng, 2.0), (drawn_length(rng, 0.5, 4.0), drawn_length(rng, 0.5, 4.0))
+    base, second = fourbar(bars, "crank", side), _side(rng)
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = base.poses(numbers, u, closing)
+        at_r, at_s = world(numbers, moving["coupler"], r), world(numbers, moving["rocker"], s)
+        way = between(closing, at_r, (numbers.number(t[0]), numbers.number(t[1])), at_s, second)
+        return {**moving, "left": Pose(at_r, way.first.heading()), "right": Pose(at_s, way.second.heading())}
+
+    points = {body: dict(given) for body, given in base.points.items()}
+    points["coupler"]["R"], points["rocker"]["S"] = r, s
+    points["left"] = {"R": O, "T": (t[0], 0)}
+    points["right"] = {"S": O, "T": (t[1], 0)}
+    return Sketch(points, poses, _turns("crank"), marks=ENDS)
+
+
+def stephenson_six_bars(rng: Draw) -> Sketch:
+    """Stephenson III: a four-bar with a link from a third pin of its coupler to an output on a third ground pivot."""
+    bars, side = _any_bars(rng), _side(rng)
+    r, d, t = _place(rng, 2.0), _place(rng, 3.0), (drawn_length(rng, 0.5, 4.0), drawn_length(rng, 0.5, 4.0))
+    base, second = fourbar(bars, "crank", side), _side(rng)
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = base.poses(numbers, u, closing)
+        at_d, at_r = standing(numbers, *d, u[0]), world(numbers, moving["coupler"], r)
+        way = between(closing, at_r, (numbers.number(t[0]), numbers.number(t[1])), at_d, second)
+        return {**moving, "link": Pose(at_r, way.first.heading()), "output": Pose(at_d, way.second.heading())}
+
+    points = {body: dict(given) for body, given in base.points.items()}
+    points["ground"]["D"], points["coupler"]["R"] = d, r
+    points["link"] = {"R": O, "T": (t[0], 0)}
+    points["output"] = {"D": O, "T": (t[1], 0)}
+    return Sketch(points, poses, _turns("crank"), marks=ENDS)
+
+
+# ------------------------------------------------------------------------------------------------- several loops
+
+
+def chains(rng: Draw) -> Sketch:
+    """Two to five four-bars in a row: the rocker of each is the crank of the next, parallelograms first."""
+    count = rng.randint(2, 5)
+    parallel = rng.choice((0, 0, 1, count - 1, count))
+    stages: list[tuple[tuple[Fraction, ...], int]] = []
+    for k in range(count):
+        if k < parallel:
+            g, a = drawn_length(rng, 0.5, 2.0), drawn_length(rng, 0.5, 2.0)
+            stages.append(((g, a, g, a), 0))
+        elif k == parallel == count - 1:
+            stages.append((_any_bars(rng), _side(rng)))
+        else:
+            stages.append((grashof(rng, rng.choice(("double crank", "crank-rocker"))), _side(rng)))
+    if all(bars[0] == bars[1] for bars, _ in stages):
+        raise RedrawError
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        theta, x = u[0], Fraction(0)
+        moving = {"crank": Pose(Vector(0, 0), theta)}
+        for k, ((g, a, b, c), side) in enumerate(stages):
+            p = turned(theta, numbers.number(a)) + standing(numbers, x, 0, theta)
+            if side:
+                way = on_arm(closing, (g, a, b, c), side, theta)
+                coupler, theta = way.first.heading(), way.second.heading()
+            else:  # a parallelogram that stays one
+                closing.sines.append(theta.sin_cos()[0].d0)
+                coupler = theta * numbers.number(0)
+            x += g
+            moving[f"coupler{k}"] = Pose(p, coupler)
+            moving[f"rocker{k}"] = Pose(standing(numbers, x, 0, theta), theta)
+        return moving
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {"O": O}, "crank": {"O": O}}
+    x, last = Fraction(0), "crank"
+    for k, ((g, a, b, c), _) in enumerate(stages):
+        x += g
+        points["ground"][f"C{k}"] = (x, 0)
+        points[last][f"P{k}"] = (a, 0)
+        points[f"coupler{k}"] = {f"P{k}": O, f"Q{k}": (b, 0)}
+        points[f"rocker{k}"] = {f"C{k}": O, f"Q{k}": (c, 0)}
+        last = f"rocker{k}"
+    return Sketch(points, poses, _turns("crank"), marks=ENDS)
+
+
+def geared_five_bars(rng: Draw) -> Sketch:
+    """Two cranks geared together, and two bars between their ends."""
+    ratio = Fraction(rng.choice((-3, -2, -1, 1, 2, 3)), rng.choice((1, 1, 2)))
+    offset = drawn_length(rng, -3.0, 3.0)
+    g, a, b, c, e = (drawn_length(rng, 0.3, 2.0) for _ in range(5))
+    side = _side(rng)
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        other = u[0] * numbers.number(ratio) + numbers.number(offset)
+        at_c = standing(numbers, g, 0, u[0])
+        p, q = turned(u[0], numbers.number(a)), at_c + turned(other, numbers.number(e))
+        way = between(closing, p, (numbers.number(b), numbers.number(c)), q, side)
+        return {
+            "crank": Pose(Vector(0, 0), u[0]),
+            "gear": Pose(at_c, other),
+            "left": Pose(p, way.first.heading()),
+            "right": Pose(q, way.second.heading()),
+        }
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        turn = frame.angle * (1.0 - float(ratio)) + float(offset)
+        return (Gear("gears", ("crank", "gear"), float(ratio), offset=turn),)
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": O, "C": (g, 0)},
+        "crank": {"O": O, "P": (a, 0)},
+        "gear": {"C": O, "Q": (e, 0)},
+        "left": {"P": O, "T": (b, 0)},
+        "right": {"Q": O, "T": (c, 0)},
+    }
+    return Sketch(points, poses, _turns("crank"), joints)
+
+
+def redundant_parallelograms(rng: Draw) -> Sketch:
+    """Parallel cranks with a third bar, as a distance or as a body, that adds nothing; on one line or beside it."""
+    g, a = drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.3, 2.0)
+    third = (drawn_length(rng, -2.0, 3.0), Fraction(0) if rng.random() < 0.6 else drawn_length(rng, -1.0, 1.0))
+    if third[0] in (0, g):
+        raise RedrawError
+    is_body = rng.random() < 0.5
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        closing.sines.append(u[0].sin_cos()[0].d0)
+        moving = {
+            "crank": Pose(Vector(0, 0), u[0]),
+            "coupler": Pose(turned(u[0], numbers.number(a)), u[0] * numbers.number(0)),
+            "rocker": Pose(standing(numbers, g, 0, u[0]), u[0]),
+        }
+        if is_body:
+            moving["bar"] = Pose(standing(numbers, *third, u[0]), u[0])
+        return moving
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        return () if is_body else (Distance("AB", ("ground.B", "coupler.A"), frame.length(a)),)
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": O, "C": (g, 0), "B": third},
+        "crank": {"O": O, "P": (a, 0)},
+        "coupler": {"P": O, "Q": (g, 0), "A": third},
+        "rocker": {"C": O, "Q": (a, 0)},
+    }
+    if is_body:
+        points["bar"] = {"B": O, "A": (a, 0)}
+    return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
+
+
+# ------------------------------------------------------------------------------------- cylinders, several drivers
+
+
+def five_bars(rng: Draw) -> Sketch:
+    """Two driven cranks, and two bars between their ends."""
+    g, a, b, c, e = (drawn_length(rng, 0.4, 2.0) for _ in range(5))
+    side = _side(rng)
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        at_c = standing(numbers, g, 0, u[0])
+        p, q = turned(u[0], numbers.number(a)), at_c + turned(u[1], numbers.number(e))
+        way = between(closing, p, (numbers.number(b), numbers.number(c)), q, side)
+        return {
+            "left": Pose(Vector(0, 0), u[0]),
+            "right": Pose(at_c, u[1]),
+            "forearm": Pose(p, way.first.heading()),
+            "strut": Pose(q, way.second.heading()),
+        }
+
+    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        return (
+            AngleDriver("shoulder", "left", ConstantSpeed(start[0], 1.0)),
+            AngleDriver("elbow", "right", ConstantSpeed(start[1], 1.0)),
+        )
+
+    points = {
+        "ground": {"O": O, "C": (g, 0)},
+        "left": {"O": O, "P": (a, 0)},
+        "right": {"C": O, "Q": (e, 0)},
+        "forearm": {"P": O, "T": (b, 0)},
+        "strut": {"Q": O, "T": (c, 0)},
+    }
+    return Sketch(points, poses, drivers, kinds=("angle", "angle"))
+
+
+def cylinders(rng: Draw) -> Sketch:
+    """A boom raised by a cylinder; at times with a stick on it, moved by a second one."""
+    has_stick = rng.random() < 0.5
+    base = (drawn_length(rng, 0.3, 1.5), drawn_length(rng, -1.0, 0.5))
+    boom, tip = (drawn_length(rng, 0.5, 2.0), drawn_length(rng, -0.3, 0.5)), (drawn_length(rng, 1.5, 3.0), Fraction(0))
+    rear, nose = (drawn_length(rng, 0.3, 1.2), drawn_length(rng, 0.1, 0.8)), drawn_length(rng, 0.3, 0.9)
+    side, second = _side(rng), _side(rng)
+    arm_squared = boom[0] ** 2 + boom[1] ** 2
+    if arm_squared == base[0] ** 2 + base[1] ** 2:
+        raise RedrawError
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        arm = numbers.sqrt(numbers.array([numbers.number(arm_squared)]))[0]
+        lean = numbers.angle(boom)
+        o, m = standing(numbers, 0, 0, u[0]), standing(numbers, *base, u[0])
+        way = between(closing, o, (arm, u[0]), m, side)
+        moving = {"boom": Pose(Vector(0, 0), way.first.heading() - lean)}
+        if has_stick:
+            raised = Pose(o, moving["boom"].phi)
+            at_s, at_m = world(numbers, raised, tip), world(numbers, raised, rear)
+            stick = between(closing, at_s, (numbers.number(nose), u[1]), at_m, second)
+            moving["stick"] = Pose(at_s, stick.first.heading())
+        return moving
+
+    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        first = DistanceDriver("lift", ("ground.M", "boom.N"), ConstantSpeed(start[0], 1.0))
+        if not has_stick:
+            return (first,)
+        return (first, DistanceDriver("crowd", ("boom.R", "stick.E"), ConstantSpeed(start[1], 1.0)))
+
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {
+        "ground": {"O": O, "M": base},
+        "boom": {"O": O, "N": boom, "S": tip, "R": rear},
+    }
+    if has_stick:
+        points["stick"] = {"S": O, "E": (nose, 0)}
+    kinds = ("length", "length") if has_stick else ("length",)
+    return Sketch(points, poses, drivers, kinds=kinds, reach=(0.1, 4.0))
+
+
+FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often of a hundred
+    "four-bars": (four_bars, 16),
+    "change points": (change_points, 14),
+    "near change points": (near_change_points, 9),
+    "slider-cranks": (slider_cranks, 8),
+    "crank = rod": (crank_and_rod, 9),
+    "pins in slots": (pins_in_slots, 7),
+    "watt six-bars": (watt_six_bars, 7),
+    "stephenson six-bars": (stephenson_six_bars, 7),
+    "chains": (chains, 6),
+    "geared five-bars": (geared_five_bars, 4),
+    "redundant parallelograms": (redundant_parallelograms, 5),
+    "five-bars": (five_bars, 4),
+    "cylinders": (cylinders, 4),
+}

@@ -1,0 +1,162 @@
+"""Patterns of steps: the orders in which a mechanism's driver values are asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from tests.stress.branch import Floats, Interval, Walk
+from tests.stress.drawn import TURN
+
+Values = list[float]
+OUTSIDE_SAMPLES = 5  # at most, to a mechanism: each is walked to a limit
+FAR = 20  # turns of a big jump
+
+
+def _span(branch: Interval) -> tuple[float, float]:
+    start = branch.drawn.start[0]
+    return (start - 2.0 * TURN, start + 2.0 * TURN) if branch.is_free else (branch.low, branch.high)
+
+
+def _unit(branch: Interval) -> float:
+    return 1.0 if branch.drawn.sketch.kinds == ("angle",) else float(branch.drawn.frame.scale)
+
+
+def forward(rng: Random, branch: Interval) -> Values:
+    """Even steps of 0.01 to 170 degrees, or as parts of a radian's length, from anywhere."""
+    low, high = _span(branch)
+    step = math.radians(10.0 ** rng.uniform(-2.0, math.log10(170.0))) * _unit(branch)
+    first = rng.uniform(low, high)
+    return [first + k * step for k in range(rng.randint(10, 40))]
+
+
+def back(rng: Random, branch: Interval) -> Values:
+    return forward(rng, branch)[::-1]
+
+
+def there_and_back(rng: Random, branch: Interval) -> Values:
+    ahead = forward(rng, branch)
+    return ahead + ahead[::-2]
+
+
+def jumps(rng: Random, branch: Interval) -> Values:
+    """Anywhere; where an angle goes round, many turns away."""
+    low, high = _span(branch)
+    if branch.is_free:
+        low, high = low - FAR * TURN, high + FAR * TURN
+    return [rng.uniform(low, high) for _ in range(12)]
+
+
+def unordered(rng: Random, branch: Interval) -> Values:
+    found = forward(rng, branch)
+    rng.shuffle(found)
+    return found
+
+
+def tiny(rng: Random, branch: Interval) -> Values:
+    """Steps of 1e-15 to 1e-4 about a place, that may be a singular one."""
+    low, high = _span(branch)
+    here = rng.choice([*_places(rng, branch), rng.uniform(low, high), rng.uniform(low, high)])
+    step = 10.0 ** rng.uniform(-15.0, -4.0) * _unit(branch)
+    return [here + (k - 10) * step for k in range(20)]
+
+
+def singular(rng: Random, branch: Interval) -> Values:
+    """Exactly at singular points, and 1e-1 to 1e-15 on either side."""
+    found = []
+    for place in rng.sample(_places(rng, branch), k=min(2, len(_places(rng, branch)))):
+        found.append(place)
+        found += [place + rng.choice((1, -1)) * 10.0 ** -rng.uniform(1.0, 15.0) * _unit(branch) for _ in range(8)]
+        found.append(place)
+    if rng.random() < 0.5:
+        rng.shuffle(found)
+    return found
+
+
+def leaving(rng: Random, branch: Interval) -> Values:
+    """Out of the range and back into it, again and again."""
+    low, high = _span(branch)
+    beyond = [10.0 ** rng.uniform(-9.0, 0.5) * _unit(branch) for _ in range(2)]
+    outside = [low - beyond[0], high + beyond[1]]
+    found = []
+    for _ in range(4):
+        found += [rng.uniform(low, high), rng.choice(outside)]
+    return [*found, rng.uniform(low, high), rng.uniform(low, high)]
+
+
+def wrapped(rng: Random, branch: Interval) -> Values:
+    """An angle that jumps from a turn to 0, which is a way back."""
+    if branch.drawn.sketch.kinds != ("angle",):
+        return jumps(rng, branch)
+    low, _ = _span(branch)
+    return [low + (value - low) % TURN for value in forward(rng, branch)]
+
+
+def many_turns(rng: Random, branch: Interval) -> Values:
+    """Hundreds of turns away, and back: seldom, as it takes its time."""
+    if not branch.is_free or rng.random() > 0.1:
+        return jumps(rng, branch)
+    start = branch.drawn.start[0]
+    return [start, start + rng.uniform(100.0, 500.0) * TURN, start, start - 30.0 * TURN, start + 1.0]
+
+
+def _places(rng: Random, branch: Interval) -> Values:
+    """Singular points and limits; where an angle goes round, some turns away too."""
+    ends = [(branch.low, branch.low_is_limit), (branch.high, branch.high_is_limit)]
+    places = branch.marks + [end for end, is_limit in ends if is_limit]
+    if branch.is_free:
+        places = [place + rng.randint(-1, 1) * TURN for place in places]
+    return places or [rng.uniform(*_span(branch))]
+
+
+PATTERNS: dict[str, Callable[[Random, Interval], Values]] = {
+    "forward": forward,
+    "back": back,
+    "there and back": there_and_back,
+    "jumps": jumps,
+    "unordered": unordered,
+    "tiny": tiny,
+    "singular": singular,
+    "leaving": leaving,
+    "wrapped": wrapped,
+    "many turns": many_turns,
+}
+
+
+def drawn_steps(rng: Random, branch: Interval | Walk) -> tuple[list[str], Floats]:
+    """Names of three patterns, and their driver values (n, d) one after the other."""
+    if isinstance(branch, Walk):
+        return ["ways"], _ways(rng, branch)
+    names = rng.sample(sorted(PATTERNS), 3)
+    steps: list[float] = []
+    outside = 0
+    for name in names:
+        for value in PATTERNS[name](rng, branch):
+            is_inside = branch.is_free or branch.low <= value <= branch.high
+            if not is_inside and not (branch.low_is_limit if value < branch.low else branch.high_is_limit):
+                continue  # nobody looked that far
+            outside += not is_inside
+            if is_inside or outside <= OUTSIDE_SAMPLES:
+                steps.append(value)
+    return names, np.array(steps or [branch.drawn.start[0]])[:, None]
+
+
+def _ways(rng: Random, branch: Walk) -> Floats:
+    """Of several drivers: steps, jumps and tiny steps, from place to place."""
+    drawn = branch.drawn
+    units = np.array([1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds])
+    generator = np.random.default_rng(rng.getrandbits(64))
+    here = np.array(drawn.start)
+    found: list[Any] = []
+    for _ in range(12):
+        reach = 10.0 ** generator.uniform(-8.0, 0.4)
+        found.append(here + reach * units * generator.uniform(-1.0, 1.0, len(units)))
+        if generator.uniform() < 0.5:
+            found.append(here)
+        if reach < 0.5:
+            here = found[-1]
+    return np.array(found)

@@ -1,0 +1,244 @@
+"""Trial: one random mechanism over random steps, judged sample by sample."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import kinfmu
+from kinfmu import Run
+from kinfmu.backends.python import load_model
+from kinfmu.naming import derivative_name
+from kinfmu.plan import compile_plan
+from tests.stress.branch import INSIDE, OUTSIDE, TURN, Expected, Floats, Interval, Walk, branch_of
+from tests.stress.drawn import Drawn, Frame
+from tests.stress.families import FAMILIES, Draw, RedrawError
+from tests.stress.jets import DIGITS, SCREENING, Numbers
+from tests.stress.patterns import drawn_steps
+
+WRONG = 1e-9  # of the column's largest magnitude
+TIGHT = 2e-6  # where what must stay positive falls below on the way, `outside` is an answer too
+BEYOND = 10.0  # times its own estimate: a flagged sample may not be wronger
+SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
+AGREED = 0.1  # the two oracles may differ by this part of the error, or of what counts as wrong
+STARTS = 64
+FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms stand a million lengths, or some, off the origin
+MEETING = 0.3  # least sine of the angle under which bars meet at the start
+DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (Fraction(3, 5), Fraction(4, 5)), (Fraction(-7, 25), Fraction(24, 25)))
+ORDERS = ("q", "qd", "qdd")
+
+
+class Fault(NamedTuple):
+    """What is wrong with a sample, or with the whole mechanism (sample -1)."""
+
+    kind: str
+    sample: int
+    text: str
+
+
+@dataclass
+class Verdict:
+    """What a trial showed."""
+
+    seed: int
+    family: str
+    patterns: Sequence[str]
+    statuses: NDArray[np.int64]
+    side: NDArray[np.int64]
+    relative: Floats  # (n, 3) error of q, qd, qdd, each column relative to its magnitude; NaN where there is no number
+    absolute: Floats  # (n, 3) the same relative to the size for lengths, in radians for angles: as estimates are
+    estimate: Floats  # (n, 3)
+    spared: int  # samples that were told unreachable behind a place too tight
+    digits: int  # samples that were judged by 50 digits
+    gap: float  # largest difference of the two oracles, as a part of what is judged
+    faults: list[Fault] = field(default_factory=list)
+
+
+@dataclass
+class Trial:
+    """A drawn mechanism, its branch, and the samples asked for."""
+
+    seed: int
+    family: str
+    drawn: Drawn
+    branch: Interval | Walk
+    patterns: Sequence[str]
+    inputs: tuple[Floats, Floats, Floats]  # (n, d) each: values, speeds, accelerations
+
+    def run(self) -> tuple[Run, float]:
+        """What kinfmu says to it, and the size that it measures errors by."""
+        plan = compile_plan(self.drawn.mechanism)
+        names = [driver.inputs for driver in plan.drivers]
+        given = {
+            names[k][order]: table[:, k] for order, table in enumerate(self.inputs) for k in range(len(names))
+        }
+        return kinfmu.solve(plan, **given), load_model(plan).SIZE
+
+    def judged(self) -> Verdict:
+        """kinfmu's run beside the closed forms."""
+        n = len(self.inputs[0])
+        nothing = np.full((n, 3), np.nan)
+        none = np.full(n, -1)
+        verdict = Verdict(self.seed, self.family, self.patterns, none, none, nothing, nothing, nothing, 0, 0, 0.0)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                run, size = self.run()
+        except Exception as error:  # noqa: BLE001  whatever it is, it is a fault, and the next mechanism goes on
+            verdict.faults.append(Fault("raised", -1, f"{type(error).__name__}: {error}"))
+            return verdict
+        verdict.statuses, verdict.estimate = run.status, run.error
+        expected = self.branch.expected(self.inputs[0], run.good)
+        verdict.side = expected.side
+        self._judge_status(run, expected, verdict)
+        which = np.flatnonzero(run.good & (expected.side == INSIDE))
+        if len(which) == 0:
+            return verdict
+        relative, absolute = self._errors(SCREENING, run, expected, which, size)
+        verdict.relative, verdict.absolute = nothing.copy(), nothing.copy()
+        verdict.relative[which], verdict.absolute[which] = relative, absolute
+        self._confirm(run, expected, which, size, verdict)
+        self._judge_errors(run, expected, verdict)
+        return verdict
+
+    def _judge_status(self, run: Run, expected: Expected, verdict: Verdict) -> None:
+        holes = np.isnan(run.values) | np.isnan(run.rates) | np.isnan(run.accelerations)
+        for k, status in enumerate(run.status):
+            if run.good[k] and holes[k].any():
+                verdict.faults.append(Fault("NaN", k, f"status {status}"))
+            if not run.good[k] and not holes[k].all():
+                verdict.faults.append(Fault("numbers without a status", k, f"status {status}"))
+            if run.good[k] and expected.side[k] == OUTSIDE:
+                verdict.faults.append(Fault("past a limit", k, f"status {status}"))
+            if not run.good[k] and expected.side[k] == INSIDE:
+                if expected.tightest[k] < TIGHT:
+                    verdict.spared += 1
+                else:
+                    verdict.faults.append(Fault("told unreachable", k, f"status {status}"))
+            if not run.good[k] and status != 3:
+                verdict.faults.append(Fault("not outside", k, f"status {status}"))
+
+    def _errors(
+        self, numbers: Numbers, run: Run, expected: Expected, which: NDArray[np.int64], size: float
+    ) -> tuple[Floats, Floats]:
+        """(len(which), 3) largest errors of q, qd, qdd: of the columns' magnitudes, and as estimates are measured."""
+        u, ud, udd = (table[which] for table in self.inputs)
+        with np.errstate(all="ignore"):
+            columns = self.drawn.exactly(numbers, u, ud, udd).columns
+        drive, more = np.abs(ud).max(axis=1), np.abs(udd).max(axis=1)
+        found = [np.zeros((len(which), 3)), np.zeros((len(which), 3))]
+        large = self.branch.magnitudes
+        for name in run.outputs:
+            column = columns[name]
+            is_angle = name.endswith(".phi")
+            for order, exact in enumerate((column.d0, column.d1, column.d2)):
+                exact = np.broadcast_to(exact, (len(which),))
+                ours = numbers.array(run[derivative_name(name, order)][which])
+                error = ours - exact
+                if is_angle and order == 0:
+                    principal = np.asarray(exact, dtype=float)
+                    turns = np.rint((expected.angles[name][which] - principal) / TURN)
+                    error = error - numbers.array(turns) * (2 * numbers.pi)
+                off = np.abs(np.asarray(error, dtype=float))
+                off = np.where(np.isnan(off), np.inf, off)
+                most = (
+                    np.full(len(which), large.q[name]),
+                    large.qd[name] * drive,
+                    large.qdd[name] * drive * drive + large.qd[name] * more,
+                )[order]
+                own = np.abs(np.asarray(exact, dtype=float))
+                with np.errstate(all="ignore"):
+                    part = np.where(off == 0.0, 0.0, off / np.fmax(most, own))
+                found[0][:, order] = np.fmax(found[0][:, order], part)
+                found[1][:, order] = np.fmax(found[1][:, order], off if is_angle else off / size)
+        return found[0], found[1]
+
+    def _confirm(
+        self, run: Run, expected: Expected, which: NDArray[np.int64], size: float, verdict: Verdict
+    ) -> None:
+        """A share of the samples, and all that look wrong, are judged again by 50 digits, which then count."""
+        rng = np.random.default_rng(self.seed)
+        suspect = (verdict.relative[which] > 0.1 * WRONG).any(axis=1)
+        again = which[suspect | (rng.uniform(size=len(which)) < SHARE)]
+        if len(again) == 0 or SCREENING is DIGITS:
+            verdict.digits = len(which) if SCREENING is DIGITS else 0
+            return
+        relative, absolute = self._errors(DIGITS, run, expected, again, size)
+        first = verdict.relative[again]
+        gaps = np.where(relative == first, 0.0, np.abs(relative - first) / np.fmax(relative, WRONG))
+        verdict.gap = float(gaps.max())
+        verdict.relative[again], verdict.absolute[again] = relative, absolute
+        verdict.digits = len(again)
+        for k in again[(gaps > AGREED).any(axis=1)]:
+            verdict.faults.append(Fault("the oracles differ", int(k), f"by {gaps.max():.1g}"))
+
+    def _judge_errors(self, run: Run, expected: Expected, verdict: Verdict) -> None:
+        for k in np.flatnonzero(run.good & (expected.side == INSIDE)):
+            for order, name in enumerate(ORDERS):
+                error, absolute = verdict.relative[k, order], verdict.absolute[k, order]
+                if error <= WRONG:
+                    continue
+                estimate = run.error[k, order]
+                said = f"{name} wrong by {error:.2g} (estimate {estimate:.2g}, true {absolute:.2g})"
+                if run.status[k] == 0:
+                    verdict.faults.append(Fault("wrong with status ok", int(k), said))
+                    break
+                if not absolute <= BEYOND * estimate:
+                    verdict.faults.append(Fault("beyond its estimate", int(k), f"status {run.status[k]}, {said}"))
+                    break
+
+
+def trial(seed: int, family: str | None = None) -> Trial:
+    """The trial of a seed, of any family or of one."""
+    rng = Draw(seed)  # noqa: S311  a test, not a secret
+    drawn_family = rng.choices(list(FAMILIES), [weight for _, weight in FAMILIES.values()])[0]
+    family = family or drawn_family
+    while True:
+        try:
+            drawn = _drawn(rng, family)
+            branch = branch_of(drawn)
+        except (RedrawError, ZeroDivisionError, ValueError):
+            continue
+        break
+    names, u = drawn_steps(rng, branch)
+    generator = np.random.default_rng(rng.getrandbits(64))
+    units = [1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds]
+    ud = generator.uniform(0.3, 1.5, u.shape) * generator.choice((1.0, -1.0), u.shape) * units
+    udd = generator.uniform(-1.0, 1.0, u.shape) * units
+    return Trial(seed, family, drawn, branch, names, (u, ud, udd))
+
+
+def _drawn(rng: Draw, family: str) -> Drawn:
+    chance = rng.random()
+    rng.parts = 1024 if chance < FAR_SHARE else 1000
+    sketch = FAMILIES[family][0](rng)
+    scale = Fraction(10) ** (rng.randint(-6, 6) if rng.random() < 0.25 else 0)
+    direction = rng.choice(DIRECTIONS) if rng.random() < 0.5 else DIRECTIONS[0]
+    at = (Fraction(0), Fraction(0))
+    if chance < FAR_SHARE:  # so that the doubles there are the lengths as drawn
+        scale, direction = Fraction(1), DIRECTIONS[0]
+        at = (Fraction(rng.randint(-2_000_000, 2_000_000)), Fraction(rng.randint(-1_000_000, 1_000_000)))
+    elif chance < BESIDE_SHARE:
+        at = (scale * Fraction(rng.randint(-2000, 2000), 1000), scale * Fraction(rng.randint(-9, 9), 8))
+    frame = Frame(scale, (Fraction(direction[0]), Fraction(direction[1])), at)
+    low, high = sketch.reach
+    units = [1.0 if kind == "angle" else float(scale) for kind in sketch.kinds]
+    candidates = np.array([[round(rng.uniform(low, high), 2) for _ in units] for _ in range(STARTS)]) * units
+    drawn = Drawn(sketch, frame, tuple(candidates[0]))
+    with np.errstate(all="ignore"):
+        closing = drawn.positions(candidates).closing
+        good = np.minimum.reduce([np.abs(np.asarray(s, dtype=float)) for s in closing.sines]) > MEETING
+    if not good.any():
+        raise RedrawError
+    return Drawn(sketch, frame, tuple(float(value) for value in candidates[int(np.argmax(good))]))
+
+
+def judged(task: tuple[int, str | None]) -> Verdict:
+    """The verdict on a seed and a family, for processes that share the work."""
+    return trial(*task).judged()
