@@ -17,6 +17,8 @@ SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near
 NEAR_SINGULAR = 5e-3  # determinant below which qdd keeps less than nine digits
 MOST_STEPS = 1_000_000  # of a way: seconds, and more than any motion that is meant
 NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to blame; the way has too many steps
+BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away by accident
+UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
@@ -125,6 +127,10 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
+    if trial.moved > UNDOUBTED:
+        for second, scale in zip(zdd, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, both
+            if abs(second) * s * s > 2.0 * BENT * scale:
+                return None
     return trial
 
 

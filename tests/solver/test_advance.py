@@ -11,6 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.solver import Pose, Solver, Status
+from tests.mechanisms import slider_crank
 
 Errors = Callable[[Solver, Pose], list[float]]
 
@@ -85,3 +86,13 @@ def test_a_crossing_that_no_bridge_spans_is_a_limit_and_no_way_to_the_other_bran
     np.testing.assert_allclose(run["right_jaw.phi"][run.good], 0.0, rtol=0, atol=1e-9)
     assert (run.status[piston > 51.25] == Status.OUTSIDE).all()
     assert any("the limit is piston = 51.22498" in event.text for event in run.events)
+
+
+def test_prediction_far_off_does_not_land_a_turn_away() -> None:
+    # beside a limit the rod turns ever faster than the crank: one long step back once took it round
+    mechanism = slider_crank(1.78, 1.086, -0.796, start=0.11)
+    run = kinfmu.solve(mechanism, crank_angle=[0.15220722892189027, -3.2256017379760742])
+    steps = kinfmu.solve(mechanism, crank_angle=np.linspace(0.15220722892189027, -3.2256017379760742, 1000))
+    assert run.good.all()
+    assert steps.good.all()
+    assert run["rod.phi"][1] == pytest.approx(steps["rod.phi"][-1], abs=1e-12)

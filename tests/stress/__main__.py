@@ -21,7 +21,7 @@ def main() -> int:
     """Try random mechanisms and print what is found; 1 if anything is wrong."""
     parser = argparse.ArgumentParser(
         prog="scripts/stress",
-        description="Random mechanisms over random steps, against closed forms of 50 digits: each number is a mechanism.",
+        description="Random mechanisms over random steps, against closed forms of 50 digits; a seed is a mechanism.",
         epilog=f"Families: {', '.join(FAMILIES)}.",
     )
     parser.add_argument("--count", type=int, help="mechanisms; 10000, or 1 with --seed alone, which shows every sample")

@@ -26,14 +26,14 @@ DIP = 0.05  # what must stay positive is looked at closely where it falls below
 FLAT = 1.001  # places that differ by less have nothing between them
 LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
 REGULAR = 0.02  # magnitudes are taken where what must stay positive is above
-STILL = 1e-3  # of the largest of its kind: a column below hardly moves
+STILL, LEAST = 1e-9, 1e-3  # of the largest of its kind: below, a column stands still; it counts with no less
 PASSES, PIECES = 14, 32
 
 Floats = NDArray[np.float64]
 
 
 class Expected(NamedTuple):
-    """What is right for n samples: on which side of the limits, angles by name to a turn, and the tightest place passed."""
+    """What is right for n samples: the side of the limits, angles by name to a turn, the tightest place passed."""
 
     side: NDArray[np.int64]
     angles: Mapping[str, Floats]
@@ -59,7 +59,10 @@ def _lowest(limits: list[Array], count: int) -> Any:
 def _magnitudes(
     drawn: Drawn, columns: Mapping[str, Any], angles: Mapping[str, Floats], regular: NDArray[np.bool_]
 ) -> Magnitudes:
-    """Of columns; those that hardly move count with the largest of their kind, that as one if all stand still."""
+    """Of columns; at least a thousandth of their kind's largest, and that itself for those that stand still.
+
+    Where a kind does less than the driver alone, it counts with that.
+    """
     scale = float(drawn.frame.scale)
     per = 1.0 if "angle" in drawn.sketch.kinds else scale
     tables: list[dict[str, float]] = []
@@ -70,10 +73,10 @@ def _magnitudes(
             found[name] = float(np.abs(np.asarray(values, dtype=float)[regular]).max(initial=0.0))
         for is_angle in (True, False):
             kind = [name for name in found if name.endswith(".phi") == is_angle]
-            least = STILL * (1.0 if is_angle else scale) / per**order
-            largest = max((table[name] for table in [*tables[1:], found] for name in kind), default=least)
-            largest = max(largest, least)
-            found.update((name, largest) for name in kind if found[name] < STILL * largest)
+            natural = (1.0 if is_angle else scale) / per**order
+            largest = max([natural, *(table[name] for table in [*tables[1:], found] for name in kind)])
+            for name in kind:
+                found[name] = largest if found[name] < STILL * largest else max(found[name], LEAST * largest)
         tables.append(found)
     return Magnitudes(*tables)
 
@@ -99,7 +102,7 @@ class Interval:
         """True for an angle that goes round."""
         return not (self.low_is_limit or self.high_is_limit) and self.drawn.sketch.kinds == ("angle",)
 
-    def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:
+    def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:  # noqa: ARG002  as a Walk needs it
         """For samples (n, 1); which of them are good makes no difference here."""
         x = u[:, 0]
         start, period = self.drawn.start[0], TURN * self.drawn.sketch.period
@@ -261,7 +264,9 @@ class Walk:
         now = {name: self.drawn.starts[name] for name in names}
         side, tightest = np.full(len(u), INSIDE), np.empty(len(u))
         angles = {name: np.empty(len(u)) for name in names}
-        units = np.array([1.0 if kind == "angle" else float(self.drawn.frame.scale) for kind in self.drawn.sketch.kinds])
+        units = np.array(
+            [1.0 if kind == "angle" else float(self.drawn.frame.scale) for kind in self.drawn.sketch.kinds]
+        )
         with np.errstate(all="ignore"):
             for k, target in enumerate(u):
                 count = 2 + int(np.abs((target - here) / units).max() / SHORT)
@@ -312,12 +317,12 @@ def walk(drawn: Drawn) -> Walk:
         found.append(_magnitudes(drawn, one_way.columns, angles, regular))
     return Walk(
         drawn,
-        Magnitudes(*({name: max(table[name], other[name]) for name in table} for table, other in zip(*found, strict=True))),
+        Magnitudes(
+            *({name: max(table[name], other[name]) for name in table} for table, other in zip(*found, strict=True))
+        ),
     )
 
 
 def branch_of(drawn: Drawn) -> Interval | Walk:
     """The branch of a drawn mechanism."""
     return interval(drawn) if len(drawn.start) == 1 else walk(drawn)
-
-

@@ -151,4 +151,3 @@ def world(numbers: Numbers, pose: Pose, point: tuple[Exact, Exact]) -> Vector:
 def framed(numbers: Numbers, at: Vector, phi: Jet, point: tuple[Exact, Exact]) -> Pose:
     """The pose of a body whose `point` lies at a place."""
     return Pose(at - turned(phi, *(numbers.number(part) for part in point)), phi)
-

@@ -25,7 +25,7 @@ from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_s
 
 ENDS = (0.0, math.pi)  # of an arm: stretched toward its pivot and away from it
 KINDS = ("double crank", "crank-rocker", "double rocker", "rocker-crank", "triple rocker")
-O: tuple[Exact, Exact] = (0, 0)
+ORIGIN: tuple[Exact, Exact] = (0, 0)
 Poses = Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
 
 
@@ -101,7 +101,7 @@ def _changes(bars: Sequence[Fraction]) -> bool:
     return 2 * (min(bars) + max(bars)) == sum(bars)
 
 
-def fourbar(bars: Sequence[Fraction], driven: str, side: int, frame: tuple[Exact, Exact] = O) -> Sketch:
+def fourbar(bars: Sequence[Fraction], driven: str, side: int, frame: tuple[Exact, Exact] = ORIGIN) -> Sketch:
     """A four-bar between (0, 0) and (ground, 0), driven at one of its three bars; frame: of the coupler's pin P."""
     g, a, b, c = bars
 
@@ -127,10 +127,10 @@ def fourbar(bars: Sequence[Fraction], driven: str, side: int, frame: tuple[Exact
         }
 
     points = {
-        "ground": {"O": O, "C": (g, 0)},
-        "crank": {"O": O, "P": (a, 0)},
+        "ground": {"O": ORIGIN, "C": (g, 0)},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
         "coupler": {"P": frame, "Q": (frame[0] + b, frame[1])},
-        "rocker": {"C": O, "Q": (c, 0)},
+        "rocker": {"C": ORIGIN, "Q": (c, 0)},
     }
     return Sketch(points, poses, _turns(driven), marks=ENDS)
 
@@ -140,7 +140,7 @@ def _driven(rng: Draw) -> str:
 
 
 def _shifted(rng: Draw) -> tuple[Exact, Exact]:
-    return O if rng.random() < 0.5 else _place(rng, 1.0)
+    return ORIGIN if rng.random() < 0.5 else _place(rng, 1.0)
 
 
 def four_bars(rng: Draw) -> Sketch:
@@ -205,12 +205,12 @@ def slider_crank(
         return (AngleDriver("drive", driven, law),)
 
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {
-        "ground": {"O": O, "way": (0, offset)},
-        "crank": {"O": O, "P": (a, 0)},
-        "rod": {"P": O, "S": (b, 0)},
+        "ground": {"O": ORIGIN, "way": (0, offset)},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "rod": {"P": ORIGIN, "S": (b, 0)},
     }
     if has_block:
-        points["block"] = {"S": O}
+        points["block"] = {"S": ORIGIN}
     if driven == "slide":
         far = float(a + b)
         return Sketch(points, poses, drivers, joints, ("length",), (0.0,), reach=(-far, far))
@@ -271,12 +271,12 @@ def pins_in_slots(rng: Draw) -> Sketch:
         return (PointOnLine("slot", ("lever.slot", "crank.P")),)
 
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {
-        "ground": {"O": O, "C": (g, 0)},
-        "crank": {"O": O, "P": (a, 0)},
-        "lever": {"C": O, "slot": (0, e)},
+        "ground": {"O": ORIGIN, "C": (g, 0)},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "lever": {"C": ORIGIN, "slot": (0, e)},
     }
     if has_block:
-        points["block"] = {"P": O}
+        points["block"] = {"P": ORIGIN}
     return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
 
 
@@ -301,8 +301,8 @@ def watt_six_bars(rng: Draw) -> Sketch:
 
     points = {body: dict(given) for body, given in base.points.items()}
     points["coupler"]["R"], points["rocker"]["S"] = r, s
-    points["left"] = {"R": O, "T": (t[0], 0)}
-    points["right"] = {"S": O, "T": (t[1], 0)}
+    points["left"] = {"R": ORIGIN, "T": (t[0], 0)}
+    points["right"] = {"S": ORIGIN, "T": (t[1], 0)}
     return Sketch(points, poses, _turns("crank"), marks=ENDS)
 
 
@@ -320,8 +320,8 @@ def stephenson_six_bars(rng: Draw) -> Sketch:
 
     points = {body: dict(given) for body, given in base.points.items()}
     points["ground"]["D"], points["coupler"]["R"] = d, r
-    points["link"] = {"R": O, "T": (t[0], 0)}
-    points["output"] = {"D": O, "T": (t[1], 0)}
+    points["link"] = {"R": ORIGIN, "T": (t[0], 0)}
+    points["output"] = {"D": ORIGIN, "T": (t[1], 0)}
     return Sketch(points, poses, _turns("crank"), marks=ENDS)
 
 
@@ -360,14 +360,14 @@ def chains(rng: Draw) -> Sketch:
             moving[f"rocker{k}"] = Pose(standing(numbers, x, 0, theta), theta)
         return moving
 
-    points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {"O": O}, "crank": {"O": O}}
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {"O": ORIGIN}, "crank": {"O": ORIGIN}}
     x, last = Fraction(0), "crank"
     for k, ((g, a, b, c), _) in enumerate(stages):
         x += g
         points["ground"][f"C{k}"] = (x, 0)
         points[last][f"P{k}"] = (a, 0)
-        points[f"coupler{k}"] = {f"P{k}": O, f"Q{k}": (b, 0)}
-        points[f"rocker{k}"] = {f"C{k}": O, f"Q{k}": (c, 0)}
+        points[f"coupler{k}"] = {f"P{k}": ORIGIN, f"Q{k}": (b, 0)}
+        points[f"rocker{k}"] = {f"C{k}": ORIGIN, f"Q{k}": (c, 0)}
         last = f"rocker{k}"
     return Sketch(points, poses, _turns("crank"), marks=ENDS)
 
@@ -396,11 +396,11 @@ def geared_five_bars(rng: Draw) -> Sketch:
         return (Gear("gears", ("crank", "gear"), float(ratio), offset=turn),)
 
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {
-        "ground": {"O": O, "C": (g, 0)},
-        "crank": {"O": O, "P": (a, 0)},
-        "gear": {"C": O, "Q": (e, 0)},
-        "left": {"P": O, "T": (b, 0)},
-        "right": {"Q": O, "T": (c, 0)},
+        "ground": {"O": ORIGIN, "C": (g, 0)},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "gear": {"C": ORIGIN, "Q": (e, 0)},
+        "left": {"P": ORIGIN, "T": (b, 0)},
+        "right": {"Q": ORIGIN, "T": (c, 0)},
     }
     return Sketch(points, poses, _turns("crank"), joints)
 
@@ -428,13 +428,13 @@ def redundant_parallelograms(rng: Draw) -> Sketch:
         return () if is_body else (Distance("AB", ("ground.B", "coupler.A"), frame.length(a)),)
 
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {
-        "ground": {"O": O, "C": (g, 0), "B": third},
-        "crank": {"O": O, "P": (a, 0)},
-        "coupler": {"P": O, "Q": (g, 0), "A": third},
-        "rocker": {"C": O, "Q": (a, 0)},
+        "ground": {"O": ORIGIN, "C": (g, 0), "B": third},
+        "crank": {"O": ORIGIN, "P": (a, 0)},
+        "coupler": {"P": ORIGIN, "Q": (g, 0), "A": third},
+        "rocker": {"C": ORIGIN, "Q": (a, 0)},
     }
     if is_body:
-        points["bar"] = {"B": O, "A": (a, 0)}
+        points["bar"] = {"B": ORIGIN, "A": (a, 0)}
     return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
 
 
@@ -464,11 +464,11 @@ def five_bars(rng: Draw) -> Sketch:
         )
 
     points = {
-        "ground": {"O": O, "C": (g, 0)},
-        "left": {"O": O, "P": (a, 0)},
-        "right": {"C": O, "Q": (e, 0)},
-        "forearm": {"P": O, "T": (b, 0)},
-        "strut": {"Q": O, "T": (c, 0)},
+        "ground": {"O": ORIGIN, "C": (g, 0)},
+        "left": {"O": ORIGIN, "P": (a, 0)},
+        "right": {"C": ORIGIN, "Q": (e, 0)},
+        "forearm": {"P": ORIGIN, "T": (b, 0)},
+        "strut": {"Q": ORIGIN, "T": (c, 0)},
     }
     return Sketch(points, poses, drivers, kinds=("angle", "angle"))
 
@@ -504,11 +504,11 @@ def cylinders(rng: Draw) -> Sketch:
         return (first, DistanceDriver("crowd", ("boom.R", "stick.E"), ConstantSpeed(start[1], 1.0)))
 
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {
-        "ground": {"O": O, "M": base},
-        "boom": {"O": O, "N": boom, "S": tip, "R": rear},
+        "ground": {"O": ORIGIN, "M": base},
+        "boom": {"O": ORIGIN, "N": boom, "S": tip, "R": rear},
     }
     if has_stick:
-        points["stick"] = {"S": O, "E": (nose, 0)}
+        points["stick"] = {"S": ORIGIN, "E": (nose, 0)}
     kinds = ("length", "length") if has_stick else ("length",)
     return Sketch(points, poses, drivers, kinds=kinds, reach=(0.1, 4.0))
 

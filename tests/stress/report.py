@@ -93,7 +93,9 @@ class Report:
                 f"  {STATUSES[status]:<14} {ORDERS[order]:<4} {worst.error:8.2g}   {command} --seed {worst.seed}"
             )
         said.append("")
-        said.append("error estimates: share of samples where it is at least the error (or that is a rounding); median of")
+        said.append(
+            "error estimates: share of samples where it is at least the error (or that is a rounding); median of"
+        )
         said.append("estimate / error (or rounding), one in a hundred below, one in a hundred above:")
         for order, name in enumerate(ORDERS):
             hit, count = self.covered[order]
@@ -101,10 +103,12 @@ class Report:
             said.append(f"  {name:<4} {100.0 * hit / max(count, 1):8.3f} %   {middle:8.3g} {low:8.3g} {high:8.3g}")
         said.append("")
         said.append(
-            f"{self.refused} samples past a limit were told so; {self.edge} lay within 1e-10 of one; {self.spared} behind a "
-            "place tighter than 2e-6 were told outside"
+            f"{self.refused} samples past a limit were told so; {self.edge} lay within 1e-10 of one; "
+            f"{self.spared} behind a place tighter than 2e-6 were told outside"
         )
-        said.append(f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts")
+        said.append(
+            f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"
+        )
         for kind, found in self.faults.items():
             said.append("")
             said.append(f"{kind}: {len(found)} mechanisms")

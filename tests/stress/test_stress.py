@@ -1,0 +1,204 @@
+"""The stress suite in short, and that its oracle and its judgement are right."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu import Run
+from kinfmu.equations.system import System
+from tests import oracle
+from tests.stress import families
+from tests.stress.drawn import Drawn, Frame
+from tests.stress.families import FAMILIES, Draw
+from tests.stress.jets import DIGITS, LONG
+from tests.stress.report import Report
+from tests.stress.trial import Trial, trial
+
+ROOT = Path(__file__).parents[2]
+MECHANISMS = 7  # of each family
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_random_mechanisms_over_random_steps_are_right_or_say_why_not(family: str) -> None:
+    for seed in range(MECHANISMS):
+        assert trial(seed, family).judged().faults == [], f"scripts/stress --family '{family}' --seed {seed}"
+
+
+# --------------------------------------------------------------------------------------------------- the oracle
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_closed_forms_close_the_mechanism(family: str) -> None:
+    one = trial(3, family)
+    drawn = one.drawn
+    system = System(drawn.mechanism)
+    u, still = np.array([drawn.start]), np.zeros((1, len(drawn.start)))
+    columns = drawn.exactly(LONG, u, still, still).columns
+    q = np.array([float(columns[name].d0[0]) for name in system.coordinates])
+    far = max(1.0, *(abs(float(part)) for part in drawn.frame.at))
+    assert np.abs(system.gaps(system.residual(q, u[0]))).max() <= 1e-14 * far * max(1.0, drawn.frame.scale)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_long_doubles_and_50_digits_agree(family: str) -> None:
+    one = trial(1, family)
+    good = one.branch.expected(one.inputs[0], np.ones(len(one.inputs[0]), dtype=bool))
+    which = np.flatnonzero((good.side == 0) & (good.tightest > 1e-3))[:6]
+    inputs = [table[which] for table in one.inputs]
+    quick, slow = (one.drawn.exactly(numbers, *inputs) for numbers in (LONG, DIGITS))
+    regular = np.minimum.reduce([np.abs(np.asarray(sine, dtype=float)) for sine in quick.closing.sines]) > 0.05
+    assert regular.any()
+    for name, column in slow.columns.items():
+        for order in ("d0", "d1", "d2"):
+            exact, long = getattr(column, order), getattr(quick.columns[name], order)
+            rounded = np.array([np.longdouble(oracle.mp.nstr(value, 25)) for value in exact])
+            off = np.abs(long - rounded)[regular]
+            most = np.abs(np.asarray(exact, dtype=float))[regular].max() + float(one.drawn.frame.scale)
+            assert off.max() <= 1e-15 * most, (name, order)  # a rounding is 5e-20
+
+
+@pytest.mark.parametrize("bars", [("4", "1", "3.5", "3"), ("1.2", "2", "1.7", "1.9"), ("2", "1", "2", "1")])
+@pytest.mark.parametrize("side", [1, -1])
+def test_four_bar_is_that_of_the_other_oracle(bars: tuple[str, str, str, str], side: int) -> None:
+    exact = [families.Fraction(bar) for bar in bars]
+    angles = np.array([0.3, 1.2, 2.9]) if bars[0] != "1.2" else np.array([0.5, 1.0])
+    drawn = Drawn(families.fourbar(exact, "crank", side), Frame(), (0.3,))
+    ours = drawn.exactly(DIGITS, angles[:, None], 0 * angles[:, None] + 0.7, 0 * angles[:, None] - 0.4).columns
+    theirs = oracle.fourbar(*bars, list(angles), 0.7, -0.4, branch=side)
+    for k, name in enumerate(("crank.phi", "coupler.phi", "rocker.phi")):
+        for table, order in zip(theirs, ("d0", "d1", "d2"), strict=True):
+            gaps = [abs(a - b) for a, b in zip(getattr(ours[name], order), table[:, k], strict=True)]
+            assert max(gaps) < 1e-45, (name, order)
+
+
+@pytest.mark.parametrize("family", ["change points", "crank = rod", "pins in slots", "chains"])
+def test_closed_form_goes_on_smoothly_through_its_change_points(family: str) -> None:
+    """Across a mark it is what its derivatives on one side say it is on the other."""
+    seed = next(s for s in range(100) if trial(s, family).branch.is_free and trial(s, family).branch.marks)  # type: ignore[union-attr]
+    one = trial(seed, family)
+    mark, h = one.branch.marks[0], 1e-4  # type: ignore[union-attr]
+    columns = one.drawn.positions(np.array([[mark - h], [mark + h]])).columns.values()
+    there = [c.d0[0] + 2 * h * c.d1[0] + 2 * h * h * c.d2[0] - c.d0[1] for c in columns]
+    scale = float(one.drawn.frame.scale)
+    turns = np.array([value if abs(value) < 1.0 else value % (2 * np.pi) for value in map(float, there)])
+    away = np.minimum(np.abs(turns), np.abs(turns - 2 * np.pi))
+    assert away.max() < 1e-6 * max(1.0, scale)
+
+
+def test_kinds_of_four_bars_are_what_they_are_called() -> None:
+    draw = Draw(1)
+    for kind in families.KINDS:
+        for _ in range(20):
+            bars = families.grashof(draw, kind)
+            is_grashof = 2 * (min(bars) + max(bars)) < sum(bars)
+            assert (families.KINDS[bars.index(min(bars))] if is_grashof else "triple rocker") == kind
+
+
+# ------------------------------------------------------------------------------------------------ the judgement
+
+
+@pytest.fixture(scope="module")
+def plain() -> Trial:
+    """Of lengths about 1, and right."""
+    every = (trial(seed, "redundant parallelograms") for seed in range(50))
+    return next(one for one in every if one.drawn.frame == Frame())
+
+
+def _shifted(run: Run) -> Run:
+    values = run.values.copy()
+    values[3] += 1e-6
+    return replace(run, values=values)
+
+
+def _holed(run: Run) -> Run:
+    rates = run.rates.copy()
+    rates[3, 0] = np.nan
+    return replace(run, rates=rates)
+
+
+def _refused(run: Run) -> Run:
+    status = run.status.copy()
+    status[3] = 3
+    gaps = [table.copy() for table in (run.values, run.rates, run.accelerations)]
+    for table in gaps:
+        table[3] = np.nan
+    return replace(run, status=status, values=gaps[0], rates=gaps[1], accelerations=gaps[2])
+
+
+def _flagged(run: Run) -> Run:
+    status, error = run.status.copy(), run.error.copy()
+    status[3], error[3] = 1, 1e-15
+    return replace(_shifted(run), status=status, error=error)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (_shifted, "wrong with status ok"),
+        (_holed, "NaN"),
+        (_refused, "told unreachable"),
+        (_flagged, "beyond its estimate"),
+    ],
+)
+def test_what_is_wrong_is_told(
+    monkeypatch: pytest.MonkeyPatch, plain: Trial, change: Callable[[Run], Run], kind: str
+) -> None:
+    run, size = plain.run()
+    assert run.status[3] in (0, 2)
+    monkeypatch.setattr(Trial, "run", lambda _: (change(run), size))
+    verdict = plain.judged()
+    assert {fault.sample for fault in verdict.faults} == {3}
+    assert verdict.faults[0].kind == kind
+    report = Report()
+    report.take(verdict)
+    assert not report.is_right
+    assert f"{kind}: 1 mechanisms" in report.lines("scripts/stress")
+
+
+def test_numbers_past_a_limit_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = next(found for s in range(50) if (found := trial(s, "four-bars")).branch.low_is_limit)  # type: ignore[union-attr]
+    run, size = one.run()
+    outside = int(np.flatnonzero(run.status == 3)[0])
+    status, values = run.status.copy(), np.where(np.isnan(run.values), 0.0, run.values)
+    status[outside] = 0
+    rates, accelerations = (np.where(np.isnan(table), 0.0, table) for table in (run.rates, run.accelerations))
+    lying = replace(run, status=status, values=values, rates=rates, accelerations=accelerations)
+    monkeypatch.setattr(Trial, "run", lambda _: (lying, size))
+    assert ("past a limit", outside) in {(fault.kind, fault.sample) for fault in one.judged().faults}
+
+
+def test_what_is_raised_is_a_fault_of_its_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: Trial) -> tuple[Run, float]:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(Trial, "run", fail)
+    (fault,) = trial(1).judged().faults
+    assert fault == ("raised", -1, "ZeroDivisionError: by zero")
+
+
+def test_command_counts_and_reproduces_one_mechanism() -> None:
+    def said(*arguments: str) -> str:
+        return subprocess.run(
+            [sys.executable, "-m", "tests.stress", *arguments],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    many = said("--seed", "20", "--count", "4", "--jobs", "2")
+    assert "4 mechanisms in" in many
+    assert "nothing is wrong" in many
+    assert "scripts/stress --seed 2" in many
+    one = said("--seed", "20", "--family", "four-bars")
+    assert one.startswith('name = "drawn"')
+    assert "seed 20, four-bars" in one
