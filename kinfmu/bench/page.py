@@ -11,7 +11,7 @@ from pathlib import Path
 from kinfmu import gallery
 from kinfmu.bench.accuracy import Measured
 from kinfmu.bench.engines import ENGINES
-from kinfmu.bench.setting import PREDICTORS
+from kinfmu.bench.setting import PREDICTORS, Setting
 from kinfmu.bench.singular import DISTANCES, Near
 from kinfmu.errors import KinfmuError
 
@@ -124,17 +124,21 @@ def settings_page(measured: Sequence[Measured], rounds: int) -> str:
 
 
 def _row(one: Measured) -> tuple[str, ...]:
-    of, setting = one.microseconds, one.setting
-    has_newton = one.engine != "pylinkage"
+    of = one.microseconds
     return (
-        f"**{one.engine}**" if one.is_usual else one.engine,
-        PREDICTORS[setting.predictor] if has_newton else "",
-        ("chord" if setting.chord else "full") if has_newton else "closed forms",
-        setting.stop if has_newton else "",
+        *row_head(one.engine, one.setting, is_usual=one.is_usual),
         duration(of.median),
         f"{duration(of.lower)} to {duration(of.upper)}",
         *map(number, one.errors),
     )
+
+
+def row_head(engine: str, setting: Setting, *, is_usual: bool) -> tuple[str, str, str, str]:
+    """The cells that say what was measured: the usual setting of an engine is bold."""
+    name = f"**{engine}**" if is_usual else engine
+    if engine == "pylinkage":
+        return name, "", "closed forms", ""
+    return name, PREDICTORS[setting.predictor], "chord" if setting.chord else "full", setting.stop
 
 
 def singular_table(near: Sequence[Near]) -> str:

@@ -54,7 +54,7 @@ def _with_reference() -> list[str]:
     "-o",
     "folder",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Where accuracy writes tables and charts: docs/ of a checkout or the current folder if nothing is said.",
+    help="Where accuracy writes tables and charts: if nothing is said docs/ of a checkout, or the current folder without one or with --mechanism.",
 )
 def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
     r"""Measure on this machine, side by side with other ways.
@@ -76,7 +76,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     given = {} if rounds is None else {"rounds": rounds}
     for name in dict.fromkeys(wanted):
         if name == "accuracy":
-            _accuracy(mechanisms, given, folder or _docs())
+            _accuracy(mechanisms, given, folder or (Path() if mechanisms else default_folder()))
         elif name == "sample":
             from kinfmu.bench import solve_sample
 
@@ -95,8 +95,8 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             click.echo(chains.run(**given))
 
 
-def _docs() -> Path:
-    """docs/ of the checkout that this is run from, else the current folder."""
+def default_folder() -> Path:
+    """Where accuracy.md is kept: docs/ of the checkout that this is run from, else the current folder."""
     checkout = gallery.folder().parent / "docs"
     return checkout if (checkout / "accuracy.md").is_file() else Path()
 

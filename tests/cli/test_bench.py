@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from kinfmu import gallery
 from kinfmu.bench import accuracy, case, chains, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
+from kinfmu.cli.bench import default_folder
 from tests.cli.conftest import Command
 
 QUICK = ["kinfmu", "generated Python", "scipy fsolve"]
@@ -44,8 +46,8 @@ def only_what_comes_with_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def quick(command: Command, *more: object) -> tuple[str, str]:
-    """Output and messages of one round on one mechanism."""
-    result = command("bench", "accuracy", "--mechanism", "slider_crank", "--rounds", 1, *more)
+    """Output and messages of one round on one mechanism, written into the working folder if nothing is said."""
+    result = command("bench", "accuracy", "--mechanism", "slider_crank", "--rounds", 1, *(more or ("-o", ".")))
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
@@ -94,6 +96,17 @@ def test_the_tables_hold_every_engine_with_a_time_and_a_small_error(command: Com
     assert all(len(line.strip("|").split("|")) == 9 for line in lines)
     for point in POINTS:
         assert f"| {point.title} |" in page
+
+
+def test_it_writes_into_docs_of_a_checkout_and_else_into_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gallery, "folder", lambda: tmp_path / "fmus")
+    assert default_folder() == Path()
+    page = tmp_path / "docs" / PAGE
+    page.parent.mkdir()
+    page.touch()
+    assert default_folder() == page.parent
 
 
 @pytest.mark.usefixtures("once")
@@ -166,7 +179,7 @@ def test_wrong_words_are_refused_with_what_would_be_right(
 @pytest.mark.parametrize(
     ("what", "lines"),
     [
-        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve"]),
+        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve", "kinfmu.solve"]),
         ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
