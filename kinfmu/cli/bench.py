@@ -54,7 +54,8 @@ def _with_reference() -> list[str]:
     "-o",
     "folder",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Where accuracy writes tables and charts: if nothing is said docs/ of a checkout, or the current folder without one or with --mechanism.",
+    help="Where accuracy writes tables and charts; if nothing is said docs/ of a checkout, or the current folder where "
+    "there is none or with --mechanism.",
 )
 def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
     r"""Measure on this machine, side by side with other ways.
