@@ -58,6 +58,7 @@ extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];
 extern const double kf_reach[KF_DRIVERS]; /* what counts as a step of one */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
+extern const double kf_row_scales[KF_ROOM(KF_ROWS)]; /* of the residuals, block after block */
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
 extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws */
 
@@ -95,5 +96,6 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant);
 void kf_lu_solve(int k, const double *factors, const double *right, double *x);
 bool kf_qr(int m, int k, const double *matrix, double *factors, double *determinant);
 void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x);
+double kf_reciprocal_condition(int m, int k, double *matrix);
 
 #endif

@@ -169,3 +169,88 @@ void kf_qr_solve(int m, int k, const double *factors, const double *right, doubl
         x[i] = (b[i] - sum) / columns[i * m + i];
     }
 }
+
+/* The same for 2 x 2, where the inverse is at hand. */
+static double reciprocal_condition_of_two(const double *matrix)
+{
+    double a = matrix[0], b = matrix[1], c = matrix[2], d = matrix[3];
+    double p = sqrt(a * a + b * b), q = sqrt(c * c + d * d), norm, inverse_norm;
+    if (!(p > 0.0 && q > 0.0)) {
+        return 0.0;
+    }
+    a /= p;
+    b /= p;
+    c /= q;
+    d /= q;
+    p = sqrt(a * a + c * c);
+    q = sqrt(b * b + d * d);
+    if (!(p > 0.0 && q > 0.0)) {
+        return 0.0;
+    }
+    a /= p;
+    b /= q;
+    c /= p;
+    d /= q;
+    norm = fmax(fabs(a) + fabs(c), fabs(b) + fabs(d));
+    inverse_norm = fmax(fabs(d) + fabs(c), fabs(b) + fabs(a)); /* over |det| */
+    return fabs(a * d - b * c) / (norm * inverse_norm);
+}
+
+/* 1 / cond of the equilibrated A (m, k) (rows, then columns, scaled to unit length), in the 1-norm; 0 if it is singular.
+ * For a tall matrix that of R in A = QR. A is overwritten.
+ */
+double kf_reciprocal_condition(int m, int k, double *matrix)
+{
+    double factors[KF_QR_ROOM(1, KF_ROOM(KF_LARGEST_BLOCK)) + KF_LU_ROOM(1)], unit[KF_ROOM(KF_LARGEST_BLOCK)];
+    double column[KF_ROOM(KF_LARGEST_BLOCK)], norm = 0.0, inverse_norm = 0.0, determinant;
+    int i, j;
+    if (m == 2 && k == 2) {
+        return reciprocal_condition_of_two(matrix);
+    }
+    for (i = 0; i < m; ++i) {
+        const double length = sqrt(dot(k, matrix + i * k, matrix + i * k));
+        for (j = 0; length > 0.0 && j < k; ++j) {
+            matrix[i * k + j] /= length;
+        }
+    }
+    for (j = 0; j < k; ++j) {
+        double length = 0.0;
+        for (i = 0; i < m; ++i) {
+            length += matrix[i * k + j] * matrix[i * k + j];
+        }
+        length = sqrt(length);
+        if (!(length > 0.0)) {
+            return 0.0;
+        }
+        for (i = 0; i < m; ++i) {
+            matrix[i * k + j] /= length;
+        }
+    }
+    if (m > k) {
+        if (!kf_qr(m, k, matrix, factors, &determinant)) {
+            return 0.0;
+        }
+        for (i = 0; i < k; ++i) {
+            for (j = 0; j < k; ++j) {
+                matrix[i * k + j] = j >= i ? factors[j * m + i] : 0.0;
+            }
+        }
+    }
+    if (!kf_lu(k, matrix, factors, &determinant)) {
+        return 0.0;
+    }
+    for (j = 0; j < k; ++j) {
+        double sum = 0.0, inverse_sum = 0.0;
+        for (i = 0; i < k; ++i) {
+            unit[i] = i == j ? 1.0 : 0.0;
+            sum += fabs(matrix[i * k + j]);
+        }
+        kf_lu_solve(k, factors, unit, column);
+        for (i = 0; i < k; ++i) {
+            inverse_sum += fabs(column[i]);
+        }
+        norm = sum > norm ? sum : norm;
+        inverse_norm = inverse_sum > inverse_norm ? inverse_sum : inverse_norm;
+    }
+    return 1.0 / (norm * inverse_norm);
+}

@@ -105,7 +105,8 @@ typedef struct {
     kf_pose base, way[4], walk[2], beside, located;
     kf_model ahead;
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
-    double determinants[2][KF_ROOM(KF_BLOCKS)]; /* of the nodes next to a zero */
+    double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
+    double x1[KF_COORDINATES], x2[KF_COORDINATES];
     int live[3]; /* roads that are needed */
 } kf_scratch;
 

@@ -1,0 +1,286 @@
+/* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/advance.py. */
+#include "way.h"
+
+#define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near and its place is extrapolated */
+#define BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
+#define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
+#define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part of it: more is another branch */
+#define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
+#define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
+#define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
+
+/* One step of predict and correct; false if it cannot be trusted to stay on the branch. */
+bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u, kf_pose *trial)
+{
+    const kf_model *const model = &solver->model;
+    const double *x1 = pose->x1, *x2 = pose->x2;
+    double needed;
+    int k;
+    if (KF_DRIVERS == 1) {
+        if (pose->derivatives < 2) {
+            kf_tangent(model, pose);
+        }
+    } else {
+        x1 = solver->scratch.x1;
+        x2 = solver->scratch.x2;
+        kf_velocity(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
+        kf_acceleration(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
+    }
+    if (kf_position(model, u, pose->found.x, x1, x2, s, NULL, &trial->found) >= 0) { /* singular, or diverged */
+        return false;
+    }
+    needed = KF_TRUST * trial->found.moved;
+    if (needed > trial->found.margin || needed > pose->found.margin || trial->found.margin == 0.0) {
+        return false;
+    }
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double before = pose->found.determinants[k], after = trial->found.determinants[k];
+        if (before > 0.0 ? after < KF_FALL * before : after > KF_FALL * before) {
+            return false;
+        }
+    }
+    for (k = 0; trial->found.moved > UNDOUBTED && k < KF_UNKNOWNS; ++k) {
+        if (fabs(x2[k]) * s * s > 2.0 * BENT * kf_unknown_scales[k]) {
+            return false;
+        }
+    }
+    kf_fresh(trial, pose->road, pose->low, pose->high);
+    return true;
+}
+
+/* False if the tangent of a single driver jumps between two poses, as it does from one branch to a crossing one.
+ *
+ * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign; their
+ * tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step.
+ */
+bool kf_is_smooth(const kf_model *model, kf_pose *pose, kf_pose *trial)
+{
+    const double s = KF_POSE_U(trial)[0] - KF_POSE_U(pose)[0];
+    double largest = 0.0, jump = 0.0;
+    int k;
+    kf_tangent(model, pose);
+    kf_tangent(model, trial);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        largest = fmax(largest, fabs(trial->x1[k]) / kf_unknown_scales[k]);
+        jump = fmax(jump, fabs(trial->x1[k] - (pose->x1[k] + s * pose->x2[k])) / kf_unknown_scales[k]);
+    }
+    return jump <= SMOOTH * largest;
+}
+
+/* From a pose to a value of the only driver by trusted steps, without bridges; or NULL. What it finds lasts until the next
+ * walk, which may start there.
+ */
+kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u)
+{
+    const double longest = KF_LONGEST_STEP * kf_reach[0];
+    kf_pose *const walk = solver->scratch.walk, *pose = start;
+    double step = longest;
+    int k;
+    for (k = 0; k < MOST_WALKED; ++k) {
+        const double here = KF_POSE_U(pose)[0], distance = u - here;
+        const bool whole = -step <= distance && distance <= step;
+        const double s = whole ? distance : distance > 0.0 ? step : -step, there = whole ? u : here + s;
+        kf_pose *const trial = pose == &walk[0] ? &walk[1] : &walk[0];
+        if (here == u) {
+            return pose;
+        }
+        if (kf_trusted_step(solver, pose, kf_alone, s, &there, trial)) {
+            pose = trial;
+            continue;
+        }
+        step = 0.5 * fabs(s);
+        if (step < ROUGHEST * longest) {
+            return NULL;
+        }
+    }
+    return NULL;
+}
+
+/* Direction and length of a straight way of several drivers, measured by the driver that has most to go. */
+static double course(const double *start, const double *target, double *direction)
+{
+    double length = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        length = fmax(length, fabs((target[k] - start[k]) / kf_reach[k]));
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        direction[k] = (target[k] - start[k]) / length;
+    }
+    return length;
+}
+
+/* Where the way ends, just beyond a pose that steps cannot leave.
+ *
+ * Near a dead centre determinant^2 falls linearly along the way: the secant rule on the last two poses gives its zero.
+ */
+static void limited(const kf_pose *before, const kf_pose *pose, kf_limit *limit)
+{
+    const double *const determinants = pose->found.determinants;
+    double near, far, beyond = 0.0;
+    int k;
+    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
+    limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
+    if (KF_BLOCKS == 0) {
+        return;
+    }
+    for (k = 1; k < KF_BLOCKS; ++k) {
+        limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
+    }
+    near = determinants[limit->block] * determinants[limit->block];
+    far = before->found.determinants[limit->block] * before->found.determinants[limit->block];
+    if (far > near) {
+        beyond = near / (far - near);
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * beyond;
+        }
+    }
+}
+
+/* True if the target lies past the limit on the way that s goes. */
+static bool is_beyond(const double *target, const double *limit, const double *direction, double s)
+{
+    double sum = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum += (target[k] - limit[k]) * direction[k] * s;
+    }
+    return sum > 0.0;
+}
+
+/* The pose at the end of a way, with the iterations of the whole way.
+ *
+ * At a dead centre it has no tangent to go on by: the next way starts from the last regular pose.
+ */
+static kf_pose *arrived(kf_pose *pose, const kf_pose *regular, int iterations)
+{
+    pose->found.iterations = iterations;
+    if (pose->found.margin < KF_NEAR) {
+        pose->status = KF_NEAR_SINGULAR;
+        pose->has_base = true;
+        memcpy(pose->base_u, KF_POSE_U(regular), sizeof pose->base_u);
+        memcpy(pose->base_z, regular->found.x, KF_UNKNOWNS * sizeof(double));
+        pose->base_bridge = regular->bridge;
+        pose->road = regular->road;
+        pose->low = regular->low;
+        pose->high = regular->high;
+    }
+    return pose;
+}
+
+/* A place for one more pose beside those that are needed. */
+static kf_pose *spare(kf_solver *solver, const kf_pose *pose, const kf_pose *before, const kf_pose *regular)
+{
+    kf_pose *place = solver->scratch.way;
+    while (place == pose || place == before || place == regular) {
+        ++place;
+    }
+    return place;
+}
+
+/* The same pose with other singular points known. */
+static kf_pose *on_road(kf_solver *solver, const kf_pose *pose, int road, kf_pose *place)
+{
+    if (place != pose) {
+        *place = *pose;
+    }
+    kf_stretch(solver, road, KF_POSE_U(place)[0], &place->low, &place->high);
+    place->road = road;
+    place->bridge = -1;
+    place->status = KF_OK;
+    place->has_base = false;
+    return place;
+}
+
+/* The pose at `target`, in the solver's scratch, or NULL and the limit on the way to it.
+ *
+ * Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
+ * residual, and is trusted if the correction is small against the determinant and no determinant changes its sign. With
+ * one driver, singular points on the way are bridged.
+ */
+kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit)
+{
+    const bool one = KF_DRIVERS == 1;
+    const double longest = one ? KF_LONGEST_STEP * kf_reach[0] : KF_LONGEST_STEP;
+    kf_pose *pose = start, *before = start, *regular = start, *trial;
+    double direction[KF_DRIVERS] = {1.0}, u[KF_DRIVERS], distance, step = longest;
+    int iterations = 0, turn, k;
+    bool is_limited = false;
+    distance = one ? target[0] - KF_POSE_U(start)[0] : course(KF_POSE_U(start), target, direction);
+    memcpy(limit->u, KF_POSE_U(start), sizeof limit->u);
+    limit->block = KF_TOO_FAR;
+    if (fabs(distance) > KF_MOST_STEPS * longest) {
+        return NULL;
+    }
+    for (turn = 0; turn < KF_MOST_STEPS; ++turn) {
+        bool whole;
+        double s;
+        trial = spare(solver, pose, before, regular);
+        if (one) {
+            kf_needed(solver, start->road, pose->road, regular->road);
+            if (!(pose->low <= target[0] && target[0] <= pose->high)) {
+                const int road = pose->road;
+                const int bridge =
+                    pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, road, KF_POSE_U(pose)[0], target[0]);
+                if (kf_covers(&solver->bridges[bridge], target[0])) {
+                    if (!kf_bridge_pose(solver, bridge, target, trial)) { /* a block not interpolated ends there */
+                        memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
+                        limit->block = KF_NO_BLOCK;
+                        return NULL;
+                    }
+                    kf_stretch(solver, road, target[0], &trial->low, &trial->high);
+                    trial->road = road;
+                    return trial;
+                }
+                kf_bridge_exit(solver, bridge, target[0], trial);
+                pose = on_road(solver, trial, road, trial);
+                continue;
+            }
+            distance = target[0] - KF_POSE_U(pose)[0];
+            if (distance == 0.0) { /* a node, or a step that ended there by rounding */
+                return arrived(pose, regular, iterations);
+            }
+        }
+        whole = -step <= distance && distance <= step;
+        s = whole ? distance : distance > 0.0 ? step : -step;
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            u[k] = whole ? target[k] : KF_POSE_U(pose)[k] + s * direction[k];
+        }
+        if (kf_trusted_step(solver, pose, direction, s, u, trial)) {
+            iterations += trial->found.iterations;
+            if (!(trial->found.margin < KF_CLOSE && one) || kf_is_smooth(&solver->model, pose, trial)) {
+                if (trial->found.margin < KF_REGULAR && one) {
+                    const int road = kf_surveyed(solver, pose, trial);
+                    if (road != trial->road) {
+                        pose = on_road(solver, pose, road, trial);
+                        continue;
+                    }
+                }
+                if (whole) {
+                    return arrived(trial, regular, iterations);
+                }
+                before = pose;
+                pose = trial;
+                if (pose->found.margin >= KF_NEAR) {
+                    regular = pose;
+                }
+                distance -= s;
+                step = fmin(2.0 * step, longest);
+                continue;
+            }
+        }
+        step = 0.5 * fabs(s);
+        if (step < SHORTEST_STEP * longest) {
+            if (!is_limited) {
+                limited(before, pose, limit);
+                is_limited = true;
+            }
+            if (step < GIVE_UP * longest || is_beyond(target, limit->u, direction, s)) {
+                return NULL;
+            }
+        }
+    }
+    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
+    limit->block = KF_TOO_FAR;
+    return NULL;
+}

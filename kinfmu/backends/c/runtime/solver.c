@@ -1,0 +1,183 @@
+/* Solver: poses, rates and accelerations of the model. See kinfmu/solver/solver.py. */
+#include "way.h"
+
+#define TOLERANCE 1e-9 /* residual relative to the size above which a sample is not ok */
+
+void kf_solver_start(kf_solver *solver)
+{
+    kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
+    solver->tolerance = TOLERANCE;
+    solver->stuck = false;
+    solver->message[0] = '\0';
+    kf_fresh(&solver->anchor, -1, -INFINITY, INFINITY);
+    kf_evaluated(&solver->model, kf_anchor_u, kf_anchor_z, NULL, &solver->anchor.found);
+}
+
+static kf_status failed(kf_pose *pose, kf_status status)
+{
+    kf_fresh(pose, -1, -INFINITY, INFINITY);
+    pose->status = status;
+    return status;
+}
+
+/* A pose counts only if its rows close and the rows set aside as redundant hold too. */
+static kf_status rejected(kf_solver *solver, kf_pose *pose)
+{
+    char *const message = solver->message;
+    double watches[KF_ROOM(KF_WATCHES)];
+    int k, most = 0;
+    kf_say_place(message, KF_POSE_U(pose));
+    if (!(pose->found.residual <= solver->tolerance)) {
+        kf_say(message, ": residual ");
+        kf_say_number(message, "%.2g", pose->found.residual);
+        kf_say(message, " of the size is left");
+        return pose->status = KF_NOT_CONVERGED;
+    }
+    kf_watches(&solver->model, &pose->found, watches);
+    for (k = 1; k < KF_WATCHES; ++k) {
+        most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
+    }
+    kf_say(message, ": the redundant row %s is open by ", kf_watch_names[most]);
+    kf_say_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
+    kf_say(message, " %s", kf_length_unit);
+    return pose->status = KF_INCONSISTENT;
+}
+
+/* The pose that a way starts from where the pose has no tangent to go on by. */
+static kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
+{
+    kf_pose *const base = &solver->scratch.base;
+    if (pose->base_bridge >= 0) {
+        kf_bridge_pose(solver, pose->base_bridge, pose->base_u, base);
+    } else {
+        kf_fresh(base, -1, -INFINITY, INFINITY);
+        kf_evaluated_as_given(&solver->model, pose->base_u, pose->base_z, &base->found);
+    }
+    base->road = pose->road;
+    base->low = pose->low;
+    base->high = pose->high;
+    return base;
+}
+
+/* Away from all that is singular: one trusted step. */
+static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    const double longest = KF_LONGEST_STEP * kf_reach[0], s = u[0] - KF_POSE_U(start)[0];
+    if (!(-longest <= s && s <= longest && start->low <= u[0] && u[0] <= start->high)
+        || !kf_trusted_step(solver, start, kf_alone, s, u, pose)
+        || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)) {
+        return false;
+    }
+    if (pose->found.margin >= KF_REGULAR) {
+        return true;
+    }
+    if (pose->found.margin > KF_NEAR
+        && (pose->found.margin >= KF_CLOSE || kf_is_smooth(&solver->model, start, pose))) {
+        kf_needed(solver, start->road, start->road, start->road);
+        return kf_surveyed(solver, start, pose) == pose->road; /* nothing new there */
+    }
+    return false;
+}
+
+kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    kf_pose *found;
+    kf_limit limit;
+    double sum = 0.0;
+    bool is_same = true;
+    int k;
+    if (solver->stuck) {
+        return failed(pose, KF_INCONSISTENT);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        is_same = is_same && u[k] == KF_POSE_U(start)[k];
+        sum += u[k];
+    }
+    if (is_same) {
+        *pose = *start;
+        return pose->status;
+    }
+    if (start->has_base) {
+        start = base_of(solver, start);
+    }
+    if (KF_DRIVERS == 1 && is_near(solver, start, u, pose)) { /* most samples */
+        return KF_OK;
+    }
+    solver->message[0] = '\0';
+    if (!(sum - sum == 0.0)) {
+        kf_say_place(solver->message, u);
+        kf_say(solver->message, " is not a finite number");
+        return failed(pose, KF_OUTSIDE);
+    }
+    found = kf_advance(solver, start, u, &limit);
+    if (found == NULL) {
+        kf_say_limit(solver->message, &limit, u);
+        return failed(pose, KF_OUTSIDE);
+    }
+    *pose = *found;
+    if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
+        return rejected(solver, pose);
+    }
+    return pose->status;
+}
+
+/* With one driver, x' and x'' are derivatives with respect to it, and the same goes for the outputs y:
+ *
+ *     yd = y' ud,   ydd = y'' ud^2 + y' udd
+ */
+void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs, double *rates,
+               double *accelerations)
+{
+    const kf_model *const model = &solver->model;
+    const bool one = KF_DRIVERS == 1;
+    int k;
+    if (outputs != NULL) {
+        kf_outputs(model, &pose->found, outputs);
+    }
+    if (rates == NULL && accelerations == NULL) {
+        return;
+    }
+    if (!one || pose->derivatives < 1) {
+        kf_velocity(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
+        pose->derivatives = one ? 1 : 0;
+    }
+    if (accelerations != NULL) {
+        double slopes[KF_ROOM(KF_OUTPUTS)];
+        if (!one || pose->derivatives < 2) {
+            kf_acceleration(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
+            pose->derivatives = one ? 2 : 0;
+        }
+        kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, accelerations);
+        if (one) {
+            double *const slope = rates != NULL ? rates : slopes;
+            kf_output_rates(model, &pose->found, pose->x1, slope);
+            for (k = 0; k < KF_OUTPUTS; ++k) {
+                accelerations[k] = accelerations[k] * (ud[0] * ud[0]) + slope[k] * udd[0];
+            }
+        } else if (rates != NULL) {
+            kf_output_rates(model, &pose->found, pose->x1, rates);
+        }
+    } else {
+        kf_output_rates(model, &pose->found, pose->x1, rates);
+    }
+    for (k = 0; one && rates != NULL && k < KF_OUTPUTS; ++k) {
+        rates[k] *= ud[0];
+    }
+}
+
+double kf_margin(const kf_solver *solver, const kf_pose *pose)
+{
+    double matrix[KF_ROOM(KF_LARGEST_BLOCK)], margin = 1.0;
+    int block, first = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
+        double small = fabs(pose->found.determinants[block]);
+        if (rows > 1) {
+            kf_jacobian(&solver->model, &pose->found, block, matrix);
+            small = kf_reciprocal_condition(rows, columns, matrix);
+        }
+        margin = fmin(margin, small);
+        first = kf_block_ends[block];
+    }
+    return margin;
+}

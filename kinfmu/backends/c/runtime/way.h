@@ -1,0 +1,92 @@
+/* What the files of the solver know of each other; nothing here is for others. */
+#ifndef KF_WAY_H
+#define KF_WAY_H
+
+#include "solver.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define KF_EPS DBL_EPSILON
+#define KF_REGULAR 0.19      /* determinant from which a block is solved as elsewhere: see span.py */
+#define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see bridge.py */
+#define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see advance.py, as all that follows */
+#define KF_TRUST 10.0
+#define KF_FALL 0.3
+#define KF_NEAR 5e-3         /* determinant below which a pose is near-singular */
+#define KF_CLOSE 0.1
+#define KF_MOST_STEPS 1000000
+
+/* pose.c */
+extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
+extern const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)];
+void kf_fresh(kf_pose *pose, int road, double low, double high);
+bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found);
+bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
+void kf_tangent(const kf_model *model, kf_pose *pose);
+
+/* turns.c */
+double kf_turned(double angle, double turns);
+double kf_whole_turns(double angle);
+
+/* hermite.c */
+#define KF_MOST_NODES 4
+typedef struct {
+    int count; /* of the terms, three a node */
+    double coefficients[3 * KF_MOST_NODES], nodes[3 * KF_MOST_NODES];
+} kf_hermite;
+void kf_hermite_through(int count, const double *nodes, const double samples[][3], kf_hermite *polynomial);
+void kf_hermite_at(const kf_hermite *polynomial, double x, double values[3]);
+void kf_weights(int count, const double *nodes, double x, double weights[][3]);
+
+/* span.c */
+void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model);
+void kf_span_reverse(kf_span *span);
+void kf_span_hold(kf_span *span, const double *before, const double *after);
+void kf_combined(const kf_span *span, double half, int count, const int *nodes, double weights[][3], double *z);
+double kf_span_apart(const kf_span *span);
+void kf_span_middle(const kf_span *span, double *z);
+void kf_span_read(const kf_span *span, double x, double *z, double *zd, double *zdd);
+void kf_span_difference(const kf_span *span, double x, double *z, double *zd, double *zdd);
+
+/* bridge.c */
+bool kf_covers(const kf_bridge *bridge, double u);
+bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose);
+bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose);
+void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd);
+int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
+int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
+bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero);
+
+/* road.c */
+void kf_stretch(const kf_solver *solver, int road, double u, double *low, double *high);
+bool kf_knows(const kf_solver *solver, int road, double u, int block);
+int kf_with_bridge(kf_solver *solver, int road, int bridge);
+int kf_with_searched(kf_solver *solver, int road, kf_searched stretch);
+int kf_next_bridge(const kf_solver *solver, int road, double here, double target);
+int kf_spare_bridge(const kf_solver *solver);
+int kf_spare_span(const kf_solver *solver, int other);
+void kf_needed(kf_solver *solver, int start, int pose, int regular);
+
+/* advance.c */
+typedef struct {
+    double u[KF_DRIVERS];
+    int block;
+} kf_limit;
+enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
+kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
+bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u, kf_pose *trial);
+bool kf_is_smooth(const kf_model *model, kf_pose *pose, kf_pose *trial);
+kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
+
+/* survey.c */
+int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
+
+/* message.c */
+void kf_say(char *message, const char *format, ...);
+void kf_say_number(char *message, const char *format, double value);
+void kf_say_place(char *message, const double *u);
+void kf_say_limit(char *message, const kf_limit *limit, const double *target);
+
+#endif
