@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .bridge import HALF_WIDTH, Bridge, build, moved, secant_zero, zero_near
+from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
 from .pose import ALONE, Model, Pose, Vector, directed, on_road, tangent_of
-from .road import Blocked, Road
+from .road import Road, Searched
 from .span import REGULAR
 from .status import Status
 
@@ -150,33 +150,47 @@ def is_smooth(model: Model, pose: Pose, trial: Pose) -> bool:
 
 
 def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
-    """The road with what is new at a trial pose: a bridge, if it has come into the window of a singular point; a
-    blocked place, if no bridge holds there. The road as it was, if nothing is new.
+    """The road with what is new at a trial pose: a bridge, if it has come near the window of a singular point; a
+    searched stretch, if no bridge holds there. The road as it was, if nothing is new.
     """
+    road: Road | None = trial.road
+    here, known = trial.u[0], road or Road()
+    low = [k for k, d in enumerate(trial.determinants) if -REGULAR < d < REGULAR and not known.knows(here, k)]
+    if not low:
+        return road
 
     def walk(start: Pose, u: float) -> Pose | None:
         return _plainly(model, start, u)
 
-    reach: float = model.REACH[0]
-    road: Road | None = trial.road
-    known = road or Road()
-    if known.knows(trial.u[0]):
-        return road
     if model.DRIVER_KINDS[0] == "angle":
         for old in known.bridges:
-            again = moved(old, pose, trial.u[0], walk)
+            again = moved(old, pose, here, walk)
             if again is not None:
                 return known.with_bridge(again, pose.u[0])
-    block = min(range(len(trial.determinants)), key=lambda k: abs(trial.determinants[k]))
-    far_enough = abs(trial.u[0] - pose.u[0]) > 1e-3 * reach
-    zero = secant_zero(pose, trial, block) if far_enough else zero_near(trial, block, walk, reach)
-    if zero is None or abs(zero - trial.u[0]) > 1.05 * HALF_WIDTH * reach or known.knows(zero):
-        return road
-    bridge = build(model, pose, block, zero, walk)
-    if bridge is not None:
-        return known.with_bridge(bridge, pose.u[0])
-    room = 2.0 * HALF_WIDTH * reach
-    return known.with_blocked(Blocked(zero - room, zero + room), pose.u[0])
+    reach: float = model.REACH[0]
+    before = pose if abs(here - pose.u[0]) > 1e-3 * reach else _beside(trial, low[0], walk, 0.02 * reach)
+    for block in low if before is not None else ():  # upstream first
+        zero = secant_zero(before, trial, block)
+        if zero is None or abs(zero - here) > 1.05 * HALF_WIDTH * reach or known.knows(zero, block):
+            continue
+        bridge = build(model, before, block, zero, walk)
+        if bridge is None:
+            room = 2.0 * HALF_WIDTH * reach
+            road = known = known.with_searched(Searched(zero - room, zero + room, block))
+        elif known.knows(bridge.centre, block):
+            road = known = known.with_searched(Searched(*sorted((here, bridge.centre)), block))
+        else:
+            return known.with_bridge(bridge, pose.u[0])
+    return road
+
+
+def _beside(pose: Pose, block: int, walk: Walk, distance: float) -> Pose | None:
+    """A pose beside another on the side where a block's determinant grows."""
+    for offset in (distance, -distance):
+        other = walk(pose, pose.u[0] + offset)
+        if other is not None and abs(other.determinants[block]) > abs(pose.determinants[block]):
+            return other
+    return None
 
 
 def _plainly(model: Model, start: Pose, u: float) -> Pose | None:

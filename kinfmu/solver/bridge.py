@@ -20,7 +20,9 @@ from .turns import turned, whole_turns
 HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
 NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would win
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
-AGREED = 1e-9  # largest difference of two widths, and of a pose and a node turns away, in z
+AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node turns away
+FINE = 1e-12  # [rad, sizes]; difference of two widths from which narrower ones win nothing
+STRAIGHT = 0.1  # change of a zero located anew, as a part of what is left to go: as little where there is a zero
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
 
 Walk = Callable[[Pose, float], "Pose | None"]  # from a pose to a driver value, plainly
@@ -133,56 +135,62 @@ def moved(bridge: Bridge, pose: Pose, u: float, walk: Walk) -> Bridge | None:
 def build(model: Model, pose: Pose, block: int, zero: float, walk: Walk) -> Bridge | None:
     """A bridge over the zero of a block's determinant that a regular pose has before it, or None if none proves itself.
 
-    A dead centre gives no bridge: the far side cannot be reached, or the interpolated pose does not close.
+    zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
+    closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:
+    the determinant does not fall to zero straight, the far side cannot be reached.
     """
     reach: float = model.REACH[0]
-    half = HALF_WIDTH * reach
-    while half >= NARROWEST * reach:
-        bridge = _spanned(model, pose, block, zero, half, walk)
-        if bridge is not None:
-            return bridge
+    centre = _located(pose, block, zero, walk, reach)
+    if centre is None:
+        return None
+    half, best, apart = HALF_WIDTH * reach, None, AGREED
+    while half >= NARROWEST * reach and apart > FINE:
+        span = _spanned(model, pose, block, centre, half, walk)
+        if span is not None and span.apart() < apart:
+            best, apart = span, span.apart()
         half *= 0.5
-    return None
-
-
-def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float, walk: Walk) -> Bridge | None:
-    """A bridge of one width; its centre is found by the secant rule on the determinant, on the near side only."""
-    side = 1.0 if centre > pose.u[0] else -1.0
-    for _ in range(4):
-        near = [pose]
-        for distance in (4.0, 2.0, 1.0):
-            arrived = walk(near[-1], centre - side * distance * half)
-            if arrived is None:
-                return None
-            near.append(arrived)
-        better = secant_zero(near[-2], near[-1], block)
-        if better is None or abs(better - centre) > 2.0 * half:
-            return None
-        if abs(better - centre) <= 0.2 * half:
-            break
-        centre = better
-    else:
+    if best is None:
         return None
-    near = near[1:]
-    far = _crossed(model, centre, half, side, near)
-    if far is None or near[-1].determinants[block] * far[0].determinants[block] >= 0.0:
-        return None  # not reached, or touched and not crossed: no change point of two smooth branches
-    nodes = near + far if side > 0.0 else (near + far)[::-1]
-    span = Span(model, centre, half, nodes)
-    inner, outer = span.middle()
-    if max(abs(a - b) for a, b in zip(inner, outer, strict=True)) > AGREED:
-        return None
-    bridge = Bridge(span)
+    bridge = Bridge(best)
     return bridge if bridge.closes() else None
 
 
-def zero_near(pose: Pose, block: int, walk: Walk, reach: float) -> float | None:
-    """Driver value near a pose where a block's determinant seems to vanish, by its slope on the regular side."""
-    for offset in (0.02 * reach, -0.02 * reach):
-        other = walk(pose, pose.u[0] + offset)
-        if other is not None and abs(other.determinants[block]) > abs(pose.determinants[block]):
-            return secant_zero(other, pose, block)
+def _located(pose: Pose, block: int, zero: float, walk: Walk, reach: float) -> float | None:
+    """Where a block's determinant vanishes, by the secant rule from the near side; None if it does not fall straight.
+
+    Towards a dead centre it falls like a square root: the secant's zero stays beyond, by as much as is left to go.
+    """
+    step = 0.5 * (zero - pose.u[0])
+    whole = False  # the first estimate may stem from the same two places
+    while abs(step) > 0.1 * NARROWEST * reach:
+        ahead = walk(pose, pose.u[0] + step)
+        if ahead is None:
+            step, whole = 0.5 * step, False
+            continue
+        better = secant_zero(pose, ahead, block)
+        if better is None or (better - ahead.u[0]) * step <= 0.0:
+            return None
+        change = abs(better - zero)
+        if whole and change <= STRAIGHT * abs(better - ahead.u[0]) and change <= 0.2 * NARROWEST * reach:
+            return better
+        pose, zero, whole = ahead, better, True
+        step = 0.5 * (zero - pose.u[0])
     return None
+
+
+def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float, walk: Walk) -> Span | None:
+    """A span of one width over the zero of a block's determinant, from the side that the pose is on."""
+    side = 1.0 if centre > pose.u[0] else -1.0
+    near: list[Pose] = []
+    for distance in (4.0, 2.0, 1.0):
+        arrived = walk(near[-1] if near else pose, centre - side * distance * half)
+        if arrived is None:
+            return None
+        near.append(arrived)
+    far = _crossed(model, centre, half, side, near)
+    if far is None or near[-1].determinants[block] * far[0].determinants[block] >= 0.0:
+        return None  # not reached, or touched and not crossed: no change point of two smooth branches
+    return Span(model, centre, half, near + far if side > 0.0 else (near + far)[::-1])
 
 
 def secant_zero(a: Pose, b: Pose, block: int) -> float | None:

@@ -8,26 +8,25 @@ from typing import Any, NamedTuple
 from .bridge import Bridge, restored
 from .pose import Model
 
-_KEPT = 8  # of each kind, the latest; what is met again after a turn should still be known
+_KEPT = 32  # of each kind, the latest; what is met again after a turn should still be known
 
 
-class Blocked(NamedTuple):
-    """A place that no bridge leads over: a dead centre, or branches that only come close."""
+class Searched(NamedTuple):
+    """A stretch where no zero of a block's determinant is to be sought (again): it is bridged beyond, or is none."""
 
     low: float
     high: float
+    block: int
 
 
 class Road(NamedTuple):
-    """Bridges and blocked places, the latest last, and the stretch [low, high] around a pose that is free of windows.
+    """Bridges and searched stretches, the latest last, and the stretch [low, high] around a pose that has no window.
 
-    surveyed: intervals where no further singular point is to be sought. A value: it travels with the poses that were
-    found along it.
+    A value: it travels with the poses that were found along it.
     """
 
     bridges: tuple[Bridge, ...] = ()
-    blocked: tuple[Blocked, ...] = ()
-    surveyed: tuple[tuple[float, float], ...] = ()
+    searched: tuple[Searched, ...] = ()
     low: float = -inf
     high: float = inf
 
@@ -42,21 +41,27 @@ class Road(NamedTuple):
                 low = max(low, bridge.high)
             else:
                 high = min(high, bridge.low)
-        return Road(self.bridges, self.blocked, self.surveyed, low, high)
+        return Road(self.bridges, self.searched, low, high)
 
     def with_bridge(self, bridge: Bridge, u: float) -> Road:
         """The road with one more bridge, seen from a driver value; one of the same span makes way for it."""
         others = [known for known in self.bridges if known.span is not bridge.span]
-        return _made((*others, bridge)[-_KEPT:], self.blocked).around(u)
+        return Road((*others, bridge)[-_KEPT:], self.searched).around(u)
 
-    def with_blocked(self, place: Blocked, u: float) -> Road:
-        """The road with one more blocked place, seen from a driver value."""
-        return _made(self.bridges, (*self.blocked, place)[-_KEPT:]).around(u)
+    def with_searched(self, stretch: Searched) -> Road:
+        """The road with one more searched stretch."""
+        return self._replace(searched=(*self.searched, stretch)[-_KEPT:])
 
-    def knows(self, u: float) -> bool:
-        """True if the singular point near a driver value has been looked at."""
-        for low, high in self.surveyed:  # noqa: SIM110
-            if low <= u <= high:  # not any(...): a generator costs more than the two or three comparisons
+    def knows(self, u: float, block: int) -> bool:
+        """True if a block's zero near a driver value need not be sought.
+
+        Between the outermost nodes of a bridge there is no other than those it spans.
+        """
+        for bridge in self.bridges:
+            if bridge.nodes[0].u[0] <= u <= bridge.nodes[-1].u[0]:
+                return True
+        for stretch in self.searched:  # noqa: SIM110
+            if stretch.block == block and stretch.low <= u <= stretch.high:
                 return True
         return False
 
@@ -70,17 +75,10 @@ class Road(NamedTuple):
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `laid` makes the same road."""
-        return [[bridge.dump() for bridge in self.bridges], [list(place) for place in self.blocked]]
+        return [[bridge.dump() for bridge in self.bridges], [list(stretch) for stretch in self.searched]]
 
 
 def laid(model: Model, data: list[Any]) -> Road:
     """The road that was dumped."""
-    bridges, blocked = data
-    return _made(tuple(restored(model, bridge) for bridge in bridges), tuple(Blocked(*place) for place in blocked))
-
-
-def _made(bridges: tuple[Bridge, ...], blocked: tuple[Blocked, ...]) -> Road:
-    """Between a bridge's outermost nodes its own zero is the only one."""
-    surveyed = [(place.low, place.high) for place in blocked]
-    surveyed += [(bridge.nodes[0].u[0], bridge.nodes[-1].u[0]) for bridge in bridges]
-    return Road(bridges, blocked, tuple(surveyed))
+    bridges, searched = data
+    return Road(tuple(restored(model, bridge) for bridge in bridges), tuple(Searched(*stretch) for stretch in searched))

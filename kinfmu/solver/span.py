@@ -58,6 +58,12 @@ class Span:
             self._middle = inner, outer
         return self._middle
 
+    def apart(self) -> float:
+        """Largest difference of the two at the centre, in radians and sizes."""
+        inner, outer = self.middle()
+        scales = self.model.UNKNOWN_SCALES
+        return max([abs(a - b) / c for a, b, c in zip(inner, outer, scales, strict=True)])
+
     def dump(self) -> list[Any]:
         """Plain numbers from which `restored_span` makes the same span."""
         return [self.centre, self.half, [[list(node.u), list(node.z)] for node in self.nodes]]
