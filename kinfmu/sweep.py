@@ -17,6 +17,7 @@ from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
+from kinfmu.short_way import short_way
 from kinfmu.solver import Solver, Stuck, with_parameters
 from kinfmu.solver.pose import Vector
 
@@ -31,6 +32,7 @@ def solve(
     outputs: Sequence[str] | None = None,
     engine: str = "auto",
     tolerance: float = 1e-9,
+    wrap: bool = False,
     out: tuple[FloatArray, FloatArray, FloatArray] | None = None,
     **inputs: ArrayLike,
 ) -> Run:
@@ -41,8 +43,9 @@ def solve(
     and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
     parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
-    if None; what they do not need is not solved. engine: 'auto' or 'python'. out: three arrays (n, outputs) that take
-    values, rates and accelerations.
+    if None; what they do not need is not solved. engine: 'auto' or 'python'. wrap: angles given as inputs are followed
+    the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three arrays
+    (n, outputs) that take values, rates and accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
     last good sample.
@@ -55,8 +58,10 @@ def solve(
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
-        times, u, ud, udd = driven_by_inputs(plan, inputs)
+        times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
     else:
+        if wrap:
+            raise KinfmuError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
         if inputs:
             raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
         times, u, ud, udd = _driven_by_time(solver.model, _column("t", t), constants)
@@ -110,8 +115,11 @@ def _with_geometry(plan: SolvePlan, geometry: Mapping[str, float | str], toleran
     return anew, Solver(load_model(anew), tolerance)
 
 
-def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike]) -> tuple[FloatArray, ...]:
-    """Sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name."""
+def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: bool = False) -> tuple[FloatArray, ...]:
+    """Sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
+
+    wrap: angles are followed the short way.
+    """
     known = [name for driver in plan.drivers for name in driver.inputs]
     for name in inputs:
         if name not in known:
@@ -122,6 +130,10 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike]) -> tuple[
         if driver.inputs[0] not in inputs:
             raise KinfmuError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
     columns = {name: _column(name, value) for name, value in inputs.items()}
+    angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
+    if wrap and not angles:
+        raise KinfmuError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
+    columns |= {name: short_way(columns[name]) for name in angles if wrap}
     lengths = {len(column) for column in columns.values() if len(column) > 1}
     if len(lengths) > 1:
         sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())

@@ -18,6 +18,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update", action="store_true", help="rewrite the golden files, so that a change is read as a diff"
     )
+    parser.addoption(
+        "--grids", type=int, metavar="N", help="so many random grids of tests that take fewer, and these in full"
+    )
 
 
 @pytest.fixture

@@ -16,6 +16,14 @@ def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanis
     return parse(written.replace("x = 1.5, y = 0.866", f"x = {1 + math.cos(start)!r}, y = {math.sin(start)!r}"))
 
 
+def tight_jaw() -> Mechanism:
+    """The gallery's gripper with its rods' pins turned on: branches cross 0.25 mm before the dead centre."""
+    written = text(load("parallel_jaw"))
+    for mirrored in ("", "-"):
+        written = written.replace(f"rod = [0.0, {mirrored}20.0]", f"rod = [-6.05, {mirrored}19.06]")
+    return parse(written)
+
+
 def bar_as_body(turn: float = 0.0) -> Mechanism:
     """The reference four-bar with AB as a body of its own and the ground turned [rad]: 12 coordinates, 12 rows."""
     c, s, start = math.cos(turn), math.sin(turn), math.radians(60.0) + turn

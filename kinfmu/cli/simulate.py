@@ -26,6 +26,9 @@ from kinfmu.errors import KinfmuError
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="CSV with columns time and inputs, such as crank_angle or crank_angle [deg].",
 )
+@click.option(
+    "--wrap", is_flag=True, help="Angles of --input were wrapped, from 360 to 0 deg, say: follow them the short way."
+)
 @click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=30rpm.")
 @click.option(
     "--mcap", type=click.Path(dir_okay=False, path_type=Path), help="Record; logs/<name>.mcap if nothing is said."
@@ -41,6 +44,7 @@ def simulate(
     stop: float | None,
     step: float | None,
     inputs: Path | None,
+    wrap: bool,
     settings: tuple[tuple[str, str], ...],
     mcap: Path | None,
     rrd: Path | None,
@@ -55,6 +59,8 @@ def simulate(
     for path, suffix in ((mcap, ".mcap"), (rrd, ".rrd")):
         if path is not None and path.suffix.lower() != suffix:
             raise click.UsageError(f"--{suffix[1:]} {path}: such a file ends in {suffix}")
+    if wrap and inputs is None:
+        raise click.UsageError("--wrap follows the angles of --input, which is not given")
     parameters = as_values(settings)
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu = Path(model)
@@ -76,6 +82,7 @@ def simulate(
                 step=step,
                 inputs=inputs,
                 parameters=parameters,
+                wrap=wrap,
                 progress=progress,
             )
     name = run.info.get("name") or fmu.stem

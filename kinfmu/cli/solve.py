@@ -32,6 +32,7 @@ TABLES = (".csv", ".parquet", ".npz")
     help="N values of the driver [rad, or the file's unit of length], or such as 0deg:360deg:361 or 0mm:50mm:101; "
     "rates are for a driver's speed of 1, time counts the samples.",
 )
+@click.option("--wrap", is_flag=True, help="Follow --angle the short way: no step is more than half a turn.")
 @click.option(
     "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=30rpm."
 )
@@ -42,6 +43,7 @@ def solve(
     output: Path,
     times: tuple[float, float, float] | None,
     angle: str | None,
+    wrap: bool,
     settings: tuple[tuple[str, str], ...],
     outputs: str | None,
     engine: str,
@@ -58,6 +60,8 @@ def solve(
         raise click.UsageError(f"-o {output}: a table ends in one of {listed(TABLES)}")
     if times and angle:
         raise click.UsageError("--times and --angle cannot both drive")
+    if wrap and not angle:
+        raise click.UsageError("--wrap follows --angle the short way, which is not given")
     mech = gallery.load(mechanism)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
     refuse_what_follows(mech, settings)
@@ -73,7 +77,7 @@ def solve(
     else:
         t, samples = (run_times(RunSettings(*times)) if times else None), {}
     with about(mechanism):
-        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, **samples)
+        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, wrap=wrap, **samples)
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ import numpy as np
 from kinfmu.errors import FmuError, listed, suggestion
 from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism.quoted import quoted
+from kinfmu.short_way import short_way
 from kinfmu.units import Quantity, factors, quantity_in
 
 if TYPE_CHECKING:
@@ -43,18 +44,33 @@ class InputTable:
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
 
 
-def input_table(inputs: str | Path | Mapping[str, ArrayLike], interface: Interface) -> InputTable:
+def input_table(
+    inputs: str | Path | Mapping[str, ArrayLike], interface: Interface, *, wrap: bool = False
+) -> InputTable:
     """The table in a CSV file or in a mapping of arrays, for the inputs of an FMU.
 
     A file's header is such as `time, crank_angle [deg]`; columns are parted by commas, semicolons or tabs. A
-    column without a unit in brackets is in the unit that the FMU declares.
+    column without a unit in brackets is in the unit that the FMU declares. wrap: angles are followed the short way.
     """
     quantities = {
         variable.name: quantity_in(variable.unit or "1", interface.length_unit) for variable in interface.part("inputs")
     }
     if isinstance(inputs, Mapping):
-        return _from_arrays(inputs, tuple(quantities))
-    return _from_csv(Path(inputs), quantities, interface.length_unit)
+        table = _from_arrays(inputs, tuple(quantities))
+    else:
+        table = _from_csv(Path(inputs), quantities, interface.length_unit)
+    return _unwrapped(table, quantities) if wrap else table
+
+
+def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTable:
+    """The table with its angles followed the short way from row to row."""
+    angles = [quantities[name] == Quantity("angle") for name in table.names]
+    if not any(angles):
+        raise FmuError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
+    columns = [
+        short_way(column) if is_angle else column for column, is_angle in zip(table.values.T, angles, strict=True)
+    ]
+    return replace(table, values=np.column_stack(columns))
 
 
 def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> InputTable:

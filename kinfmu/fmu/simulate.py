@@ -44,6 +44,7 @@ def simulate(
     step: float | None = None,
     inputs: str | Path | Mapping[str, ArrayLike] | None = None,
     parameters: Mapping[str, float | str | bool] | None = None,
+    wrap: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
     """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
@@ -51,8 +52,9 @@ def simulate(
     start, stop, step: [s], from the FMU's default experiment where not given; samples at t_k = start + k step, a last
     shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or
     `crank_angle [deg]` with a unit, or a mapping of arrays by name; linear between rows. Inputs drive then, unless
-    parameters say otherwise. parameters: by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. progress:
-    called with (samples done, samples in all).
+    parameters say otherwise. parameters: by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap:
+    angles among the inputs are followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump
+    is a turn back. progress: called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
 
@@ -64,7 +66,9 @@ def simulate(
         about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))
         interface = about.interface
         t = _times(interface, start, stop, step)
-        table = None if inputs is None else input_table(inputs, interface)
+        if wrap and inputs is None:
+            raise FmuError("wrap follows angles among the inputs, and no inputs are given")
+        table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
         chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
         samples = _Samples(interface, len(t))
         if table is None and not _time_drives(interface, chosen):

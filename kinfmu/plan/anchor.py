@@ -70,10 +70,11 @@ def _does_not_close(system: System) -> AssemblyError:
 def _ambiguous(system: System, found: Assembled, leaving: list[FloatArray]) -> AmbiguousStartError:
     spread = np.ptp(np.array(leaving) / system.column_scales, axis=0)
     tell = int(spread.argmax())
-    values = listed(f"{branch[tell]:.4g}" for branch in leaving)
+    name, unit = system.coordinates[tell], system.mechanism.length_unit
+    values = " or ".join(_value(branch[tell], is_angle=name.endswith(".phi"), unit=unit) for branch in leaving)
     return AmbiguousStartError(
         f"the start pose is singular ({_at(system, start_targets(system))}) and {len(leaving)} branches leave it: at "
-        f"{_at(system, found.u)} {system.coordinates[tell]} can be {values}; give a start pose beside it",
+        f"{_at(system, found.u)} {name} can be {values}; give a start pose beside it, on the branch that is meant",
         branches=leaving,
     )
 
@@ -82,8 +83,12 @@ def _at(system: System, u: FloatArray) -> str:
     """'crank = 1.047 rad (60 deg)': driver values for a message."""
     said = []
     for driver, value in zip(system.mechanism.drivers, u, strict=True):
-        if driver.quantity.kind == "angle":
-            said.append(f"{driver.name} = {value:.6g} rad ({math.degrees(value):.6g} deg)")
-        else:
-            said.append(f"{driver.name} = {value:.6g} {system.mechanism.length_unit}")
+        is_angle = driver.quantity.kind == "angle"
+        said.append(f"{driver.name} = {_value(value, is_angle=is_angle, unit=system.mechanism.length_unit)}")
     return listed(said)
+
+
+def _value(value: float, *, is_angle: bool, unit: str) -> str:
+    """'1.0472 rad (60 deg)' or '12 mm', without what rounding leaves of a zero."""
+    value = round(float(value), 12) + 0.0
+    return f"{value:.6g} rad ({math.degrees(value):.6g} deg)" if is_angle else f"{value:.6g} {unit}"

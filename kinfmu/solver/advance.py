@@ -169,7 +169,9 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
                 return known.with_bridge(again, pose.u[0])
     reach: float = model.REACH[0]
     before = pose if abs(here - pose.u[0]) > 1e-3 * reach else _beside(trial, low[0], walk, 0.02 * reach)
-    for block in low if before is not None else ():  # upstream first
+    if before is None:
+        return road
+    for block in low:  # upstream first
         zero = secant_zero(before, trial, block)
         if zero is None or abs(zero - here) > 1.05 * HALF_WIDTH * reach or known.knows(zero, block):
             continue
@@ -178,7 +180,7 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
             room = 2.0 * HALF_WIDTH * reach
             road = known = known.with_searched(Searched(zero - room, zero + room, block))
         elif known.knows(bridge.centre, block):
-            road = known = known.with_searched(Searched(*sorted((here, bridge.centre)), block))
+            road = known = known.with_searched(Searched(min(here, bridge.centre), max(here, bridge.centre), block))
         else:
             return known.with_bridge(bridge, pose.u[0])
     return road

@@ -62,7 +62,7 @@ class Span:
         """Largest difference of the two at the centre, in radians and sizes."""
         inner, outer = self.middle()
         scales = self.model.UNKNOWN_SCALES
-        return max([abs(a - b) / c for a, b, c in zip(inner, outer, scales, strict=True)])
+        return float(max([abs(a - b) / c for a, b, c in zip(inner, outer, scales, strict=True)]))
 
     def dump(self) -> list[Any]:
         """Plain numbers from which `restored_span` makes the same span."""

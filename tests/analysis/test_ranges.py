@@ -21,7 +21,7 @@ from kinfmu import (
     Translational,
 )
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
-from tests.mechanisms import five_bar, fourbar, slider_crank
+from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw
 
 
 def dead_centres(ground: float, crank: float, reach: float) -> float:
@@ -125,15 +125,24 @@ def test_a_cylinder_that_closes_wholly_ends_at_zero() -> None:
 
 
 def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dead_centre() -> None:
-    report = kinfmu.check(kinfmu.load("parallel_jaw"))
+    report = kinfmu.check(tight_jaw())
     (reach,) = report.ranges
     assert reach.lowest is not None
     assert reach.highest is not None
-    dead_centre = math.sqrt((20 + 40) ** 2 - 25**2)  # crank and rod in line
+    dead_centre = math.sqrt((math.hypot(6.05, 19.06) + 40) ** 2 - 25**2)  # crank and rod in line
     assert (reach.lowest.value, reach.lowest.kind) == (pytest.approx(-dead_centre, abs=1e-9), "dead centre")
-    if reach.highest.value < dead_centre - 1e-6:
-        assert reach.highest.kind == "change point"
-        assert "where branches cross and no run goes on" in str(report)
+    assert reach.highest.kind == "change point"
+    assert reach.highest.value < dead_centre - 0.2
+    assert "where branches cross and no run goes on" in str(report)
+
+
+def test_a_crossing_beside_a_dead_centre_is_bridged_and_the_dead_centre_is_the_limit() -> None:
+    (reach,) = kinfmu.check(kinfmu.load("parallel_jaw")).ranges
+    dead_centre = math.sqrt((20 + 40) ** 2 - 25**2)  # crank and rod in line
+    assert (reach.low, reach.high) == (pytest.approx(-dead_centre, abs=1e-9), pytest.approx(dead_centre, abs=1e-9))
+    crossings = [point.value for point in reach.points if point.kind == "change point"]
+    up = math.sqrt(40**2 - 25**2)
+    np.testing.assert_allclose(crossings, [20 - up, 20 + up], atol=1e-8)
 
 
 def test_a_rack_goes_more_than_a_turn_to_either_limit() -> None:

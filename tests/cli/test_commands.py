@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -99,6 +100,16 @@ def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> N
     (tmp_path / "inputs.csv").write_text("time,crank_angle\n0,0.5\n2,1.5\n")
     assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv").exit_code == 0
     assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.5, 1.0, 1.5])
+
+
+def test_simulate_follows_wrapped_angles_the_short_way_if_told(
+    command: Command, refuses: Callable[..., str], tmp_path: Path
+) -> None:
+    (tmp_path / "inputs.csv").write_text("time,crank_angle [deg]\n0,350\n2,10\n")
+    assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv", "--wrap").exit_code == 0
+    angles = log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"]
+    assert angles == pytest.approx([math.radians(350), math.tau, math.radians(370)])
+    assert refuses("simulate", "fourbar", "--wrap") == "--wrap follows the angles of --input, which is not given"
 
 
 def test_simulate_tells_a_limit_and_keeps_what_was_reached(command: Command, tmp_path: Path) -> None:

@@ -71,8 +71,8 @@ def reference() -> Case:
 def fourbar(ground: str, crank: str, coupler: str, rocker: str, branch: int = 1, start: float = 1.0) -> Case:
     """A four-bar with lengths as decimal numbers, on its smooth branch: branch as in the oracle at the start angle.
 
-        d^2 = (g - a)^2 + 4 g a sin^2(u/2),   e = (b^2 - c^2 + d^2) / (2 d^2),   h = A B / (2 d^2)
-        A^2 = (b + c)^2 - (g + a)^2 + 4 g a cos^2(u/2),   B^2 = (g - a)^2 - (b - c)^2 + 4 g a sin^2(u/2)
+    d^2 = (g - a)^2 + 4 g a sin^2(u/2),   e = (b^2 - c^2 + d^2) / (2 d^2),   h = A B / (2 d^2)
+    A^2 = (b + c)^2 - (g + a)^2 + 4 g a cos^2(u/2),   B^2 = (g - a)^2 - (b - c)^2 + 4 g a sin^2(u/2)
     """
     g, a, b, c = (mp.mpf(length) for length in (ground, crank, coupler, rocker))
     far, near = (b + c) ** 2 - (g + a) ** 2, (g - a) ** 2 - (b - c) ** 2
@@ -220,7 +220,8 @@ def _root(f: Jet, more: np.longdouble) -> Jet:
     if more == 0:
         return f
     square = _plus(_times(f, f), more)
-    root = np.sqrt(square[0])
+    with np.errstate(invalid="ignore"):  # beyond a limit there is none
+        root = np.sqrt(square[0])
     first = square[1] / (2 * root)
     return root, first, (square[2] / 2 - first * first) / root
 

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.backends.python import load_model
+from kinfmu.plan import compile_plan
 from kinfmu.solver import Pose, Solver, Status
-from tests.mechanisms import slider_crank
+from tests import oracle
+from tests.mechanisms import slider_crank, tight_jaw
 
 Errors = Callable[[Solver, Pose], list[float]]
 
@@ -78,14 +81,36 @@ def test_from_a_pose_at_the_limit_nothing_beyond_it_is_reached_and_all_before_it
     assert "the limit is" in beyond.message
 
 
-def test_a_crossing_that_no_bridge_spans_is_a_limit_and_no_way_to_the_other_branch() -> None:
-    """The gripper's parallelograms cross their other branch 3 mm before their dead centre: no room for a bridge."""
-    piston = np.arange(-44.0, 54.6, 0.25)
+@pytest.mark.parametrize("step", [0.25, 3.0, 20.0, 60.0])
+def test_a_crossing_3_mm_before_a_dead_centre_is_bridged_there_and_back(step: float) -> None:
+    """The gripper's parallelograms cross their other branch at 51.22 mm; its bell cranks and rods are in line at 54.54.
+
+    crank = angle of R - 90 deg where |R| = 20, |R - (-25, y)| = 40
+    """
+    crossing, dead_centre = math.sqrt(40.0**2 - 25.0**2) + 20.0, math.sqrt(60.0**2 - 25.0**2)
+    up = np.arange(-44.0, dead_centre, step)
+    piston = np.concatenate([up, [54.5, crossing, 54.0, crossing + 1e-9], up[::-1]])
     run = kinfmu.solve(kinfmu.load("parallel_jaw"), piston_position=piston)
-    assert run.good[piston < 51.2].all()
+    assert run.good.all()
+    for name in ("right_jaw.phi", "right_jaw.omega", "left_jaw.phi", "left_jaw.omega"):
+        np.testing.assert_allclose(run[name], 0.0, rtol=0, atol=1e-10)
+    assert np.abs(run["right_jaw.alpha"]).max() < 1e-7
+    distance = np.hypot(25.0, piston)
+    apart = np.arccos((distance**2 + 20.0**2 - 40.0**2) / (2.0 * 20.0 * distance))
+    crank = np.arctan2(piston, -25.0) - apart - np.pi / 2.0
+    off = np.remainder(run["right_crank.phi"] - crank + np.pi, 2.0 * np.pi) - np.pi
+    np.testing.assert_allclose(off, 0.0, rtol=0, atol=1e-11)
+    beyond = kinfmu.solve(kinfmu.load("parallel_jaw"), piston_position=[53.0, dead_centre + 1e-6])
+    assert beyond.good.tolist() == [True, False]
+
+
+def test_a_crossing_too_near_a_dead_centre_is_a_limit_and_no_way_to_the_other_branch() -> None:
+    piston = np.arange(-44.0, 54.6, 0.25)
+    run = kinfmu.solve(tight_jaw(), piston_position=piston)
+    assert run.good[piston < 54.25].all()
     np.testing.assert_allclose(run["right_jaw.phi"][run.good], 0.0, rtol=0, atol=1e-9)
-    assert (run.status[piston > 51.25] == Status.OUTSIDE).all()
-    assert any("the limit is piston = 51.22498" in event.text for event in run.events)
+    assert (run.status[piston > 54.3] == Status.OUTSIDE).all()
+    assert any("the limit is piston = 54.2863" in event.text for event in run.events)
 
 
 def test_prediction_far_off_does_not_land_a_turn_away() -> None:
@@ -96,3 +121,56 @@ def test_prediction_far_off_does_not_land_a_turn_away() -> None:
     assert run.good.all()
     assert steps.good.all()
     assert run["rod.phi"][1] == pytest.approx(steps["rod.phi"][-1], abs=1e-12)
+
+
+# ------------------------------------------------------------------------------------------ dead centres, to the digit
+
+
+DEAD_CENTRE = oracle.mp.acos(oracle.mp.mpf(1) / 13)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)^2
+
+
+@pytest.fixture(scope="module")
+def rocker() -> Solver:
+    return Solver(load_model(compile_plan(kinfmu.load("triple_rocker"))))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_limit_of_a_triple_rocker_is_exact_from_wherever_it_is_met(rocker: Solver, side: float) -> None:
+    rng = random.Random(3)  # noqa: S311  # samples, not secrets
+    limit = side * float(DEAD_CENTRE)
+    for _ in range(100):
+        near = rng.choice([rng.uniform(-0.9, 0.9), 1.0 - 10.0 ** rng.uniform(-12.0, -1.0)])
+        start = rocker.solve(rocker.anchor, (limit * near,))
+        assert start.good
+        beyond = rocker.solve(start, (limit + side * 10.0 ** rng.uniform(-9.0, 1.0),))
+        assert beyond.status == Status.OUTSIDE
+        told = float(beyond.message.split("the limit is left = ")[1].split()[0])
+        assert abs(told - side * DEAD_CENTRE) <= 1e-10
+        assert "coupler.phi, right.phi would part" in beyond.message
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_before_a_limit_samples_are_right_within_their_estimate_in_every_order(side: float) -> None:
+    names = ("left.phi", "coupler.phi", "right.phi")
+    for powers in (range(3, 13), range(12, 2, -1), (12, 3, 11, 4, 12, 7)):
+        u = [side * float(DEAD_CENTRE) * (1.0 - 10.0**-k) for k in powers]
+        run = kinfmu.solve(kinfmu.load("triple_rocker"), left_angle=u)
+        assert run.good.all()
+        exact = oracle.fourbar("100", "65", "50", "65", u)
+        columns = [run.outputs.index(name) for name in names]
+        for order, table in enumerate((run.values, run.rates, run.accelerations)):
+            for row, truth, estimate in zip(table[:, columns], exact[order], run.error[:, order], strict=True):
+                assert oracle.largest_error(row, truth, modulo_turns=order == 0) <= max(estimate, 1e-12)
+
+
+def test_a_run_is_never_poisoned_by_samples_outside() -> None:
+    limit = float(DEAD_CENTRE)
+    rng = random.Random(5)  # noqa: S311  # samples, not secrets
+    u = [rng.choice([1.0, 1.6]) * rng.uniform(-1.0, 1.0) * limit for _ in range(300)]
+    run = kinfmu.solve(kinfmu.load("triple_rocker"), left_angle=u)
+    np.testing.assert_array_equal(run.good, np.abs(u) < limit)
+    good = [value for value, fine in zip(u, run.good, strict=True) if fine]
+    exact = oracle.fourbar("100", "65", "50", "65", good)
+    columns = [run.outputs.index(name) for name in ("left.phi", "coupler.phi", "right.phi")]
+    errors = run.values[run.good][:, columns] - exact.q.astype(float)
+    np.testing.assert_allclose(np.remainder(errors + 3.0, 2.0 * math.pi) - 3.0, 0.0, rtol=0, atol=1e-11)
