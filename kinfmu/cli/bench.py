@@ -58,19 +58,17 @@ def _with_reference() -> list[str]:
     "there is none or with --mechanism.",
 )
 def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
-    r"""Measure on this machine, side by side with other ways.
+    """Measure on this machine, side by side with other ways; accuracy if nothing is said.
 
     \b
-    accuracy  run time against error of every engine in every setting, and past singular points: the
-              tables of docs/accuracy.md, docs/accuracy-settings.md, and their charts
+    accuracy  run time against error of every engine in every setting, and past
+              singular points: tables and charts as in docs/accuracy.md
     sample    a sample of solve beside a dense numpy Newton
     step      a step of the FMU beside the smallest pythonfmu FMU
     import    `import kinfmu` beside bare Python
     chains    chains of up to a thousand loops
     all       all of these
-
-    Accuracy if nothing is said.
-    """
+    """  # noqa: D301  click leaves lines behind a backspace as they are
     wanted = MEASUREMENTS if ALL in what else what or MEASUREMENTS[:1]
     if "accuracy" not in wanted and (mechanisms or folder is not None):
         raise click.UsageError(f"{'--mechanism' if mechanisms else '-o'} is for accuracy, not for {listed(wanted)}")

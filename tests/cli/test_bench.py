@@ -14,7 +14,7 @@ from kinfmu.bench import accuracy, case, chains, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
-from kinfmu.cli.bench import default_folder
+from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
 from tests.cli.conftest import Command
 
 QUICK = ["kinfmu", "generated Python", "scipy fsolve"]
@@ -174,6 +174,11 @@ def test_wrong_words_are_refused_with_what_would_be_right(
 ) -> None:
     assert refuses("bench", *arguments).startswith(told)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
+    said = command("bench", "--help").stdout
+    assert re.findall(r"^  (\w+) {2,}[\w`]", said, re.MULTILINE) == [*MEASUREMENTS, ALL]
 
 
 @pytest.mark.parametrize(
