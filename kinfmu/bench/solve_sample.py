@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from time import process_time
 
 import numpy as np
 
@@ -27,13 +28,14 @@ def run(rounds: int = ROUNDS) -> str:
     ways = {
         "dense numpy Newton, 9 coordinates, warm start": _reference(u),
         "python engine, q, qd, qdd": _engine(u),
-        "kinfmu.solve, with status": _solve(u),
-        "kinfmu.solve, error estimates and margin read": _solve(u, read=True),
+        "kinfmu.solve: writes its code, runs it, status": _solve(u),
+        "the same, error estimates and margin read": _solve(u, read=True),
     }
     base, *_ = times = [
-        spread([value / len(u) * 1e6 for value in seconds]) for seconds in in_turn(list(ways.values()), rounds)
+        spread([value / len(u) * 1e6 for value in seconds])
+        for seconds in in_turn(list(ways.values()), rounds, process_time)
     ]
-    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us a sample"]
+    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us of processor time a sample"]
     lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
     for (name, way), of in zip(ways.items(), times, strict=True):
         faster, error = base.median / of.median, _error(way())

@@ -73,7 +73,9 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     if "accuracy" not in wanted and (mechanisms or folder is not None):
         raise click.UsageError(f"{'--mechanism' if mechanisms else '-o'} is for accuracy, not for {listed(wanted)}")
     given = {} if rounds is None else {"rounds": rounds}
-    for name in dict.fromkeys(wanted):
+    for k, name in enumerate(dict.fromkeys(wanted)):
+        if k:
+            click.echo()
         if name == "accuracy":
             _accuracy(mechanisms, given, folder or (Path() if mechanisms else default_folder()))
         elif name == "sample":

@@ -184,7 +184,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
 @pytest.mark.parametrize(
     ("what", "lines"),
     [
-        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve", "kinfmu.solve"]),
+        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve", "the same, error"]),
         ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
