@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 
 from kinfmu import gallery
@@ -32,7 +33,7 @@ NOTES = (
     "kinfmu is what is shipped: the last, with every",
     "step judged, to round-off.",
 )
-LOOKS = {
+LOOKS = {  # of the engines
     "kinfmu": Look(BODIES[4], 2.2, "D"),
     "generated Python": Look(BODIES[0]),
     "pylinkage": Look(GROUND, 1.4, "s"),
@@ -53,7 +54,7 @@ def draw_work_precision(folder: Path, measured: Sequence[Measured]) -> tuple[Pat
             of_engine = [one for one in of_case if one.engine == engine and not one.setting.chord]
             fixed = [one for one in of_engine if one.setting.corrections is not None]
             for order in range(3):
-                line = [one for one in fixed or of_engine if one.setting.predictor == order and one.error == one.error]
+                line = [one for one in fixed or of_engine if one.setting.predictor == order and isfinite(one.error)]
                 if line:
                     points = [(one.error, one.microseconds.median) for one in line]
                     curves.append(Curve(engine, order, points))

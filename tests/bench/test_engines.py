@@ -13,11 +13,12 @@ from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
 from kinfmu.bench.engines import ENGINES, Casadi, Dense, Engine, Fsolve, Generated, Pylinkage, Shipped
 from kinfmu.bench.exact_fourbar import exact_fourbar
+from kinfmu.bench.pictures import LOOKS
 from kinfmu.bench.setting import Setting
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.equations.reference import solve_reference
 from kinfmu.errors import MissingPackageError
-from tests.oracle import follow, fourbar, largest_error
+from tests.oracle import follow, fourbar, largest_error, reference_fourbar, slider_crank
 from tests.power_series import Series, cos, sin
 
 ROUND_OFF = 5e-13  # relative to a column's largest magnitude
@@ -98,8 +99,9 @@ def test_a_column_that_is_zero_is_judged_by_its_kind_and_a_sample_not_found_is_n
     assert np.isnan(mechanism.errors(rows)).all()
 
 
-def test_every_engine_has_a_name_of_its_own_and_its_usual_setting_among_those_measured() -> None:
+def test_every_engine_has_a_name_and_a_look_of_its_own_and_its_usual_setting_among_those_measured() -> None:
     assert len({engine.name for engine in ENGINES}) == len(ENGINES)
+    assert {engine.name for engine in ENGINES} == set(LOOKS)
     for engine in ENGINES:
         assert engine.usual in engine.settings
         assert len(set(engine.settings)) == len(engine.settings)
@@ -130,6 +132,17 @@ def test_the_oracle_of_the_change_point_goes_on_smoothly_exactly_at_it() -> None
     for k, u in enumerate(at):
         for order, table in enumerate(found):
             assert largest_error(exact_fourbar(4, 1, 3, 2, u)[order, 3:], table[k]) <= 1e-14
+
+
+@pytest.mark.parametrize("u", [0.4, 1.5, 1.6, 3.1, 3.2])
+def test_closed_forms_in_doubles_are_those_of_50_digits(u: float) -> None:
+    parallelogram, isosceles = (point.closed_form(u) for point in POINTS[1:])
+    for order, exact in enumerate(reference_fourbar(u)):
+        assert largest_error(parallelogram[order], exact) <= 1e-15
+    branch = 1 if u < math.pi / 2 else -1  # the rod goes on past the pivot
+    columns = [0, 3, 4]  # crank.phi, rod.phi, piston.x
+    for order, exact in enumerate(slider_crank(1, 1, 0, u, branch=branch)):
+        assert largest_error(isosceles[order, columns], exact, modulo_turns=order == 0) <= 1e-15
 
 
 def test_without_mpmath_it_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
