@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
-from .pose import ALONE, Model, Pose, Vector, directed, on_road, tangent_of
+from .pose import ALONE, Model, Pose, Vector, directed, on_road
 from .road import Road, Searched
 from .span import REGULAR
 from .status import Status
@@ -20,6 +20,7 @@ NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to 
 BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away by accident
 UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
+UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
@@ -71,7 +72,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
         trial = trusted_step(model, pose, direction, s, u)
         if trial is not None:
             iterations += trial.iterations
-            if trial.margin < CLOSE and one and not is_smooth(model, pose, trial):
+            if trial.margin < (CLOSE if one else REGULAR) and not keeps_branch(model, pose, trial, direction, s):
                 trial = None
         if trial is not None:
             if trial.margin < REGULAR and one:
@@ -134,15 +135,17 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     return trial
 
 
-def is_smooth(model: Model, pose: Pose, trial: Pose) -> bool:
-    """False if the tangent of a single driver jumps between two poses, as it does from one branch to a crossing one.
+def keeps_branch(model: Model, pose: Pose, trial: Pose, direction: Vector, s: float) -> bool:
+    """False if the tangent of a way jumps in a step along it, as it does from one branch to a crossing one.
 
     Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
-    their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step.
+    their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either
+    that both branches are the same in doubles, no step leads on.
     """
-    s = trial.u[0] - pose.u[0]
-    zd, zdd = tangent_of(model, pose)
-    there = tangent_of(model, trial)[0]
+    if pose.margin < UNDECIDED and trial.margin > pose.margin:
+        return False
+    zd, zdd = directed(model, pose, direction)
+    there = directed(model, trial, direction)[0]
     scales = model.UNKNOWN_SCALES
     largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one an unknown, all
     jump = max([abs(b - (a + s * aa)) / c for a, aa, b, c in zip(zd, zdd, there, scales)])  # noqa: B905

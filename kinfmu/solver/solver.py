@@ -11,7 +11,7 @@ from .advance import (
     NEAR_SINGULAR,
     Limit,
     advance,
-    is_smooth,
+    keeps_branch,
     limit_message,
     place,
     surveyed,
@@ -58,7 +58,7 @@ class Solver:
                         return near
                     if (
                         margin > NEAR_SINGULAR
-                        and (margin >= CLOSE or is_smooth(self.model, start, near))
+                        and (margin >= CLOSE or keeps_branch(self.model, start, near, ALONE, s))
                         and surveyed(self.model, start, near) is road  # nothing new there
                     ):
                         return near
