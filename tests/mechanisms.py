@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from kinfmu import AngleDriver, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
 from kinfmu.mechanism.toml_file import parse, text
@@ -160,6 +161,17 @@ def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0, star
         ],
         [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
         points={"slider": "rod.S"},
+    )
+
+
+def with_arm(linkage: Mechanism) -> Mechanism:
+    """A four-bar with an arm beside it that has a driver of its own."""
+    ground = Body("ground", {**linkage.bodies[0].points, "T": (9, 0)})
+    return replace(
+        linkage,
+        bodies=(ground, *linkage.bodies[1:], Body("arm", {"T": (0, 0), "end": (1, 0)}, (9, 0, 0.3))),
+        joints=(*linkage.joints, Revolute("T", ("ground.T", "arm.T"))),
+        drivers=(*linkage.drivers, AngleDriver("arm", "arm", ConstantSpeed(0.3, 1.0))),
     )
 
 

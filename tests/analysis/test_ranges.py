@@ -21,7 +21,7 @@ from kinfmu import (
     Translational,
 )
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
-from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw
+from tests.mechanisms import five_bar, fourbar, slider_crank, tight_jaw, with_arm
 
 
 def dead_centres(ground: float, crank: float, reach: float) -> float:
@@ -154,16 +154,7 @@ def test_a_rack_goes_more_than_a_turn_to_either_limit() -> None:
 
 
 def test_change_points_show_with_several_drivers_too() -> None:
-    linkage = fourbar(2, 1, 2, 1)
-    arm = Body("arm", {"T": (0, 0), "end": (1, 0)}, (4, 0, 0.3))
-    ground = Body("ground", {**linkage.bodies[0].points, "T": (4, 0)})
-    both = replace(
-        linkage,
-        bodies=(ground, *linkage.bodies[1:], arm),
-        joints=(*linkage.joints, Revolute("T", ("ground.T", "arm.T"))),
-        drivers=(*linkage.drivers, AngleDriver("arm", "arm", ConstantSpeed(0.3, 1.0))),
-    )
-    report = kinfmu.check(both)
+    report = kinfmu.check(with_arm(fourbar(2, 1, 2, 1)))
     crank, arm_alone = report.ranges
     np.testing.assert_allclose([point.value for point in crank.points], [0.0, math.pi], atol=1e-11)
     assert arm_alone.points == ()

@@ -14,7 +14,8 @@ from kinfmu.backends.python import load_model
 from kinfmu.plan import compile_plan
 from kinfmu.solver import Pose, Solver, Status
 from tests import oracle
-from tests.mechanisms import slider_crank, tight_jaw
+from tests.mechanisms import slider_crank, tight_jaw, with_arm
+from tests.solver.change_points import fourbar
 
 Errors = Callable[[Solver, Pose], list[float]]
 
@@ -174,3 +175,30 @@ def test_a_run_is_never_poisoned_by_samples_outside() -> None:
     columns = [run.outputs.index(name) for name in ("left.phi", "coupler.phi", "right.phi")]
     errors = run.values[run.good][:, columns] - exact.q.astype(float)
     np.testing.assert_allclose(np.remainder(errors + 3.0, 2.0 * math.pi) - 3.0, 0.0, rtol=0, atol=1e-11)
+
+
+# --------------------------------------------------------------------------------------------------- several drivers
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("lengths", [("4", "1", "3", "2"), ("2", "1", "2", "1")])
+def test_with_several_drivers_a_crossing_is_a_limit_and_no_way_to_the_other_branch(
+    lengths: tuple[str, str, str, str], branch: int
+) -> None:
+    case = fourbar(*lengths, branch=branch)
+    mechanism = with_arm(case.mechanism)
+    rng = random.Random(branch)  # noqa: S311  # samples, not secrets
+    for _ in range(6):
+        step = 10.0 ** rng.uniform(-2.0, 0.5)
+        u = [1.0]
+        for k in range(80):
+            u.append(u[-1] + rng.uniform(0.5, 1.5) * (step if k < 50 else -step))
+        arm = [rng.uniform(0.0, 1.0) for _ in u]
+        run = kinfmu.solve(mechanism, crank_angle=u, arm_angle=arm, arm_speed=0.0)
+        assert run.good[0]
+        assert set(run.status.tolist()) <= {Status.OK, Status.NEAR_SINGULAR, Status.OUTSIDE}
+        exact = case.motion(np.array(u, dtype=np.longdouble))
+        for name, columns in exact.items():
+            for order, table in enumerate((run.values, run.rates, run.accelerations)):
+                gap = np.abs(table[:, run.outputs.index(name)] - columns[order].astype(float))
+                assert (gap[run.good] <= np.maximum(run.error[run.good, order], 1e-11)).all()

@@ -4,6 +4,7 @@
 #define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near and its place is extrapolated */
 #define BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
 #define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
+#define UNDECIDED 1e-6     /* determinant below which a way ends: as small where lengths make a change point within 1e-12 */
 #define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part of it: more is another branch */
 #define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
@@ -48,21 +49,32 @@ bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, 
     return true;
 }
 
-/* False if the tangent of a single driver jumps between two poses, as it does from one branch to a crossing one.
+/* False if the tangent of a way jumps in a step along it, as it does from one branch to a crossing one.
  *
  * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign; their
- * tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step.
+ * tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either that both
+ * branches are the same in doubles, no step leads on.
  */
-bool kf_is_smooth(const kf_model *model, kf_pose *pose, kf_pose *trial)
+bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
 {
-    const double s = KF_POSE_U(trial)[0] - KF_POSE_U(pose)[0];
+    const kf_model *const model = &solver->model;
+    const double *x1 = pose->x1, *x2 = pose->x2, *const there = trial->x1;
     double largest = 0.0, jump = 0.0;
     int k;
-    kf_tangent(model, pose);
-    kf_tangent(model, trial);
+    if (pose->found.margin < UNDECIDED && trial->found.margin > pose->found.margin) {
+        return false;
+    }
+    if (KF_DRIVERS == 1) {
+        kf_tangent(model, pose);
+        kf_tangent(model, trial);
+    } else {
+        x1 = solver->scratch.x1; /* of the step from the pose to the trial */
+        x2 = solver->scratch.x2;
+        kf_velocity(model, &trial->found, direction, NULL, NULL, trial->x1);
+    }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
-        largest = fmax(largest, fabs(trial->x1[k]) / kf_unknown_scales[k]);
-        jump = fmax(jump, fabs(trial->x1[k] - (pose->x1[k] + s * pose->x2[k])) / kf_unknown_scales[k]);
+        largest = fmax(largest, fabs(there[k]) / kf_unknown_scales[k]);
+        jump = fmax(jump, fabs(there[k] - (x1[k] + s * x2[k])) / kf_unknown_scales[k]);
     }
     return jump <= SMOOTH * largest;
 }
@@ -248,7 +260,7 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
         }
         if (kf_trusted_step(solver, pose, direction, s, u, trial)) {
             iterations += trial->found.iterations;
-            if (!(trial->found.margin < KF_CLOSE && one) || kf_is_smooth(&solver->model, pose, trial)) {
+            if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR) || kf_keeps_branch(solver, pose, trial, direction, s)) {
                 if (trial->found.margin < KF_REGULAR && one) {
                     const int road = kf_surveyed(solver, pose, trial);
                     if (road != trial->road) {

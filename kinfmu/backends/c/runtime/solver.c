@@ -72,7 +72,7 @@ static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose 
         return true;
     }
     if (pose->found.margin > KF_NEAR
-        && (pose->found.margin >= KF_CLOSE || kf_is_smooth(&solver->model, start, pose))) {
+        && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, kf_alone, s))) {
         kf_needed(solver, start->road, start->road, start->road);
         return kf_surveyed(solver, start, pose) == pose->road; /* nothing new there */
     }

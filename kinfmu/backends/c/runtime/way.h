@@ -77,7 +77,7 @@ typedef struct {
 enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u, kf_pose *trial);
-bool kf_is_smooth(const kf_model *model, kf_pose *pose, kf_pose *trial);
+bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
 
 /* survey.c */
