@@ -152,6 +152,7 @@ class _Model:
             *array("bool kf_driver_is_angle", booleans(kind == "angle" for kind in kinds)),
             *_strings("kf_unknown_names", plan.unknowns),
             *array("bool kf_unknown_is_angle", booleans(name.endswith(".phi") for name in plan.unknowns)),
+            *array("bool kf_output_is_angle", booleans(name.endswith(".phi") for name in plan.outputs)),
             *_strings("kf_watch_names", plan.watch_names),
             *_strings("kf_parameter_names", [parameter.name for parameter in plan.parameters]),
             *_strings("kf_block_row_names", [", ".join(block.row_names) for block in self.solved]),

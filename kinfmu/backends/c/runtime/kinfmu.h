@@ -68,6 +68,7 @@ extern const char *const kf_driver_names[KF_DRIVERS];
 extern const bool kf_driver_is_angle[KF_DRIVERS];
 extern const char *const kf_unknown_names[KF_ROOM(KF_UNKNOWNS)];
 extern const bool kf_unknown_is_angle[KF_ROOM(KF_UNKNOWNS)];
+extern const bool kf_output_is_angle[KF_ROOM(KF_OUTPUTS)];
 extern const char *const kf_watch_names[KF_ROOM(KF_WATCHES)];
 extern const char *const kf_parameter_names[KF_ROOM(KF_PARAMETERS)];
 extern const char *const kf_block_row_names[KF_ROOM(KF_BLOCKS)]; /* "Q.x, Q.y" */

@@ -121,48 +121,50 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     return pose->status;
 }
 
-/* With one driver, x' and x'' are derivatives with respect to it, and the same goes for the outputs y:
+/* Outputs, rates and accelerations from the derivatives that the pose holds.
  *
- *     yd = y' ud,   ydd = y'' ud^2 + y' udd
+ * With one driver these are with respect to it, and the same goes for the outputs y: yd = y' ud, ydd = y'' ud^2 + y' udd.
  */
-void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs, double *rates,
-               double *accelerations)
+void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
+                   double *rates, double *accelerations)
 {
-    const kf_model *const model = &solver->model;
     const bool one = KF_DRIVERS == 1;
     int k;
     if (outputs != NULL) {
         kf_outputs(model, &pose->found, outputs);
     }
-    if (rates == NULL && accelerations == NULL) {
-        return;
-    }
-    if (!one || pose->derivatives < 1) {
-        kf_velocity(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
-        pose->derivatives = one ? 1 : 0;
-    }
     if (accelerations != NULL) {
-        double slopes[KF_ROOM(KF_OUTPUTS)];
-        if (!one || pose->derivatives < 2) {
-            kf_acceleration(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
-            pose->derivatives = one ? 2 : 0;
-        }
         kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, accelerations);
-        if (one) {
-            double *const slope = rates != NULL ? rates : slopes;
-            kf_output_rates(model, &pose->found, pose->x1, slope);
-            for (k = 0; k < KF_OUTPUTS; ++k) {
-                accelerations[k] = accelerations[k] * (ud[0] * ud[0]) + slope[k] * udd[0];
-            }
-        } else if (rates != NULL) {
-            kf_output_rates(model, &pose->found, pose->x1, rates);
+    }
+    if (one && accelerations != NULL) {
+        double slopes[KF_ROOM(KF_OUTPUTS)];
+        double *const slope = rates != NULL ? rates : slopes;
+        kf_output_rates(model, &pose->found, pose->x1, slope);
+        for (k = 0; k < KF_OUTPUTS; ++k) {
+            accelerations[k] = accelerations[k] * (ud[0] * ud[0]) + slope[k] * udd[0];
         }
-    } else {
+    } else if (rates != NULL) {
         kf_output_rates(model, &pose->found, pose->x1, rates);
     }
     for (k = 0; one && rates != NULL && k < KF_OUTPUTS; ++k) {
         rates[k] *= ud[0];
     }
+}
+
+void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs, double *rates,
+               double *accelerations)
+{
+    const kf_model *const model = &solver->model;
+    const bool one = KF_DRIVERS == 1;
+    if ((rates != NULL || accelerations != NULL) && pose->derivatives < 1) {
+        kf_velocity(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
+        pose->derivatives = one ? 1 : 0; /* of the single driver they stay true */
+    }
+    if (accelerations != NULL && pose->derivatives < 2) {
+        kf_acceleration(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
+        pose->derivatives = one ? 2 : 0;
+    }
+    kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);
 }
 
 double kf_margin(const kf_solver *solver, const kf_pose *pose)

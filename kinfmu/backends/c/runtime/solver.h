@@ -100,10 +100,19 @@ typedef struct {
 #define KF_BRIDGES (KF_DRIVERS == 1 ? 3 * KF_KEPT + 1 : 1)
 #define KF_SPANS (KF_DRIVERS == 1 ? KF_KEPT + 8 : 1)
 
+/* What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held. */
+typedef struct {
+    double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
+    double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
+    bool is_given;
+} kf_source;
+
 /* What does not outlive a call. */
 typedef struct {
     kf_pose base, way[4], walk[2], beside, located;
     kf_model ahead;
+    kf_source source;
+    double rows[2][3][KF_ROOM(KF_OUTPUTS)];
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
     double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
     double x1[KF_COORDINATES], x2[KF_COORDINATES];

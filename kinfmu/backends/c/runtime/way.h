@@ -83,6 +83,10 @@ kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
 /* survey.c */
 int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 
+/* solver.c */
+void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
+                   double *rates, double *accelerations);
+
 /* message.c */
 void kf_say(char *message, const char *format, ...);
 void kf_say_number(char *message, const char *format, double value);
