@@ -63,7 +63,7 @@ class Solver:
                     ):
                         return near
         if not isfinite(sum(u)):
-            return failed(start, u, Status.OUTSIDE, f"driver value {u!r} is not a finite number")
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
         pose = advance(self.model, start, u)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))

@@ -93,9 +93,22 @@ class Native:
         assert told.status == status
         return told
 
-    def told(self) -> Told:
+    def take(self, other: Native) -> None:
+        """The state of another instance: the solver's first bytes and the committed pose's."""
+        state = int(self.c.probe_state())
+        ctypes.memmove(self.solver, other.solver, state)
+        if isinstance(other.good, ctypes.c_void_p):
+            self.restart()
+        else:
+            self.good, self.found = self.poses
+            ctypes.memmove(self.good, other.good, len(self.good))
+
+    def told_anchor(self) -> Told:
+        return self.told(ctypes.c_void_p(self.c.probe_anchor(self.solver)))
+
+    def told(self, pose: Any = None) -> Told:
         z, three, counts = numbers([0.0] * self.sizes["UNKNOWNS"]), numbers([0.0] * 3), (ctypes.c_int * 3)()
-        self.c.probe_tell(self.found, z, three, counts)
+        self.c.probe_tell(self.found if pose is None else pose, z, three, counts)
         return Told(tuple(z[: self.sizes["UNKNOWNS"]]), *three, *counts[:2])
 
     def commit(self) -> None:

@@ -19,7 +19,7 @@ typedef struct {
     const double *ud, *udd;
     const bool *held;
     double speed, curve;
-} kf_drive;
+} kf_driven;
 
 static double larger(double most, int count, const double *values, const double *scales)
 {
@@ -31,10 +31,10 @@ static double larger(double most, int count, const double *values, const double 
 }
 
 /* How a pose is driven; its derivatives are formed. */
-static kf_drive drive_of(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
+static kf_driven drive_of(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
 {
     const bool one = KF_DRIVERS == 1;
-    kf_drive drive;
+    kf_driven drive;
     drive.ud = one ? kf_alone : ud;
     drive.udd = one ? kf_at_rest : udd;
     drive.held = pose->bridge < 0 ? NULL : solver->spans[solver->bridges[pose->bridge].span].held;
@@ -65,7 +65,7 @@ static bool soften(const kf_model *model, const kf_found *found, int block, cons
     kf_jacobian(model, found, block, matrix);
     if (m == 1 && k == 1) {
         columns[0] = rows[0] / matrix[0];
-    } else if (m == 2 && k == 2) {
+    } else if (KF_LARGEST_BLOCK >= 4 && m == 2 && k == 2) {
         const double det = matrix[0] * matrix[3] - matrix[1] * matrix[2];
         columns[0] = matrix[3] * (rows[0] / det);
         columns[1] = -matrix[2] * (rows[0] / det);
@@ -149,7 +149,7 @@ static int worst_blocks(kf_solver *solver, const kf_found *found, const bool *he
 }
 
 /* What one block adds. */
-static void make_source(kf_solver *solver, const kf_pose *pose, const kf_drive *drive, int block, double weight)
+static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int block, double weight)
 {
     kf_source *const source = &solver->scratch.source;
     double *const given = source->given_first, *const all_of = solver->scratch.x1; /* of the unknowns */
@@ -189,7 +189,7 @@ static void add(const double *there, const double *here, const double *more, dou
 }
 
 /* The pose that a source moves to, with its derivatives. */
-static bool move(kf_solver *solver, const kf_pose *pose, const kf_drive *drive, kf_pose *there)
+static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, kf_pose *there)
 {
     const kf_model *const model = &solver->model;
     const kf_source *const source = &solver->scratch.source;
@@ -223,7 +223,7 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     const double half = span->half;
     int worst[MOST_SOURCES], count, i, k;
     double weight;
-    kf_drive drive;
+    kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
     if (!kf_evaluated_as_given(&solver->model, &span->u[place], span->z[place], &node->found)) {
         return false;
@@ -256,7 +256,7 @@ static double away(double gap, double by)
 }
 
 /* What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by. */
-static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const kf_drive *drive)
+static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
 {
     kf_scratch *const scratch = &solver->scratch;
     kf_source *const source = &scratch->source;
@@ -299,7 +299,7 @@ static double largest_gap(const double *there, const double *here)
 }
 
 /* The squares of what all sources move the outputs by; false if nothing is known. */
-static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_drive *drive,
+static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_driven *drive,
                   double squares[3])
 {
     kf_pose *const there = &solver->scratch.way[0];
@@ -328,7 +328,7 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
 
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
 {
-    const kf_drive drive = drive_of(solver, pose, ud, udd);
+    const kf_driven drive = drive_of(solver, pose, ud, udd);
     double squares[3] = {0.0, 0.0, 0.0}, largest = 0.0, speed = drive.speed, curve = drive.curve;
     const double *const outputs = solver->scratch.rows[0][0];
     int k;
