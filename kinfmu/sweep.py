@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.backends.python import load_model, load_module
-from kinfmu.errors import KinfmuError, listed, suggestion
-from kinfmu.kept import Kept
+from kinfmu.errors import CompilerError, KinfmuError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.python_engine import PythonEngine
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 from kinfmu.short_way import short_way
 from kinfmu.solver import Solver, Stuck, with_parameters
 from kinfmu.solver.pose import Vector
+from kinfmu.swept import Driven, Engine, Tables
 
-_GAP = float("nan")
+ENGINES = ("auto", "python", "native")
+WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 
 
 def solve(
@@ -33,7 +35,7 @@ def solve(
     engine: str = "auto",
     tolerance: float = 1e-9,
     wrap: bool = False,
-    out: tuple[FloatArray, FloatArray, FloatArray] | None = None,
+    out: Tables | None = None,
     **inputs: ArrayLike,
 ) -> Run:
     """Positions, velocities and accelerations at the given times, or at the given driver values.
@@ -43,29 +45,35 @@ def solve(
     and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
     parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
-    if None; what they do not need is not solved. engine: 'auto' or 'python'. wrap: angles given as inputs are followed
-    the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three arrays
-    (n, outputs) that take values, rates and accelerations.
+    if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
+    and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there. wrap:
+    angles given as inputs are followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump
+    is a turn back. out: three arrays (n, outputs), by samples or by outputs (order="F": faster), that take values,
+    rates and accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
     last good sample.
     """
-    if engine not in ("auto", "python"):
-        raise KinfmuError(f"engine '{engine}' is not known; engines: auto, python")
+    if engine not in ENGINES:
+        raise KinfmuError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
     plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
-    plan, solver = _with_geometry(plan, geometry, tolerance)
+    plan, bound, solver = _with_geometry(plan, geometry, tolerance)
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
         times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
+        driven = (u, ud, udd)
+    elif wrap:
+        raise KinfmuError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
+    elif inputs:
+        raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
     else:
-        if wrap:
-            raise KinfmuError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
-        if inputs:
-            raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
-        times, u, ud, udd = _driven_by_time(solver.model, _column("t", t), constants)
-    return _swept(plan, solver, times, (u, ud, udd), out, constants)
+        times, driven = _column("t", t), None
+    chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
+    if driven is None:
+        driven = chosen.drive(times, tuple(constants.values()))
+    return _swept(plan, chosen, times, driven, out, constants)
 
 
 def run_times(run: RunSettings) -> FloatArray:
@@ -97,22 +105,39 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
     return constants, geometry
 
 
-def _with_geometry(plan: SolvePlan, geometry: Mapping[str, float | str], tolerance: float) -> tuple[SolvePlan, Solver]:
-    """A solver for other values of parameters, followed from the plan's anchor, and the plan with them written.
+def _with_geometry(
+    plan: SolvePlan, geometry: Mapping[str, float | str], tolerance: float
+) -> tuple[SolvePlan, Vector, Solver | None]:
+    """The plan with other values of parameters written, the values to be bound (none: those of the plan), and a solver
+    if there is one already, followed from the plan's anchor.
 
     What continuation does not reach is planned anew, as a file with these values would be: that assembles, or says
     which joint stays open by how much.
     """
     if not geometry:
-        return plan, Solver(load_model(plan), tolerance)
+        return plan, (), None
     mechanism = plan.mechanism.with_parameters(geometry)
     if all(plan.mechanism.parameters[name].expression is None for name in geometry):
         values = tuple(float(mechanism.parameters[parameter.name].value) for parameter in plan.parameters)
         solver = with_parameters(load_module(plan), values, tolerance)
         if not isinstance(solver, Stuck):
-            return replace(plan, mechanism=mechanism), solver
-    anew = compile_plan(mechanism, plan.outputs)
-    return anew, Solver(load_model(anew), tolerance)
+            return replace(plan, mechanism=mechanism), values, solver
+    return compile_plan(mechanism, plan.outputs), (), None
+
+
+def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, tolerance: float, count: int) -> Engine:
+    """The engine of a name; `auto` takes the native one where it pays and can be had."""
+    work = count * max(1, len(plan.blocks))
+    if name == "native" or (name == "auto" and work >= WORTH_COMPILING):
+        from kinfmu.native_engine import NativeEngine
+
+        fixed = plan.fixed if solver is None else solver.model.FIXED
+        try:
+            return NativeEngine(plan, bound, fixed, tolerance)
+        except CompilerError:
+            if name == "native":
+                raise
+    return PythonEngine(solver or Solver(load_model(plan), tolerance))
 
 
 def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: bool = False) -> tuple[FloatArray, ...]:
@@ -158,49 +183,19 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     return column
 
 
-def _driven_by_time(model: Any, times: FloatArray, constants: Mapping[str, float]) -> tuple[FloatArray, ...]:
-    values = tuple(constants.values())
-    driven = np.array([model.drive(t, values) for t in times.tolist()], dtype=float)  # (n, 3, d)
-    driven = driven.reshape(len(times), 3, len(model.DRIVERS))
-    return times, driven[:, 0], driven[:, 1], driven[:, 2]
-
-
 def _swept(
     plan: SolvePlan,
-    solver: Solver,
+    engine: Engine,
     times: FloatArray,
-    driven: tuple[FloatArray, FloatArray, FloatArray],
-    out: tuple[FloatArray, FloatArray, FloatArray] | None,
+    driven: Driven,
+    out: Tables | None,
     constants: Mapping[str, float],
 ) -> Run:
-    n, m = len(times), len(plan.outputs)
-    tables = _tables(out, (n, m))
-    gap: Vector = (_GAP,) * (3 * m)
-    motions: list[Vector] = []
-    told, watches, events = [], [], []
-    kept = Kept(solver, driven)
-    good, failing = solver.anchor, False
-    samples = zip(times.tolist(), *(map(tuple, table.tolist()) for table in driven), strict=True)
-    for t, u, ud, udd in samples:
-        pose = solver.solve(good, u)
-        kept.add(pose)
-        if pose.good:
-            good, failing = pose, False
-            told.append((pose.status, pose.residual, pose.iterations))
-            motions.append(solver.motion(pose, ud, udd))
-            watches.append(solver.watch(pose))
-        else:
-            if not failing:
-                events.append(Event(t, "error", pose.message))
-            failing = True
-            told.append((pose.status, _GAP, 0))
-            motions.append(gap)
-            watches.append((_GAP,) * len(plan.watches))
-    whole = np.array(motions, dtype=float).reshape(n, 3, m)
-    for k, array in enumerate(tables):
-        array[:] = whole[:, k]
-    diagnostics = np.array(told, dtype=float).reshape(n, 3)
-    inputs = np.stack(driven, axis=2).reshape(n, 3 * len(plan.drivers))  # value, speed, acceleration of each driver
+    tables = _tables(out, (len(times), len(plan.outputs)), engine.order)
+    told = engine.sweep(driven, tables)
+    inputs = np.stack(driven, axis=2).reshape(
+        len(times), 3 * len(plan.drivers)
+    )  # value, speed, acceleration of each driver
     return Run(
         t=times,
         outputs=plan.outputs,
@@ -208,34 +203,32 @@ def _swept(
         values=tables[0],
         rates=tables[1],
         accelerations=tables[2],
-        fixed=solver.model.FIXED,
+        fixed=engine.fixed,
         input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
         inputs=inputs,
-        status=diagnostics[:, 0].astype(np.int64),
-        iterations=diagnostics[:, 2].astype(np.int64),
-        residual=diagnostics[:, 1],
-        margin=kept.margins,
-        error=kept.errors,
+        status=told.status,
+        iterations=told.iterations,
+        residual=told.residual,
+        margin=told.margin,
+        error=told.error,
         watch_names=plan.watch_names,
-        watch=np.array(watches, dtype=float).reshape(n, len(plan.watches)),
+        watch=told.watch,
         length_unit=plan.mechanism.length_unit,
         mechanism_text=text(plan.mechanism),
         info={
             "name": plan.mechanism.name,
             "title": plan.mechanism.title,
-            "engine": "python",
+            "engine": engine.name,
             **{name: repr(float(parameter.value)) for name, parameter in plan.mechanism.parameters.items()},
             **{name: repr(value) for name, value in constants.items()},
         },
-        events=tuple(events),
+        events=tuple(Event(float(times[k]), "error", message) for k, message in told.failures),
     )
 
 
-def _tables(
-    out: tuple[FloatArray, FloatArray, FloatArray] | None, shape: tuple[int, int]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:
     if out is None:
-        return np.empty(shape), np.empty(shape), np.empty(shape)
+        return tuple(np.empty(shape, order=order) for _ in range(3))  # type: ignore[return-value]  # three of them
     for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
         if array.shape != shape or array.dtype != np.float64:
             raise KinfmuError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")

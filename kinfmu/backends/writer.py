@@ -24,11 +24,18 @@ def identifier(name: str) -> str:
 class Names:
     """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order.
 
-    curves: names of the constants that hold the data of curves.
+    curves: names of the constants that hold the data of curves; functions: names of functions that are called otherwise
+    than sin, cos and so on.
     """
 
-    def __init__(self, reserved: Iterable[str] = (), curves: Mapping[CurveData, str] | None = None) -> None:
+    def __init__(
+        self,
+        reserved: Iterable[str] = (),
+        curves: Mapping[CurveData, str] | None = None,
+        functions: Mapping[str, str] | None = None,
+    ) -> None:
         self.curves = curves or {}
+        self.functions = functions or {}
         self._numbered: dict[Node, str] = {}
         self._reserved = {identifier(name) for name in reserved}
         self._count = 0
@@ -122,7 +129,8 @@ class Writer:
             data, order = node.curve
             return f"curve({self.names.curves[data]}, {order}, {parts[0][0]})", _ATOM
         if node.op in FUNCTIONS:
-            return f"{node.op}({', '.join(text for text, _ in parts)})", _ATOM
+            name = self.names.functions.get(node.op, node.op)
+            return f"{name}({', '.join(text for text, _ in parts)})", _ATOM
         level = _LEVEL[node.op]
         if node.op == "neg":
             return f"-{_wrapped(parts[0], level + 1)}", level

@@ -37,7 +37,7 @@ TABLES = (".csv", ".parquet", ".npz")
     "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=30rpm."
 )
 @click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
-@click.option("--engine", type=click.Choice(["auto", "python"]), default="auto", show_default=True)
+@click.option("--engine", type=click.Choice(["auto", "python", "native"]), default="auto", show_default=True)
 def solve(
     mechanism: str,
     output: Path,

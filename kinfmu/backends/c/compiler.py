@@ -33,6 +33,11 @@ def sources(names: Sequence[str]) -> dict[str, str]:
     return {name: (RUNTIME / name).read_text("utf-8") for name in names}
 
 
+def runtime() -> dict[str, str]:
+    """All files of the run time."""
+    return sources(sorted(path.name for path in RUNTIME.iterdir() if path.suffix in (".c", ".h")))
+
+
 def shared_library(files: Mapping[str, str], flags: Sequence[str] = ()) -> Path:
     """A shared library of C files (and the headers that they include), by name; compiled if the cache has it not.
 

@@ -58,27 +58,16 @@ class Units:
                 self.names.assign(motion[0], name)
         self.positions = reachable([node for group in positions(kind.blocks) for node in group])
         self.known = {*self.positions, *derived}  # what later functions find computed
-        self.given = [f"g{k}" for k in range(len(kind.given))]
-        self.constants = [f"c{k}" for k in range(kind.constants)]
-        self.own = {name: f"k{k}" for k, name in enumerate(kind.coordinates)}
+        self.given, self.constants, own = fields(kind)
+        self.own = dict(zip(kind.coordinates, own, strict=True))
         self.parameters = parameters
         self.derived = derived
-        self.place: dict[str, tuple[int, str]] = {}  # of a symbol: order of derivative and place in that list
-        for field, names in zip(self.given, kind.given, strict=True):
-            self.place |= {name: (order, field) for order, name in enumerate(names)}
-        for name, field in self.own.items():
-            self.place |= {derivative_name(name, order): (order, field) for order in range(3)}
+        self.place = places(kind)
         self.hold: dict[str, Node] = {}  # numbers that later functions take from the position
         self.keeps_determinant = False
         self.later = self._later()
 
     # What the functions are made of
-
-    def row_type(self) -> list[str]:
-        fields = [f"int {', '.join(self.given)};"] if self.given else []
-        fields += [f"double {', '.join(self.constants)};"] if self.constants else []
-        return ["typedef struct {", *(f"    {field}" for field in [*fields, f"int {', '.join(self.own.values())};"]),
-                f"}} row{self.label};"]  # fmt: skip
 
     def room(self) -> int:
         """How many numbers a unit hands on."""
@@ -144,7 +133,7 @@ class Units:
     # The functions
 
     def source(self) -> list[str]:
-        text = "\n".join([*self.row_type(), "", *self._position(), *self.later])
+        text = "\n".join([*row_type(self.kind), "", *self._position(), *self.later])
         for name in self.hold:
             text = text.replace(f"<{name}>", self._hold(name))
         return text.replace("<kept>", self._kept).split("\n")
@@ -324,6 +313,31 @@ class Units:
             " const double *hold,\n    double *entries)"
         )
         return self._function(signature, ["model", "row", "x", "hold"], lines)
+
+
+def fields(kind: Kind) -> tuple[list[str], list[str], list[str]]:
+    """Names in a row: of the places of what is given, of the numbers, and of the places of the unit's coordinates."""
+    given = [f"g{k}" for k in range(len(kind.given))]
+    return given, [f"c{k}" for k in range(kind.constants)], [f"k{k}" for k in range(len(kind.coordinates))]
+
+
+def row_type(kind: Kind) -> list[str]:
+    """The struct of a row."""
+    given, constants, own = fields(kind)
+    members = [f"    int {', '.join(given)};"] if given else []
+    members += [f"    double {', '.join(constants)};"] if constants else []
+    return ["typedef struct {", *members, f"    int {', '.join(own)};", f"}} row{kind.label};"]
+
+
+def places(kind: Kind) -> dict[str, tuple[int, str]]:
+    """Of each symbol of a unit its order of derivative and the row's field that tells its place in that list."""
+    given, _, own = fields(kind)
+    found: dict[str, tuple[int, str]] = {}
+    for field, names in zip(given, kind.given, strict=True):
+        found |= {name: (order, field) for order, name in enumerate(names)}
+    for field, name in zip(own, kind.coordinates, strict=True):
+        found |= {derivative_name(name, order): (order, field) for order in range(3)}
+    return found
 
 
 def rows_of(number: int, run: Run, place: Mapping[str, int]) -> list[str]:

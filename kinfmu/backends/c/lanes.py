@@ -1,0 +1,338 @@
+"""lanes.c: the formulas of a plan for many samples side by side, free of branches.
+
+A unit's position, rates and accelerations are one loop over the lanes, so that intermediate numbers stay in registers.
+Newton corrects a good prediction twice; sines and cosines of the unknowns are computed once and then rotated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import accumulate
+
+from kinfmu.backends.alike import Kind, positions, runs_of
+from kinfmu.backends.c.text import array, assigned, declared
+from kinfmu.backends.c.units import places, row_type, rows_of
+from kinfmu.backends.newton import determinant, is_small, opposite_solution, solution, square
+from kinfmu.backends.parametric import parametric
+from kinfmu.backends.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable
+from kinfmu.naming import derivative_name
+from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.trace import is_parameter, parameter_symbol
+
+CORRECTIONS = 2
+LISTS = ("x", "x1", "x2")
+_VECTORS = {"sin": "kf_sin", "cos": "kf_cos"}
+_BRANCHING = ("curve", "atan2", "floor")
+
+
+def has_lanes(plan: SolvePlan) -> bool:
+    """True if a plan can be solved side by side: one driver, blocks of one or two unknowns, no piecewise functions."""
+    solved = (block for block in plan.blocks if block.unknowns)
+    rows = [node for block in plan.blocks for node in (*block.residuals, *(m[0] for _, m in block.assigned))]
+    plain = not any(node.op in _BRANCHING for node in reachable(rows))
+    return len(plan.drivers) == 1 and plain and all(is_small(block) for block in solved)
+
+
+def emit_lanes(plan: SolvePlan) -> dict[str, str]:
+    """Texts of lane_sizes.h and, if the plan has lanes, of lanes.c, by file name."""
+    if not has_lanes(plan):
+        return {"lane_sizes.h": "#define KF_HAS_LANES 0\n#define KF_LANE_HOLD 0\n"}
+    lanes = _Lanes(plan)
+    sizes = f"#define KF_HAS_LANES 1\n#define KF_LANE_HOLD {lanes.holds[-1]}\n"
+    return {"lane_sizes.h": sizes, "lanes.c": lanes.source()}
+
+
+class _Lanes:
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), functions=_VECTORS)
+        _, derived = parametric(plan)
+        self.derived = {node: k for k, node in enumerate(derived)}
+        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
+        self.runs = runs_of(plan.blocks, self._rate_of)
+        given_outright = [name for block in plan.blocks for name, _ in block.assigned]
+        order = [*plan.unknowns, *given_outright, *(driver.inputs[0] for driver in plan.drivers)]
+        self.place = {name: k for k, name in enumerate(order)}
+        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
+        kinds = {run.kind.label: run.kind for run in self.runs}
+        self.units = {k: _LaneUnit(kind, self.parameters, self.derived, plan.size) for k, kind in kinds.items()}
+        self.home = {  # nodes of units that are alone in their kind -> number of their run
+            node: number
+            for number, run in enumerate(self.runs, start=1)
+            if len(run.members) == 1 and not run.kind.constants
+            for node in self.units[run.kind.label].positions
+            if node.args and node not in self.derived
+        }
+        readers = [self._outputs(k) for k in range(3)] + [self._watches()]  # they say what is handed on
+        self.holds = [0, *accumulate(len(self.units[run.kind.label].hold) for run in self.runs)]
+        self.readers = [self._placed(line) for lines in readers for line in lines]
+
+    def _rate_of(self, name: str, order: int) -> str:
+        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+
+    def source(self) -> str:
+        solved = [block for block in self.plan.blocks if block.unknowns]
+        return "\n".join(
+            [
+                f"/* Kinematics of {self.plan.mechanism.name}, side by side: generated from its mechanism. */",
+                '#include "lanes.h"',
+                "",
+                "#include <math.h>",
+                "",
+                *array("static double determinant_factors", [1.0 / block.determinant_scale for block in solved]),
+                "",
+                *(line for units in self.units.values() for line in units.source()),
+                *(line for k, run in enumerate(self.runs, start=1) for line in rows_of(k, run, self.place)),
+                *self.readers,
+                *self._solve(),
+            ]
+        )
+
+    def _solve(self) -> list[str]:
+        lines = []
+        for number, run in enumerate(self.runs, start=1):
+            many = len(run.members) > 1
+            row, hold = f"&run_{number}[{'k' if many else 0}]", f"lanes->hold + {self.holds[number - 1]}"
+            factor = f", determinant_factors[{run.first}{' + k' * many}]" if run.kind.solved else ""
+            call = f"unit{run.kind.label}(model, {row}, lanes, {hold}{factor}, full);"
+            lines += [f"for (k = 0; k < {len(run.members)}; ++k) {{", f"    {call}", "}"] if many else [call]
+        return [
+            "static inline void solve(const kf_model *model, kf_lanes *lanes, const bool full)",
+            "{",
+            "    int i, k;",
+            "    for (i = 0; i < KF_LANES; ++i) {",
+            "        lanes->error[i] = 0.0;",
+            "        lanes->margin[i] = 1.0;",
+            "        lanes->moved[i] = 0.0;",
+            "    }",
+            "    (void)k;",
+            *(f"    {line}" for line in lines),
+            "    outputs(model, lanes);",
+            "    watches(model, lanes);",
+            "    if (full) {",
+            "        rates(model, lanes);",
+            "        accelerations(model, lanes);",
+            "    }",
+            "}",
+            "",
+            "void kf_lanes_solve(const kf_model *model, kf_lanes *lanes, bool full)",
+            "{",
+            "    if (full) {",
+            "        solve(model, lanes, true);",
+            "    } else {",
+            "        solve(model, lanes, false);",
+            "    }",
+            "}",
+            "",
+        ]
+
+    def _placed(self, line: str) -> str:
+
+        return re.sub(r"<(\d+):(\d+)>", lambda match: str(self.holds[int(match[1]) - 1] + int(match[2])), line)
+
+    def _loop(self, name: str, lines: Sequence[str], writer: Writer) -> list[str]:
+        """A function that goes through the lanes."""
+        where = {self._rate_of(one, k): f"{LISTS[k]}[{at}]" for one, at in self.place.items() for k in range(3)}
+        loads = []
+        for node in writer.used:
+            if node in self.derived:
+                source = f"model->derived[{self.derived[node]}]"
+            elif node in self.home:
+                number = self.home[node]
+                source = f"lanes->hold[<{number}:{self.units[self.runs[number - 1].kind.label].handed_on(node)}>][i]"
+            elif is_parameter(node):
+                source = f"model->parameters[{self.parameters[node.name]}]"
+            else:
+                source = f"lanes->{where[node.name]}[i]"
+            loads.append(f"{self.names.of(node)} = {source};")
+        body = [*loads, *lines]
+        loop = ["    KF_SIDE_BY_SIDE", "    for (i = 0; i < KF_LANES; ++i) {",
+                *(f"        {line}" for line in [*declared(assigned(body)), *body]), "    }"]  # fmt: skip
+        return [
+            f"static inline void {name}(const kf_model *model, kf_lanes *lanes)",
+            "{",
+            "    int i;",
+            "    (void)model;",
+            *(loop if lines else ["    (void)i;", "    (void)lanes;"]),
+            "}",
+            "",
+        ]
+
+    def _outputs(self, order: int) -> list[str]:
+        """Copies the outputs that are coordinates, and computes the others."""
+        writer = Writer(self.names, [*self.derived, *self.home])
+        targets = [motion[1:][order] for motion in self.plan.outputs_motion]
+        lines = [f"{line};" for line in writer.statements(targets)]
+        lines += [f"lanes->outputs[{order}][{k}][i] = {writer.expression(node)};" for k, node in enumerate(targets)]
+        return self._loop(("outputs", "rates", "accelerations")[order], lines, writer)
+
+    def _watches(self) -> list[str]:
+        writer = Writer(self.names, [*self.derived, *self.home])
+        targets = [node for _, node in self.plan.watches]
+        lines = [f"{line};" for line in writer.statements(targets)]
+        lines += [f"lanes->watches[{k}][i] = {writer.expression(node)};" for k, node in enumerate(targets)]
+        return self._loop("watches", lines, writer)
+
+
+class _LaneUnit:
+    """The function of one kind of units: positions, and with `full` rates and accelerations."""
+
+    def __init__(self, kind: Kind, parameters: dict[str, int], derived: dict[Node, int], size: float) -> None:
+        self.kind = kind
+        self.parameters = parameters
+        self.derived = derived
+        self.size = size
+        self.names = Names(kind.coordinates, functions=_VECTORS)
+        for block in kind.blocks:
+            for name, motion in block.assigned:
+                self.names.assign(motion[0], name)
+        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.hold: dict[Node, int] = {}
+
+    def handed_on(self, node: Node) -> int:
+        """Place of a node among the numbers that later functions take from here, from now on if not before."""
+        return self.hold.setdefault(node, len(self.hold))
+
+    def source(self) -> list[str]:
+        kind = self.kind
+        writer = Writer(self.names, self.derived, self.hold)
+        self.declared: list[str] = []
+        body: list[str] = []
+        for block in kind.blocks:
+            body += self._newton(writer, block) if block.unknowns else self._given_outright(writer, block)
+        where = places(kind)
+        own = {name: field for name, (order, field) in where.items() if order == 0 and field.startswith("k")}
+        body += [f"x[row->{field}][i] = {identifier(name)};" for name, field in own.items()]
+        body += [f"hold[{k}][i] = {self.names.of(node)};" for node, k in self.hold.items()]
+        motion: list[str] = []
+        for order in (1, 2):
+            for block in kind.blocks:
+                motion += self._linear(writer, block, order) if block.unknowns else []
+                for name, nodes in block.assigned:
+                    motion += [f"{line};" for line in writer.statements([nodes[order]])]
+                    motion.append(f"{identifier(derivative_name(name, order))} = {writer.expression(nodes[order])};")
+            for name, field in own.items():
+                motion.append(f"{LISTS[order]}[row->{field}][i] = {identifier(derivative_name(name, order))};")
+        found = {name for block in kind.blocks for name, _ in block.assigned}
+        found |= {derivative_name(name, order) for name in kind.coordinates for order in (1, 2)}
+        unknowns = [name for block in kind.blocks for name in block.unknowns]
+        loads = [f"{identifier(name)} = x[row->{own[name]}][i];" for name in unknowns]
+        later: list[str] = []
+        found |= set(unknowns)
+        for node in writer.used:
+            name = self.names.of(node)
+            if node in self.derived:
+                loads.append(f"{name} = model->derived[{self.derived[node]}];")
+            elif node.op != "symbol" or node.name in found:
+                continue
+            elif is_parameter(node):
+                loads.append(f"{name} = model->parameters[{self.parameters[node.name]}];")
+            elif node.name in where:
+                order, field = where[node.name]
+                (loads if order == 0 else later).append(f"{name} = {LISTS[order]}[row->{field}][i];")
+            else:
+                loads.append(f"{name} = row->{name};")
+        lines = [*loads, *body, "if (full) {", *(f"    {line}" for line in [*later, *motion]), "}"]
+        solved = kind.solved is not None
+        return [
+            *row_type(kind),
+            "",
+            f"static inline void unit{kind.label}(const kf_model *model, const row{kind.label} *row, kf_lanes *lanes,",
+            f"    double (*hold)[KF_LANES],{' const double factor,' if solved else ''} const bool full)",
+            "{",
+            "    double(*const x)[KF_LANES] = lanes->x;",
+            "    double(*const x1)[KF_LANES] = lanes->x1;",
+            "    double(*const x2)[KF_LANES] = lanes->x2;",
+            "    int i;",
+            "    (void)model;",
+            "    (void)hold;",
+            "    KF_SIDE_BY_SIDE",
+            "    for (i = 0; i < KF_LANES; ++i) {",
+            *(f"        {line}" for line in [*declared([*assigned(lines), *self.declared]), *lines]),
+            "    }",
+            "}",
+            "",
+        ]
+
+    def _given_outright(self, writer: Writer, block: Block) -> list[str]:
+        lines = []
+        for name, motion in block.assigned:
+            lines += [f"{line};" for line in writer.statements([motion[0]])]
+            given = writer.expression(motion[0])
+            if given != identifier(name):
+                lines.append(f"{identifier(name)} = {given};")
+        return lines
+
+    def _newton(self, writer: Writer, block: Block) -> list[str]:
+        """Corrections of the prediction, the residual that they leave, and what follows from the unknowns."""
+        turning = self._turning(block)
+        lines = []
+        for unknown, sine, cosine in turning:
+            lines.append(f"kf_sincos({identifier(unknown)}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
+            self.declared += [self.names.of(sine), self.names.of(cosine)]
+            writer.known |= {sine, cosine}
+        entries = [entry for row in block.jacobian for entry in row]
+        unknowns = [
+            node
+            for node in reachable([*block.residuals, *entries])
+            if node.op == "symbol" and node.name in block.unknowns
+        ]
+        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
+        moving = [*unknowns, *(node for _, sine, cosine in turning for node in (sine, cosine))]
+        lines += [f"{line};" for line in writer.statements(writer.independent(looped, moving))]
+        r = [f"r{k}" for k in range(len(block.residuals))]
+        steps = [f"d{k}" for k in range(len(block.unknowns))]
+        known = set(writer.known)
+        for turn in range(CORRECTIONS):
+            writer.known = set(known)
+            lines += [f"{line};" for line in writer.statements([*block.residuals, *entries])]
+            lines += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
+            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+            lines.append(f"per_det = 1.0 / ({determinant(jacobian)});")
+            values = solution(jacobian, r, "det")
+            lines += [
+                f"{one} = {text.replace(' / det', ' * per_det')};" for one, text in zip(steps, values, strict=True)
+            ]
+            lines += [f"{identifier(name)} -= {one};" for name, one in zip(block.unknowns, steps, strict=True)]
+            for name, one in zip(block.unknowns, steps, strict=True):
+                for unknown, sine, cosine in turning:
+                    if unknown == name:
+                        lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
+            if turn == 0:
+                for name, one in zip(block.unknowns, steps, strict=True):
+                    scale = "" if name.endswith(".phi") else f" * {1.0 / self.size!r}"
+                    lines.append(f"size = fabs({one}){scale};")
+                    lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i];")
+        writer.known = set(known)
+        lines += [f"{line};" for line in writer.statements([*block.residuals, *entries])]
+        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
+        self.jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        lines += [
+            f"det = {determinant(self.jacobian)};",
+            "size = fabs(det * factor);",
+            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
+            f"lanes->error[i] += {square(r, block.row_scales)};",
+            "per_det = 1.0 / det;",
+        ]
+        return lines + self._given_outright(writer, block)
+
+    def _turning(self, block: Block) -> list[tuple[str, Node, Node]]:
+        """Unknown angles whose sine and cosine the formulas hold, with both as nodes."""
+        found = []
+        for node in self.positions:
+            if node.op == "symbol" and node.name in block.unknowns:
+                sine, cosine = node.graph.function("sin", node), node.graph.function("cos", node)
+                if {sine, cosine} & set(self.positions):
+                    found.append((node.name, sine, cosine))
+        return found
+
+    def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
+        right = (block.velocity, block.acceleration)[order - 1]
+        lines = [f"{line};" for line in writer.statements(right)]
+        b = [f"b{k}" for k in range(len(right))]
+        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
+        z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+        values = opposite_solution(self.jacobian, b, "det")
+        return lines + [f"{one} = {text.replace(' / det', ' * per_det')};" for one, text in zip(z, values, strict=True)]

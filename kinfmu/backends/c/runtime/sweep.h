@@ -1,0 +1,51 @@
+/* Sweep: the motion at many samples. */
+#ifndef KF_SWEEP_H
+#define KF_SWEEP_H
+
+#include <stdint.h>
+
+#include "solver.h"
+
+/* A table of count samples by outputs; sample i, output j stands at start[i * row + j * column]. start NULL: not wanted. */
+typedef struct {
+    double *start;
+    ptrdiff_t row, column;
+} kf_table;
+
+/* What is to be solved and where it goes.
+ *
+ * u, ud, udd: (count, KF_DRIVERS); tables: values, rates, accelerations; status, iterations, residual: (count); watches:
+ * (count, KF_WATCHES). What cannot be reached is NaN. failures: the first sample of each stretch that cannot be reached,
+ * up to most_failures of them, with the messages (most_failures, KF_MESSAGE).
+ */
+typedef struct {
+    int64_t count;
+    const double *u, *ud, *udd;
+    kf_table tables[3];
+    int64_t *status, *iterations;
+    double *residual, *watches;
+    int64_t most_failures, failure_count;
+    int64_t *failures;
+    char *messages;
+    int64_t side_by_side; /* how many samples went through lanes */
+} kf_job;
+
+/* Memory for a sweep, to be given back by kf_sweep_free; NULL if there is none. */
+typedef struct kf_sweep kf_sweep;
+kf_sweep *kf_sweep_new(double tolerance);
+void kf_sweep_free(kf_sweep *sweep);
+
+/* Parameters followed from those written; false: kf_sweep_message says why they cannot be had. */
+bool kf_sweep_bind(kf_sweep *sweep, const double *parameters);
+const char *kf_sweep_message(const kf_sweep *sweep);
+
+/* All samples of a job; false if memory ran out. */
+bool kf_sweep_run(kf_sweep *sweep, kf_job *job);
+
+/* margin (count) and errors (count, 3) of the samples of a job; either may be NULL. */
+void kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
+
+/* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws. */
+void kf_drive_all(int64_t count, const double *times, const double *constants, double *u, double *ud, double *udd);
+
+#endif

@@ -1,0 +1,62 @@
+"""The native engine: whole arrays of samples through the compiled C of a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Literal
+
+from kinfmu.backends.c.library import Library
+from kinfmu.plan import SolvePlan
+from kinfmu.run import FloatArray
+from kinfmu.swept import Driven, Swept, Tables
+
+
+class NativeEngine:
+    """A plan's library. parameters: values reached from those of the plan, or nothing; fixed: as Engine has it.
+
+    CompilerError if there is no compiler or it fails.
+    """
+
+    name = "native"
+    order: Literal["C", "F"] = "F"
+
+    def __init__(
+        self, plan: SolvePlan, parameters: Sequence[float], fixed: Mapping[str, float], tolerance: float
+    ) -> None:
+        self._library = Library(plan)
+        self._parameters = parameters
+        self._tolerance = tolerance
+        self.fixed = fixed
+
+    def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
+        """Driver values, speeds and accelerations at times, by the laws."""
+        return self._library.drive(times, constants)
+
+    def sweep(self, driven: Driven, tables: Tables) -> Swept:
+        """Fill the tables; what cannot be reached is NaN there."""
+        told = self._library.sweep(driven, tables, self._parameters, self._tolerance)
+        late = _Late(self._library, driven, self._parameters, self._tolerance)
+        return Swept(
+            status=told.status,
+            iterations=told.iterations,
+            residual=told.residual,
+            watch=told.watch,
+            margin=lambda: late.diagnosed[0],
+            error=lambda: late.diagnosed[1],
+            failures=told.failures,
+        )
+
+
+class _Late:
+    """Margins and errors of a sweep, which are computed together when either is first read."""
+
+    def __init__(self, library: Library, driven: Driven, parameters: Sequence[float], tolerance: float) -> None:
+        self._library = library
+        self._driven = driven
+        self._parameters = parameters
+        self._tolerance = tolerance
+
+    @cached_property
+    def diagnosed(self) -> tuple[FloatArray, FloatArray]:
+        return self._library.diagnose(self._driven, self._parameters, self._tolerance)
