@@ -73,7 +73,7 @@ class _Lanes:
         return self.rates[name][order] if name in self.rates else derivative_name(name, order)
 
     def source(self) -> str:
-        solved = [block for block in self.plan.blocks if block.unknowns]
+        factors = [1.0 / block.determinant_scale for block in self.plan.blocks if block.unknowns]
         return "\n".join(
             [
                 f"/* Kinematics of {self.plan.mechanism.name}, side by side: generated from its mechanism. */",
@@ -81,7 +81,7 @@ class _Lanes:
                 "",
                 "#include <math.h>",
                 "",
-                *array("static double determinant_factors", [1.0 / block.determinant_scale for block in solved]),
+                *(array("static double determinant_factors", factors) if factors else ()),
                 "",
                 *(line for units in self.units.values() for line in units.source()),
                 *(line for k, run in enumerate(self.runs, start=1) for line in rows_of(k, run, self.place)),

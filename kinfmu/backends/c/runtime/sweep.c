@@ -39,7 +39,7 @@ typedef struct {
 typedef struct {
     double u, turns;
     int64_t sample;
-} kf_alone;
+} kf_left;
 
 struct kf_sweep {
     kf_solver solver;
@@ -53,7 +53,7 @@ struct kf_sweep {
     double spacing;
     bool repeats; /* every turn of the driver: the intervals are those of one turn */
     double raised[KF_ROOM(KF_UNKNOWNS)]; /* by how many turns the unknowns grow in one */
-    kf_alone *alone;
+    kf_left *alone;
     int64_t alone_count, alone_room;
 };
 
@@ -426,7 +426,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start, int 
         if (alone[i]) {
             if (sweep->alone_count == sweep->alone_room) {
                 const int64_t room = 2 * sweep->alone_room + 1024;
-                kf_alone *const more = realloc(sweep->alone, (size_t)room * sizeof *more);
+                kf_left *const more = realloc(sweep->alone, (size_t)room * sizeof *more);
                 if (more == NULL) {
                     return false;
                 }
@@ -434,7 +434,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start, int 
                 sweep->alone_room = room;
             }
             const double u = job->u[start + i];
-            kf_alone *const one = &sweep->alone[sweep->alone_count++];
+            kf_left *const one = &sweep->alone[sweep->alone_count++];
             one->turns = sweep->repeats && fabs(u) < FARTHEST ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
             one->u = one->turns == 0.0 ? u : kf_turned(u, -one->turns);
             one->sample = start + i;
@@ -445,7 +445,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start, int 
 
 static int in_order(const void *a, const void *b)
 {
-    const double left = ((const kf_alone *)a)->u, right = ((const kf_alone *)b)->u;
+    const double left = ((const kf_left *)a)->u, right = ((const kf_left *)b)->u;
     return (left > right) - (left < right);
 }
 

@@ -1,0 +1,151 @@
+"""The native engine moves as the Python engine does, whatever the order of samples, past singular points too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import gallery, sweep
+from kinfmu.backends.c import compiler, library
+from kinfmu.errors import CompilerError, KinfmuError
+from kinfmu.plan import compile_plan
+from kinfmu.run import Run
+from kinfmu.swept import Driven
+from tests.fmu.test_parameters import linkage
+
+SAMPLES = 1100  # enough for samples to be solved side by side
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    try:
+        compiler.command()
+    except CompilerError as error:
+        pytest.skip(str(error))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setattr(library, "FLAGS", ("-O1", "-Wall", "-Wextra", "-Wconversion", "-Werror"))
+        yield
+
+
+def assert_same_motion(native: Run, python: Run) -> None:
+    """Positions to 1e-12 of the column's largest magnitude, rates within what both estimate of themselves."""
+    np.testing.assert_array_equal(native.good, python.good)
+    good = python.good
+    estimates = native.error + python.error
+    size = max(float(np.abs(python.values[good]).max(initial=1e-30)), 1e-30)
+    for order, name in enumerate(("values", "rates", "accelerations")):
+        ours, theirs = getattr(native, name)[good], getattr(python, name)[good]
+        scale = np.maximum(np.abs(theirs).max(axis=0, initial=0.0), np.abs(theirs).max(initial=0.0))
+        allowed = 1e-12 * scale + (estimates[good, order, None] * max(size, 1.0) if order else 0.0)
+        assert (np.abs(ours - theirs) <= allowed).all(), name
+    assert np.isnan(native.values[~good]).all()
+    np.testing.assert_allclose(native.watch, python.watch, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_the_gallery_moves_as_in_python(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    plan = compile_plan(mechanism)
+    settings = mechanism.run
+    t = np.linspace(settings.start, settings.stop, SAMPLES)
+    native, python = (kinfmu.solve(plan, t, engine=engine) for engine in ("native", "python"))
+    assert_same_motion(native, python)
+    assert native.info["engine"] == "native"
+    assert [(event.t, event.text) for event in native.events] == [(event.t, event.text) for event in python.events]
+
+
+def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
+    rng = np.random.default_rng(5)
+    turns = np.concatenate(
+        [np.arange(-720, 1800) * (np.pi / 180.0), np.pi * np.arange(-4, 9), rng.uniform(-9, 30, 500)]
+    )
+    for u in (np.sort(turns), rng.permutation(turns)):
+        run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=u, engine="native")
+        assert (run.status <= 2).all()
+        np.testing.assert_allclose(run["coupler.phi"], 0.0, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(run["rocker.phi"], u, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(run["rocker.omega"], 1.0, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(run["rocker.alpha"], 0.0, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(run["coupler.ax"], -np.cos(u), rtol=0, atol=1e-8)
+
+
+def test_most_samples_go_side_by_side() -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    told = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
+    assert told.side_by_side == SAMPLES
+    assert (told.status == 0).all()
+
+
+def test_what_lies_past_a_limit_is_told_and_the_branch_comes_back() -> None:
+    mechanism = kinfmu.load("triple_rocker")
+    u = np.concatenate([np.linspace(0.9, 4.0, 700), np.linspace(4.0, 0.9, 700)])
+    native, python = (kinfmu.solve(mechanism, left_angle=u, engine=engine) for engine in ("native", "python"))
+    assert_same_motion(native, python)
+    assert 0 < native.good.sum() < len(u)
+    assert [event.text for event in native.events] == [event.text for event in python.events]
+
+
+def test_tables_may_lie_by_samples_or_by_outputs() -> None:
+    u = np.linspace(0.5, 2.0, SAMPLES)
+    mechanism = kinfmu.load("fourbar")
+    runs = []
+    for order in ("C", "F"):
+        out = tuple(np.full((SAMPLES, 7), 7.0, order=order) for _ in range(3))  # type: ignore[call-overload]
+        run = kinfmu.solve(mechanism, crank_angle=u, engine="native", out=out)  # type: ignore[arg-type]
+        assert run.values is out[0]
+        runs.append(run)
+    np.testing.assert_array_equal(runs[0].accelerations, runs[1].accelerations)
+
+
+def test_positions_alone_can_be_had() -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    whole, alone = tables(plan.outputs), tables(plan.outputs)
+    samples = driven(np.linspace(0.0, 7.0, SAMPLES))
+    compiled = library.Library(plan)
+    compiled.sweep(samples, whole)
+    compiled.sweep(samples, (alone[0], None, None))
+    np.testing.assert_array_equal(alone[0], whole[0])
+
+
+def test_other_parameters_are_reached_by_continuation() -> None:
+    others = {"ground": 4.2, "crank": 1.3, "coupler": 3.1, "rocker": 3.3}
+    native, python = (
+        kinfmu.solve(linkage(), np.linspace(0.0, 6.0, SAMPLES), parameters=others, engine=engine)
+        for engine in ("native", "python")
+    )
+    assert_same_motion(native, python)
+    with pytest.raises(KinfmuError, match="stay open by"):
+        library.Library(compile_plan(linkage())).sweep(
+            driven(np.zeros(2)), tables(("a",) * 13), parameters=[4.0, 1.0, 0.5, 0.5]
+        )
+
+
+def test_few_samples_are_left_to_python_and_many_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    t = np.linspace(0.0, 90.0, 50)
+    assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "python"
+    monkeypatch.setattr(sweep, "WORTH_COMPILING", 50)
+    assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "native"
+
+
+def test_without_a_compiler_auto_is_python_and_native_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> tuple[str, ...]:
+        raise CompilerError("no C compiler: neither cc, gcc nor clang is there")
+
+    monkeypatch.setattr(compiler, "command", none)
+    monkeypatch.setattr(sweep, "WORTH_COMPILING", 0)
+    assert kinfmu.solve(kinfmu.load("fourbar"), [0.0]).info["engine"] == "python"
+    with pytest.raises(CompilerError, match="no C compiler"):
+        kinfmu.solve(kinfmu.load("fourbar"), [0.0], engine="native")
+
+
+def driven(u: np.ndarray) -> Driven:
+    column = np.asarray(u, dtype=float)[:, None]
+    return column, np.ones_like(column), np.zeros_like(column)
+
+
+def tables(outputs: tuple[str, ...]) -> list[np.ndarray]:
+    return [np.zeros((SAMPLES, len(outputs)), order="F") for _ in range(3)]
