@@ -87,7 +87,7 @@ def test_two_drivers_take_arrays_and_numbers() -> None:
         ({"crank_angle": [0.0, 1.0, 2.0], "crank_speed": [1.0, 2.0]}, "equal lengths or be single numbers"),
         ({"crank_angle": [[0.0]]}, "must be one-dimensional"),
         ({"crank_angle": "fast"}, "crank_angle must be numbers"),
-        ({"t": [0.0], "engine": "native"}, "engine 'fortran' is not known"),
+        ({"t": [0.0], "engine": "fortran"}, "engine 'fortran' is not known"),
         ({"t": [0.0], "parameters": {"crank.sped": 1.0}}, r"did you mean 'crank\.speed'"),
         ({"t": [0.0], "parameters": {"crank.speed": np.inf}}, "must be a finite number"),
     ],
