@@ -78,7 +78,7 @@ def driver_range(way: Way) -> DriverRange:
     found = [
         SingularPoint(
             limit.u[0],
-            "change point" if _kind(way, limit) == "change point" else "limit",
+            "change point" if _kind(limit) == "change point" else "limit",
             max(limit.block, -1) + 1,
             way.name,
         )
@@ -106,14 +106,14 @@ def _position(way: Way, limit: Limit | None) -> LimitPosition | None:
     if limit is None:
         return None
     coordinates = way.at_limit(limit)
-    return LimitPosition(limit.u[0], _kind(way, limit), coordinates, parting(way, coordinates))
+    return LimitPosition(limit.u[0], _kind(limit), coordinates, parting(way, coordinates))
 
 
-def _kind(way: Way, limit: Limit) -> str:
+def _kind(limit: Limit) -> str:
     """What a limit is, as LimitPosition has it."""
     if limit.block == NO_BLOCK:
         return "end"
-    return "dead centre" if way.is_dead_centre(limit) else "change point"
+    return "change point" if limit.crosses else "dead centre"
 
 
 def _change_point(way: Way, bridge: Bridge) -> SingularPoint:

@@ -62,17 +62,6 @@ class Way:
         first, second, third = map(self.coordinates, beside)
         return {name: 3.0 * first[name] - 3.0 * second[name] + third[name] for name in first}
 
-    def is_dead_centre(self, limit: Limit) -> bool:
-        """True if the motion turns back at a limit: rates per unit of the driver grow like 1 / sqrt(s) towards it.
-
-        Where they stay as they are, branches cross, and it is the solver that goes no further.
-        """
-        beside = self._beside(limit)
-        if len(beside) < 3:
-            return True
-        near, far = (max(map(abs, self.speeds(pose).values())) for pose in beside[:2])  # at s and at 4 s
-        return near > 1.5 * far
-
     def _beside(self, limit: Limit) -> list[Pose]:
         """Poses at s, 4 s and 9 s before a limit; fewer if they cannot be reached."""
         start, inwards = (self.poses[0], 1.0) if limit is self.low else (self.poses[-1], -1.0)
@@ -160,7 +149,7 @@ def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
     bridges: list[Bridge] = []
     pose, count = start, math.ceil(abs(distance) / (STEP * unit))
     for k in range(1, count + 1):
-        arrived = advance(solver.model, pose, (start.u[0] + distance * k / count,))
+        arrived = advance(solver.model, pose.base or pose, (start.u[0] + distance * k / count,))
         if isinstance(arrived, Limit):
             return _Leg(poses, bridges, limit=arrived)
         if not arrived.good:

@@ -22,16 +22,21 @@ UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did no
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
 UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
+STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
 
 
 class Limit(NamedTuple):
-    """Driver values where a way ends, and the block whose determinant vanishes there (or NO_BLOCK, TOO_FAR)."""
+    """Driver values where a way ends, and the block whose determinant vanishes there (or NO_BLOCK, TOO_FAR).
+
+    crosses: the motion does not turn back there, but another branch crosses it, and no bridge holds.
+    """
 
     u: Vector
     block: int
+    crosses: bool = False
 
 
 def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
@@ -90,7 +95,7 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
             continue
         step = 0.5 * abs(s)
         if step < SHORTEST_STEP * longest:
-            limit = limit or _limit(before, pose)
+            limit = limit or _limit(model, before, pose, direction)
             if step < _GIVE_UP * longest or _beyond(target, limit.u, direction, s):
                 return limit
     return Limit(pose.u, TOO_FAR)
@@ -218,19 +223,25 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
     return None
 
 
-def _limit(before: Pose, pose: Pose) -> Limit:
+def _limit(model: Model, before: Pose, pose: Pose, direction: Vector) -> Limit:
     """Where the way ends, just beyond a pose that steps cannot leave.
 
-    Near a dead centre determinant^2 falls linearly along the way: the secant rule on the last two poses gives its zero.
+    Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule
+    on the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
     """
     if not pose.determinants:
         return Limit(pose.u, NO_BLOCK)
     block = min(range(len(pose.determinants)), key=lambda k: abs(pose.determinants[k]))
-    near, far = pose.determinants[block] ** 2, before.determinants[block] ** 2
+    unit = model.REACH[0] if len(direction) == 1 else 1.0
+    slopes = directed(model, pose, direction)[0]
+    crosses = max([abs(slopes[k]) / model.UNKNOWN_SCALES[k] for k in range(*model.BLOCKS[block])]) * unit < STEEP
+    near, far = abs(pose.determinants[block]), abs(before.determinants[block])
+    if not crosses:
+        near, far = near * near, far * far
     if far <= near:
-        return Limit(pose.u, block)
+        return Limit(pose.u, block, crosses)
     beyond = near / (far - near)
-    return Limit(tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True)), block)
+    return Limit(tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True)), block, crosses)
 
 
 def _beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
@@ -245,7 +256,8 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
             f"{place(model, target)} is too far from {place(model, limit.u)}: more than {MOST_STEPS} steps on one way"
         )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
-    return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {names} would part"
+    why = f"branches of {names} cross" if limit.crosses else f"{names} would part"
+    return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {why}"
 
 
 def place(model: Model, u: Vector) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import kinfmu
-from kinfmu import Mechanism, Run
+from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Run
 from tests import mechanisms
 from tests.power_series import mp
 
@@ -125,6 +125,60 @@ def slider_crank(crank: str, rod: str, start: float = 0.7) -> Case:
 
     mechanism = mechanisms.slider_crank(float(crank), float(rod), start=start)
     return Case(f"slider-crank {crank} {rod}", mechanism, _with_turns(coordinates, mechanism, start))
+
+
+def two_loops(apart: float, start: float = 1.0) -> Case:
+    """A parallelogram 2-1-2-1 whose rocker drives a four-bar 4-1-3-2 by an arm at an angle [rad] to itself.
+
+    The second has a change point so much before one of the first.
+    """
+    second = fourbar("4", "1", "3", "2", start=start + apart)
+    bodies = {body.name: body for body in second.mechanism.bodies}
+    c, s = math.cos(start), math.sin(start)
+
+    def moved(name: str) -> tuple[float, float, float]:
+        x, y, phi = bodies[name].start
+        return 2.0 + (x or 0.0), y or 0.0, phi or 0.0
+
+    mechanism = Mechanism(
+        "two_loops",
+        [
+            Body("ground", {"O": (0, 0), "C": (2, 0), "E": (6, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, start)),
+            Body("coupler", {"P": (0, 0), "Q": (2, 0)}, (c, s, 0)),
+            Body("arm", {"C": (0, 0), "Q": (1, 0), "R": (math.cos(apart), math.sin(apart))}, (2, 0, start)),
+            Body("link", {"R": (0, 0), "S": (3, 0)}, moved("coupler")),
+            Body("output", {"E": (0, 0), "S": (2, 0)}, moved("rocker")),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "arm.Q")),
+            Revolute("C", ("ground.C", "arm.C")),
+            Revolute("R", ("arm.R", "link.R")),
+            Revolute("S", ("link.S", "output.S")),
+            Revolute("E", ("ground.E", "output.E")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
+    )
+
+    def motion(u: LongArray) -> Motion:
+        turning = (u, np.ones_like(u), 0 * u)
+        of_second = second.motion(u + np.longdouble(apart))
+        x, y = of_second["coupler.x"], of_second["coupler.y"]
+        return {
+            "crank.phi": turning,
+            "coupler.x": (np.cos(u), -np.sin(u), -np.cos(u)),
+            "coupler.y": (np.sin(u), np.cos(u), -np.sin(u)),
+            "coupler.phi": (0 * u, 0 * u, 0 * u),
+            "arm.phi": turning,
+            "link.x": (2 + x[0], *x[1:]),
+            "link.y": y,
+            "link.phi": of_second["coupler.phi"],
+            "output.phi": of_second["rocker.phi"],
+        }
+
+    return Case(f"two loops {apart:g}", mechanism, motion)
 
 
 def change_point_cases() -> list[Case]:

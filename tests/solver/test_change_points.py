@@ -16,7 +16,7 @@ import kinfmu
 from kinfmu import Status
 from tests import oracle
 from tests.power_series import mp
-from tests.solver.change_points import Case, change_point_cases, fourbar, grid, reference, slider_crank
+from tests.solver.change_points import Case, change_point_cases, fourbar, grid, reference, slider_crank, two_loops
 
 SHORT = 400  # samples of a grid in the usual run
 RIGHT = (1e-12, 1e-10, 1e-8)  # q, qd, qdd at speed 1
@@ -139,6 +139,22 @@ def test_going_back_jumps_of_many_turns_and_any_order_arrive_where_small_steps_a
     run = case.run(u)
     assert run.good.all()
     assert (case.errors(run).max(axis=0) <= RIGHT).all()
+
+
+# ------------------------------------------------------------------------------------------ several of them, close by
+
+
+@pytest.mark.parametrize("apart", [0.3, 0.1, 0.06, 0.03, 0.01, 4e-3, 1e-3, 1e-5, 0.0])
+def test_change_points_of_two_loops_are_bridged_apart_or_together(apart: float, grids: tuple[int, int | None]) -> None:
+    count, most = grids
+    case = two_loops(apart)
+    between = [math.pi - apart * part for part in (-0.5, 0.0, 0.3, 0.5, 1.0, 1.3, 2.0)]
+    for seed in range(4 if most else count):
+        run = case.run([*grid(seed, 0.1, 60.0, turns=1, most=most), *between, *reversed(between)])
+        assert run.good.all()
+        errors = case.errors(run)
+        assert ((errors <= RIGHT) | (errors <= run.error)).all()
+        assert (errors.max(axis=0) <= (1e-11, 1e-8, 1e-5)).all()
 
 
 # ----------------------------------------------------------------------------- lengths that all but make change points

@@ -6,6 +6,7 @@
 #define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
 #define UNDECIDED 1e-6     /* determinant below which a way ends: as small where lengths make a change point within 1e-12 */
 #define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part of it: more is another branch */
+#define STEEP 100.0        /* slope of an unknown over the driver, in radians or sizes; before a dead centre it is more */
 #define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
 #define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
@@ -124,12 +125,13 @@ static double course(const double *start, const double *target, double *directio
 
 /* Where the way ends, just beyond a pose that steps cannot leave.
  *
- * Near a dead centre determinant^2 falls linearly along the way: the secant rule on the last two poses gives its zero.
+ * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule on
+ * the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
  */
-static void limited(const kf_pose *before, const kf_pose *pose, kf_limit *limit)
+static void limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
 {
     const double *const determinants = pose->found.determinants;
-    double near, far, beyond = 0.0;
+    double near, far, beyond = 0.0, steepest = 0.0;
     int k;
     memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
     limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
@@ -139,8 +141,21 @@ static void limited(const kf_pose *before, const kf_pose *pose, kf_limit *limit)
     for (k = 1; k < KF_BLOCKS; ++k) {
         limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
     }
-    near = determinants[limit->block] * determinants[limit->block];
-    far = before->found.determinants[limit->block] * before->found.determinants[limit->block];
+    if (KF_DRIVERS == 1) {
+        kf_tangent(&solver->model, pose);
+    } else {
+        kf_velocity(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
+    }
+    for (k = limit->block > 0 ? kf_block_ends[limit->block - 1] : 0; k < kf_block_ends[limit->block]; ++k) {
+        steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
+    }
+    limit->crosses = steepest * (KF_DRIVERS == 1 ? kf_reach[0] : 1.0) < STEEP;
+    near = fabs(determinants[limit->block]);
+    far = fabs(before->found.determinants[limit->block]);
+    if (!limit->crosses) {
+        near *= near;
+        far *= far;
+    }
     if (far > near) {
         beyond = near / (far - near);
         for (k = 0; k < KF_DRIVERS; ++k) {
@@ -221,6 +236,7 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
     distance = one ? target[0] - KF_POSE_U(start)[0] : course(KF_POSE_U(start), target, direction);
     memcpy(limit->u, KF_POSE_U(start), sizeof limit->u);
     limit->block = KF_TOO_FAR;
+    limit->crosses = false;
     if (fabs(distance) > KF_MOST_STEPS * longest) {
         return NULL;
     }
@@ -284,7 +300,7 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
         step = 0.5 * fabs(s);
         if (step < SHORTEST_STEP * longest) {
             if (!is_limited) {
-                limited(before, pose, limit);
+                limited(solver, before, pose, direction, limit);
                 is_limited = true;
             }
             if (step < GIVE_UP * longest || is_beyond(target, limit->u, direction, s)) {

@@ -54,7 +54,7 @@ void kf_say_limit(char *message, const kf_limit *limit, const double *target)
     }
     kf_say(message, " cannot be reached: the limit is ");
     kf_say_place(message, limit->u);
-    kf_say(message, ", where ");
+    kf_say(message, limit->crosses ? ", where branches of " : ", where ");
     if (limit->block == KF_NO_BLOCK) {
         kf_say(message, "the joints");
     }
@@ -63,5 +63,5 @@ void kf_say_limit(char *message, const kf_limit *limit, const double *target)
         const bool is_first = k == (limit->block > 0 ? kf_block_ends[limit->block - 1] : 0);
         kf_say(message, "%s%s", is_first ? "" : ", ", kf_unknown_names[k]);
     }
-    kf_say(message, " would part");
+    kf_say(message, limit->crosses ? " cross" : " would part");
 }

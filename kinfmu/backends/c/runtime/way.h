@@ -73,6 +73,7 @@ void kf_needed(kf_solver *solver, int start, int pose, int regular);
 typedef struct {
     double u[KF_DRIVERS];
     int block;
+    bool crosses; /* the motion does not turn back there, but another branch crosses it, and no bridge holds */
 } kf_limit;
 enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
