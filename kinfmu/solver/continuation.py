@@ -20,6 +20,7 @@ from .status import Status
 _SHORTEST = 1e-7  # step in s; where steps get shorter the way ends
 _MOST_STEPS = 10_000
 _ITERATIONS = 60
+NO_NUMBER = "what follows from them is no finite number"
 
 
 class Reached(NamedTuple):
@@ -107,8 +108,9 @@ def _opens(module: Any, values: Vector, u: Vector, pose: Pose, block: int) -> st
     """Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave."""
     try:
         model = module.bound(values)
-    except (ArithmeticError, ValueError) as error:  # a division by zero, a length that is not positive
-        return f"{_said(module, values)}: {error}"
+    except (ArithmeticError, ValueError) as error:
+        told = str(error)  # a length that is not positive; or a division by zero, the root of something negative
+        return f"{_said(module, values)}: {told if ' must be ' in told else NO_NUMBER}"
     if block < 0:
         sizes = [abs(determinant) for determinant in pose.determinants]
         block = sizes.index(min(sizes)) if sizes else -1

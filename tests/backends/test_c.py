@@ -17,11 +17,11 @@ import pytest
 import kinfmu
 from kinfmu import gallery
 from kinfmu.backends.c import compiler, emit
-from kinfmu.backends.python import load_model
+from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import CompilerError
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver import Solver
-from tests.fmu.test_parameters import linkage
+from tests.fmu.test_parameters import geared, linkage
 
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 RUNTIME = ("kinfmu.h", "linear.c", "curve.c")
@@ -117,8 +117,20 @@ def test_laws_of_c_and_python_agree() -> None:
     constants = [value for _, value in python.LAW_CONSTANTS]
     for t in np.linspace(-0.3, 2.7, 31):
         rows = [numbers([0.0]) for _ in range(3)]
-        c.library.kf_drive(ctypes.c_double(t), numbers(constants), *rows)
+        c.library.kf_drive(c.model, ctypes.c_double(t), numbers(constants), *rows)
         assert tuple(tuple(row) for row in rows) == python.drive(float(t), tuple(constants))
+
+
+def test_laws_take_the_parameters_that_are_bound() -> None:
+    plan = compile_plan(geared())
+    values = (3.5, 40.0, 2.0)  # the last is a pace: durations are 1 / pace
+    python, c = load_module(plan).bound(values), Compiled(plan)
+    assert c.bind(values) == ""
+    constants = [value for _, value in python.LAW_CONSTANTS]
+    for t in (0.1, 0.4, 0.6):
+        rows = [numbers([0.0]) for _ in range(3)]
+        c.library.kf_drive(c.model, ctypes.c_double(t), numbers(constants), *rows)
+        assert tuple(tuple(row) for row in rows) == python.drive(t, tuple(constants))
 
 
 def test_parameters_are_bound_or_refused() -> None:

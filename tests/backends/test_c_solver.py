@@ -23,7 +23,7 @@ from kinfmu.solver import Solver, Status, with_parameters
 from kinfmu.solver.pose import ALONE, AT_REST
 from kinfmu.sweep import run_times
 from tests.backends.native import STRICT, Native
-from tests.fmu.test_parameters import LENGTHS, linkage
+from tests.fmu.test_parameters import geared, linkage
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, slider_crank, tight_jaw
 
 QUICK = (*STRICT, "-O0")  # to compile
@@ -137,24 +137,29 @@ def test_c_and_python_are_the_same_about_singular_points_and_limits(name: str) -
     assert expected <= set(statuses)
 
 
-CHANGES = [
-    {},
-    {"ground": 4.2, "crank": 1.3, "coupler": 3.1, "rocker": 3.3},
-    {"coupler": 9.0},
-    {"crank": 2.4},
-    {"rocker": 0.6},
-]
+CHANGES: dict[Callable[[], Mechanism], list[dict[str, float]]] = {
+    linkage: [
+        {},
+        {"ground": 4.2, "crank": 1.3, "coupler": 3.1, "rocker": 3.3},
+        {"coupler": 9.0},
+        {"crank": 2.4},
+        {"rocker": 0.6},
+        {"crank": 0.0, "rocker": 0.0},
+        {"ground": -4.0},
+        {"ground": 1e300},
+    ],
+    geared: [{"rod": 3.6}, {"rod": -3.5}, {"teeth": 0.0}, {"teeth": 31.0}, {"pace": -2.0}, {"pace": 0.0}],
+}
 
 
-def test_parameters_are_followed_and_refused_alike() -> None:
-    mechanism = linkage()
-    plan = compile_plan(mechanism)
+@pytest.mark.parametrize("mechanism", CHANGES)
+def test_parameters_are_followed_and_refused_alike(mechanism: Callable[[], Mechanism]) -> None:
+    plan = compile_plan(mechanism())
     c = Native(plan, QUICK)
-    for change in CHANGES:
-        values = tuple(float({**LENGTHS, **change}[parameter.name]) for parameter in plan.parameters)
+    for change in CHANGES[mechanism]:
+        values = tuple(change.get(parameter.name, parameter.value) for parameter in plan.parameters)
         python = with_parameters(load_module(plan), values)
-        message = c.bind(values)
-        assert message == getattr(python, "message", ""), change
+        assert c.bind(values) == getattr(python, "message", ""), change
         assert c.told_anchor().z == pytest.approx(python.anchor.z, rel=0, abs=1e-12)
         for u in (1.2, 2.0, 7.5):
             pose, told = python.solve(python.anchor, (u,)), c.solve((u,))

@@ -121,8 +121,9 @@ def test_a_redundant_bar_of_another_length_is_refused_with_its_row(tmp_path: Pat
     assert "the redundant row AB.length is open by about 0.01005 m" in run.events[0].text
 
 
-def test_numbers_that_a_file_would_be_refused_for_are_refused_at_run_time(tmp_path: Path) -> None:
-    mechanism = Mechanism(
+def geared() -> Mechanism:
+    """Lengths, ratios and durations that are parameters."""
+    return Mechanism(
         "geared",
         [
             Body("ground", {"O": (0, 0), "C": (4, 0)}),
@@ -140,12 +141,16 @@ def test_numbers_that_a_file_would_be_refused_for_are_refused_at_run_time(tmp_pa
         [AngleDriver("crank", "crank", Cycloidal(rise=1.0, duration="1/pace", start=1.0))],
         parameters={"rod": 3.5, "teeth": 40.0, "pace": 1.0},
     )
+
+
+def test_numbers_that_a_file_would_be_refused_for_are_refused_at_run_time(tmp_path: Path) -> None:
+    mechanism = geared()
     fmu = kinfmu.build(mechanism, tmp_path)
     for name, value, told in (
         ("rod", -3.5, "[joints.rod] length = -3.5 must be positive"),  # d.d = L^2 would not mind
-        ("teeth", 0.0, "[joints.mesh] ratio = 0.0 must be other than 0"),
+        ("teeth", 0.0, "[joints.mesh] ratio = 0 must be other than 0"),
         ("pace", -2.0, "[drivers.crank] duration = -0.5 must be positive"),
-        ("pace", 0.0, "float division by zero"),
+        ("pace", 0.0, "what follows from them is no finite number"),
     ):
         run = kinfmu.simulate(fmu, parameters={name: value})
         assert run.events[0].text == f"parameters {name} = {value:g}: {told}"

@@ -19,6 +19,7 @@ from kinfmu.equations.graph import Node
 from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
+from kinfmu.solver.continuation import NO_NUMBER
 from kinfmu.solver.curve import CurveData
 
 
@@ -208,9 +209,16 @@ class _Model:
             for k, constant in enumerate(self.plan.law_constants)
             if constant.name in used
         ]
+        parameters = [
+            f"{identifier(name)} = model->parameters[{k}];" for name, k in self.parameters.items() if name in used
+        ]
+        constants += parameters
         unused = [] if "time" in used else ["time"]
-        unused += [] if constants else ["constants"]
-        signature = "void kf_drive(double time, const double *constants, double *u, double *ud, double *udd)"
+        unused += _unused([*constants, *body, *results], "model", "constants")
+        signature = (
+            "void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud,"
+            "\n              double *udd)"
+        )
         return self._function(signature, [*constants, *body, *results], unused)
 
     def _bind(self) -> list[str]:
@@ -227,6 +235,17 @@ class _Model:
         ]
         lines = [f"model->parameters[{k}] = parameters[{k}];" for k in self.parameters.values()]
         lines += [*loads, *known]
+        lines += [f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(self.derived)]
+        numbers = [writer.expression(node) for _, node, _ in self.plan.conditions if node not in self.derived]
+        if self.derived:
+            lines += ["for (k = 0; k < KF_DERIVED; ++k) {", "    total += fabs(model->derived[k]);", "}"]
+        if self.derived or numbers:
+            lines += [
+                f"if (!({' + '.join(['total', *(f'fabs({number})' for number in numbers)])} < INFINITY)) {{",
+                f'    snprintf(why, room, "{NO_NUMBER}");',
+                "    return false;",
+                "}",
+            ]
         for name, node, meant in self.plan.conditions:
             number = writer.expression(node)
             told = string(f"{name.replace('%', '%%')} = %.15g must be {meant}")
@@ -236,9 +255,11 @@ class _Model:
                 "    return false;",
                 "}",
             ]
-        lines += [f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(self.derived)]
-        unused = [] if self.plan.conditions else ["why", "room"]
-        return self._function(signature, [*lines, "return true;"], unused)
+        needed = self.derived or numbers
+        variables = (
+            ["double total = 0.0;", "int k;"] if self.derived else ["const double total = 0.0;"] if numbers else []
+        )
+        return self._function(signature, [*lines, "return true;"], [] if needed else ["why", "room"], variables)
 
     def _position(self) -> list[str]:
         lines = [
@@ -285,7 +306,8 @@ class _Model:
             "found->iterations = newton.iterations;",
             "found->moved = 0.0;",
             "for (k = 0; newton.iterations && k < KF_UNKNOWNS; ++k) {",
-            "    found->moved = fmax(found->moved, fabs(x[k] - predicted[k]) / kf_unknown_scales[k]);",
+            "    const double moved = fabs(x[k] - predicted[k]) / kf_unknown_scales[k];",
+            "    found->moved = moved > found->moved ? moved : found->moved;",
             "}",
             "kf_watches(model, found, watches);",
             "found->watch = 0.0;",

@@ -167,7 +167,12 @@ class Units:
             return self._function(signature, arguments, lines)
         lines += [f"{self._kept} = det;"] if self.keeps_determinant else []
         lines += ["*determinant = det;", "newton->iterations += iteration;"]
-        lines += ["if (error > newton->largest) {", "    newton->largest = error;", "}", "return true;"]
+        lines += [
+            "if (error > newton->largest || error != error) { /* a NaN stays */",
+            "    newton->largest = error;",
+            "}",
+        ]
+        lines.append("return true;")
         signature = (
             f"static bool position{self.label}(const kf_model *model, const row{self.label} *row, double *x,\n"
             "    double *hold, const double *z, bool held, double *determinant, kf_newton *newton)"

@@ -22,7 +22,7 @@ def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequ
         number = writer.expression(node)
         known += [
             f"if not {_HOLDS[meant].format(number)}:",
-            f"    raise ValueError({name + ' = %r must be ' + meant!r} % ({number},))",
+            f"    raise ValueError({name + ' = %.15g must be ' + meant!r} % ({number},))",
         ]
     fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in plan.fixed_nodes.items())
     defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]

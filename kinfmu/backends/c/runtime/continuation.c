@@ -47,12 +47,15 @@ static void say_parameters(char *message, const double *parameters)
 
 static double length_of(int count, const double *vector)
 {
-    double square = 0.0;
+    double largest = 0.0, square = 0.0;
     int k;
     for (k = 0; k < count; ++k) {
-        square += vector[k] * vector[k];
+        largest = fmax(largest, fabs(vector[k]));
     }
-    return sqrt(square);
+    for (k = 0; largest > 0.0 && k < count; ++k) {
+        square += vector[k] / largest * (vector[k] / largest);
+    }
+    return largest * sqrt(square);
 }
 
 /* J^T (J, r) of a block at what was found, the rows relative to the size; the length of r. */

@@ -74,7 +74,7 @@ extern const char *const kf_parameter_names[KF_ROOM(KF_PARAMETERS)];
 extern const char *const kf_block_row_names[KF_ROOM(KF_BLOCKS)]; /* "Q.x, Q.y" */
 
 bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room);
-void kf_drive(double time, const double *constants, double *u, double *ud, double *udd);
+void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
 int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd, double s,
                 const bool *held, kf_found *found); /* -1, or the block that failed, with its residual in `found` */
 void kf_velocity(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
