@@ -31,7 +31,7 @@ class NativeEngine:
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Driver values, speeds and accelerations at times, by the laws."""
-        return self._library.drive(times, constants)
+        return self._library.drive(times, constants, self._parameters)
 
     def sweep(self, driven: Driven, tables: Tables) -> Swept:
         """Fill the tables; what cannot be reached is NaN there."""

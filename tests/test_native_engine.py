@@ -14,7 +14,7 @@ from kinfmu.errors import CompilerError, KinfmuError
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
 from kinfmu.swept import Driven
-from tests.fmu.test_parameters import linkage
+from tests.fmu.test_parameters import geared, linkage
 
 SAMPLES = 1100  # enough for samples to be solved side by side
 
@@ -122,6 +122,13 @@ def test_other_parameters_are_reached_by_continuation() -> None:
         library.Library(compile_plan(linkage())).sweep(
             driven(np.zeros(2)), tables(("a",) * 13), parameters=[4.0, 1.0, 0.5, 0.5]
         )
+
+
+def test_laws_take_the_parameters() -> None:
+    t = np.linspace(0.0, 1.0, SAMPLES)
+    runs = [kinfmu.solve(geared(), t, parameters={"pace": 2.0}, engine=engine) for engine in ("python", "native")]
+    np.testing.assert_allclose(runs[1].values, runs[0].values, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(runs[1].accelerations, runs[0].accelerations, rtol=0, atol=1e-9)
 
 
 def test_few_samples_are_left_to_python_and_many_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,15 +87,17 @@ class Library:
         library.kf_sweep_diagnose.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), _numbers, _numbers]
         library.kf_sweep_message.restype = ctypes.c_char_p
         library.kf_sweep_message.argtypes = [ctypes.c_void_p]
-        library.kf_drive.restype = None
-        library.kf_drive_all.restype = None
+        library.kf_drive_all.restype = ctypes.c_bool
 
-    def drive(self, times: FloatArray, constants: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, d) driver values, speeds and accelerations at times, by the laws."""
+    def drive(
+        self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, d) driver values, speeds and accelerations at times, by the laws; parameters: those of the plan if none."""
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
-        self._library.kf_drive_all(
-            ctypes.c_int64(len(times)), _start(times), _start(np.array(constants, dtype=float)), *map(_start, driven)
-        )
+        values = parameters or [parameter.value for parameter in self.plan.parameters]
+        given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
+        if not self._library.kf_drive_all(ctypes.c_int64(len(times)), _start(times), *given, *map(_start, driven)):
+            raise KinfmuError("these parameters cannot be had")
         return driven  # type: ignore[return-value]  # three of them
 
     def sweep(

@@ -521,12 +521,19 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
     return true;
 }
 
-void kf_drive_all(int64_t count, const double *times, const double *constants, double *u, double *ud, double *udd)
+bool kf_drive_all(int64_t count, const double *times, const double *parameters, const double *constants, double *u,
+                  double *ud, double *udd)
 {
+    kf_model model;
+    char why[KF_MESSAGE];
     int64_t k;
-    for (k = 0; k < count; ++k) {
-        kf_drive(times[k], constants, u + k * KF_DRIVERS, ud + k * KF_DRIVERS, udd + k * KF_DRIVERS);
+    if (!kf_bind(&model, parameters, why, sizeof why)) {
+        return false;
     }
+    for (k = 0; k < count; ++k) {
+        kf_drive(&model, times[k], constants, u + k * KF_DRIVERS, ud + k * KF_DRIVERS, udd + k * KF_DRIVERS);
+    }
+    return true;
 }
 
 void kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors)

@@ -45,7 +45,10 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job);
 /* margin (count) and errors (count, 3) of the samples of a job; either may be NULL. */
 void kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
 
-/* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws. */
-void kf_drive_all(int64_t count, const double *times, const double *constants, double *u, double *ud, double *udd);
+/* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws, with these parameters; false if
+ * they cannot be had.
+ */
+bool kf_drive_all(int64_t count, const double *times, const double *parameters, const double *constants, double *u,
+                  double *ud, double *udd);
 
 #endif
