@@ -85,7 +85,9 @@ class Bridge:
             residual = evaluated(self.span.model, u, z, self.span.held)[3]
         except (ArithmeticError, ValueError):
             return False
-        return bool(residual <= CLOSED + 4.0 * EPS * max(abs(self.centre), *map(abs, z)))
+        scales = (*self.span.model.REACH, *self.span.model.UNKNOWN_SCALES)
+        largest = max([abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)])
+        return bool(residual <= CLOSED + 4.0 * EPS * largest)
 
     def difference(self, u: float) -> tuple[Vector, Vector, Vector]:
         """What the wider span says less than the one used, in z and its two derivatives: the error estimate."""
