@@ -19,7 +19,7 @@ def as_json(report: Report) -> dict[str, Any]:
 
     name, length_unit, bodies (names of the moving ones), rows (of all joints), mobility, gruebler (Gruebler's count),
     drivers, coordinates (q), outputs: names; fixed: value by coordinate.
-    redundant, inconsistent: name (joint), row, implied_by (joints), implied_by_rows, gap.
+    redundant, inconsistent: name (joint), row, implied_by (joints), implied_by_rows, gap, tolerance.
     blocks: unknowns, rows, determinant (a short formula or null).
     start: driver values by name from which runs are followed.
     singular: driver, value, kind ('change point' or 'limit'), block.
@@ -68,6 +68,7 @@ def _row(row: DependentRow) -> dict[str, Any]:
         "implied_by": list(row.implied_by_joints),
         "implied_by_rows": list(row.implied_by),
         "gap": row.gap,
+        "tolerance": row.tolerance,
     }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from kinfmu.drivers import Driver
+from kinfmu.joints.decimal_sum import decimal_sum
 from kinfmu.joints.joint import Held
 from kinfmu.joints.measures import CoordinateOf, Measure
 from kinfmu.mechanism import Mechanism, Start
@@ -32,7 +33,7 @@ class HeldDriver(Held):
         measure = self.driver.measured()
         if not isinstance(measure, CoordinateOf):
             return self
-        return replace(self, value=self.value + (dx if measure.axis == "x" else dy))
+        return replace(self, value=decimal_sum(self.value, dx if measure.axis == "x" else dy))
 
     def measured(self) -> tuple[Measure, float]:
         return self.driver.measured(), self.value

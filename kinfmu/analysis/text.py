@@ -57,13 +57,15 @@ def _count(report: Report) -> Iterator[str]:
 
 def _rows(report: Report) -> Iterator[str]:
     for row in report.redundant:
-        reason = f"at every pose it follows from {listed(row.implied_by_joints)}; set aside and kept on watch"
-        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}")
+        within = f"{row.tolerance:.3g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
+        reason = f"at every pose it follows from {listed(row.implied_by_joints)}, to within {within}"
+        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}; set aside and kept on watch")
     if not report.redundancy.dependent:
         yield _line("redundant", "none")
     for row in report.inconsistent:
-        gap = f"{abs(row.gap):.6g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
-        reason = f"{listed(row.implied_by_joints)} leave it open by {gap} at every pose"
+        unit = "rad" if row.row.kind == "angle" else report.mechanism.length_unit
+        gap = f"{abs(row.gap):.6g} {unit} at every pose; up to {row.tolerance:.3g} {unit} would count as redundant"
+        reason = f"{listed(row.implied_by_joints)} leave it open by {gap}"
         yield _line("contradicts", f"{row.row.owner} (row {row.row.name}): {reason}")
 
 

@@ -13,7 +13,7 @@ from kinfmu.drivers import Driver
 from kinfmu.equations.taylor import Taylor
 from kinfmu.joints import GROUND, Joint, Placement, Pose
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.units import METRES
 
 FloatArray = NDArray[np.float64]
@@ -184,14 +184,17 @@ def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
 
 def size_of(mechanism: Mechanism) -> float:
     """The mechanism's size [length]: the longest body, measured between its points (and its frame, unless ground)."""
-    longest = 0.0
-    for body in mechanism.bodies:
-        points = list(body.points.values()) if body.is_ground else [*body.points.values(), (0.0, 0.0)]
-        xy = np.array(points or [(0.0, 0.0)], dtype=float)
-        longest = max(longest, float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0)))))
+    longest = max(map(length_of, mechanism.bodies), default=0.0)
     for joint in mechanism.joints:
         longest = max(longest, float(joint.reach()))
     return longest or 1.0 / METRES[mechanism.length_unit]
+
+
+def length_of(body: Body) -> float:
+    """How long a body is [length], measured between its points (and its frame, unless ground)."""
+    points = list(body.points.values()) if body.is_ground else [*body.points.values(), (0.0, 0.0)]
+    xy = np.array(points or [(0.0, 0.0)], dtype=float)
+    return float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0))))
 
 
 def _floats(values: ArrayLike) -> list[float]:

@@ -3,6 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from kinfmu.joints.decimal_sum import decimal_sum
 from kinfmu.joints.joint import Held
 from kinfmu.joints.measures import CoordinateOf
 from kinfmu.joints.placement import Axis, PointName
@@ -28,7 +29,7 @@ class Coordinate(Held):
     value: Length = 0.0
 
     def moved(self, dx: float, dy: float) -> Coordinate:
-        return replace(self, value=self.value + (dx if self.axis == "x" else dy))
+        return replace(self, value=decimal_sum(self.value, dx if self.axis == "x" else dy))
 
     def measured(self) -> tuple[CoordinateOf, float]:
         return CoordinateOf(self.of, self.axis), self.value

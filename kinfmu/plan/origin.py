@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kinfmu.equations.system import size_of
+from kinfmu.joints.decimal_sum import decimal_sum
 from kinfmu.mechanism import Mechanism, Point, Start
 
 FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own
@@ -15,7 +16,7 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
 
     The origin is the first ground point if the mechanism lies far off, else the world's (also where a driver or a law
     leads a coordinate of the world): constraints do not depend on it, and rounding then is relative to the size and not
-    to the offset.
+    to the offset. Points move by decimal numbers: of a pin at 1000000.7 the double beside it has lost what counts.
     """
     ground = next(body for body in mechanism.bodies if body.is_ground)
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
@@ -31,11 +32,13 @@ def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
     bodies, written = [], mechanism.written()
     for body in written.bodies:
         if body.is_ground:
-            points = {name: Point(point.x + dx, point.y + dy) for name, point in body.points.items()}
+            points = {
+                name: Point(decimal_sum(point.x, dx), decimal_sum(point.y, dy)) for name, point in body.points.items()
+            }
             bodies.append(replace(body, points=points))
         else:
             x, y, phi = body.start
-            start = Start(None if x is None else x + dx, None if y is None else y + dy, phi)
+            start = Start(None if x is None else decimal_sum(x, dx), None if y is None else decimal_sum(y, dy), phi)
             bodies.append(replace(body, start=start))
     joints = tuple(joint.moved(dx, dy) for joint in written.joints)
     return replace(mechanism, bodies=tuple(bodies), joints=joints)

@@ -9,9 +9,11 @@ import numpy as np
 
 from kinfmu.equations.assembly import assemble, comfortable, dependent_rows, motion_samples, rough_start
 from kinfmu.equations.part import Part
-from kinfmu.equations.system import FloatArray, Row, System
+from kinfmu.equations.system import FloatArray, Row, System, length_of
+from kinfmu.joints import Distance, Revolute
 
-CONSISTENT = 1e-11  # gap relative to the mechanism's size up to which a dependent row counts as consistent
+CONSISTENT = 1e-11  # gap up to which a dependent row counts as consistent, of the link that it is about
+_ROUNDING = 2e-14  # the least tolerance, of the mechanism's size: what rounding leaves open of a row that holds
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
 _SAMPLES = 6
 
@@ -21,13 +23,17 @@ class DependentRow:
     """A row of Phi_K whose gradient is a combination of the others' at every pose of the motion that they leave.
 
     implied_by: names of the rows in that combination; any of them could be set aside in its place. gap: by how much the
-    row is open there, as a length or in radians: 0 (within CONSISTENT) makes it redundant, anything else inconsistent.
+    row is open there, as a length or in radians, the median of the poses, as rounding counts for more where the others
+    are nearly singular: 0 (within the tolerance) makes it redundant, anything else inconsistent. tolerance: CONSISTENT
+    of the bar that a distance is, or of the shorter of the bodies that a pin joins, else of the mechanism's size; in
+    radians CONSISTENT.
     """
 
     row: Row
     index: int
     implied_by: tuple[str, ...]
     gap: float
+    tolerance: float
     is_consistent: bool
 
     @property
@@ -82,11 +88,24 @@ def find_redundancy(system: System) -> Redundancy:
         poses, rows = found
         kept = others
         residuals = [system.residual(pose, u) for pose in poses]
-        gap = max((float(system.gaps(phi)[index]) for phi in residuals), key=abs)
+        gaps = sorted((float(system.gaps(phi)[index]) for phi in residuals), key=abs)
+        gap, tolerance = gaps[(len(gaps) - 1) // 2], _tolerance(system, index)
         implied_by = _implied_by(system, poses, index, rows)
-        consistent = all(system.relative_gaps(phi)[index] <= CONSISTENT for phi in residuals)
-        dependent.insert(0, DependentRow(system.rows[index], index, implied_by, gap, consistent))
+        dependent.insert(0, DependentRow(system.rows[index], index, implied_by, gap, tolerance, abs(gap) <= tolerance))
     return Redundancy(free - len(kept), tuple(kept), tuple(dependent))
+
+
+def _tolerance(system: System, index: int) -> float:
+    """The gap up to which a dependent row counts as consistent, as a length or in radians."""
+    if system.rows[index].kind == "angle":
+        return CONSISTENT
+    member, length = system.members[system.member_of[index]], system.size
+    if isinstance(member.owner, Distance):
+        length = member.owner.length
+    elif isinstance(member.owner, Revolute):
+        moving = [body for body in system.mechanism.moving_bodies if body.name in member.bodies]
+        length = min([length for length in map(length_of, moving) if length > 0.0], default=length)
+    return max(CONSISTENT * length, _ROUNDING * system.size)
 
 
 def _poses_of_dependence(

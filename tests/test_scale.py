@@ -1,0 +1,312 @@
+"""Scale: accuracy is relative to the size, from 1e-6 to 1e6, long and short links mixed, far from the origin too."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Run, Translational, gallery
+from kinfmu.errors import InconsistentError
+from kinfmu.plan import compile_plan
+from kinfmu.solver import Status
+from tests import oracle
+from tests.oracle import Motion, largest_error, mp
+from tests.scaled import scaled
+
+SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
+BARS = (4.0, 1.0, 3.5, 3.0)  # ground, crank, coupler, rocker
+ANGLES = [0.4 + 0.6 * k for k in range(10)]
+FAR = (1000000.7, -999999.3)  # of which doubles keep ten digits after the point
+
+
+def written(value: float) -> float:
+    """The double of a decimal number of 15 digits: what a person would write."""
+    return float(f"{value:.15g}")
+
+
+def crank_rocker(bars: Sequence[float], at: tuple[float, float] = (0.0, 0.0), start: float = 1.0) -> Mechanism:
+    """A four-bar about `at`, started roughly at a crank angle; inputs crank_angle, ..."""
+    ground, crank, coupler, rocker = bars
+    exact = oracle.fourbar(*map(repr, bars), start).rounded().q[0]
+    tip = (at[0] + crank * math.cos(start), at[1] + crank * math.sin(start))
+    return Mechanism(
+        "crank_rocker",
+        [
+            Body("ground", {"O": at, "C": (written(at[0] + ground), at[1])}),
+            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (*at, start)),
+            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (*tip, exact[1])),
+            Body("rocker", {"C": (0, 0), "Q": (rocker, 0)}, (at[0] + ground, at[1], exact[2])),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(start, 1.0))],
+    )
+
+
+def angles_off(run: Run, exact: Motion) -> list[float]:
+    """Largest errors of the three angles and of their rates."""
+    names = ["crank.phi", "coupler.phi", "rocker.phi"]
+    columns = [run.outputs.index(name) for name in names]
+    tables = zip((run.values, run.rates, run.accelerations), exact, strict=True)
+    return [largest_error(ours[:, columns], table, modulo_turns=not k) for k, (ours, table) in enumerate(tables)]
+
+
+def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> list[float]:
+    """Largest errors of the crank's tip, its velocity and its acceleration, at speed 1."""
+    u = [mp.mpf(float(angle)) for angle in run["crank_angle"]]
+    a, (x, y) = mp.mpf(repr(crank)), map(mp.mpf, map(repr, at))
+    exact = [
+        [[x + a * mp.cos(b), y + a * mp.sin(b)] for b in u],
+        [[-a * mp.sin(b), a * mp.cos(b)] for b in u],
+        [[-a * mp.cos(b), -a * mp.sin(b)] for b in u],
+    ]
+    names = [("x", "y"), ("vx", "vy"), ("ax", "ay")]
+    return [
+        largest_error(np.column_stack([run[f"coupler.{c}"] for c in letters]), np.array(table, dtype=object))
+        for letters, table in zip(names, exact, strict=True)
+    ]
+
+
+# --------------------------------------------------------------------------------------------------- all sizes
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_a_mechanism_larger_by_a_power_of_two_moves_alike_to_the_bit(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)
+    alike = kinfmu.solve(scaled(mechanism, 1.0), times)
+    for factor in (2.0**-20, 2.0**20):
+        run = kinfmu.solve(scaled(mechanism, factor), times)
+        units = np.array([1.0 if output.endswith(".phi") else factor for output in run.outputs])
+        for ours, theirs in zip(_tables(run), _tables(alike), strict=True):
+            np.testing.assert_array_equal(ours / units, theirs)
+        for table in ("status", "iterations", "residual", "error"):
+            np.testing.assert_array_equal(getattr(run, table), getattr(alike, table))
+        np.testing.assert_allclose(run.margin, alike.margin, rtol=0.1)  # over the largest that was drawn, two digits
+
+
+def _tables(run: Run) -> tuple[np.ndarray, ...]:
+    return run.values, run.rates, run.accelerations
+
+
+@pytest.mark.parametrize("name", ["fourbar", "parallel_jaw", "excavator", "slider_crank", "triple_rocker"])
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_check_finds_the_same_at_every_size(name: str, factor: float) -> None:
+    mechanism = kinfmu.load(name)
+    report, alike = kinfmu.check(scaled(mechanism, factor)), kinfmu.check(mechanism)
+    assert report.problem is None
+    assert report.mobility == alike.mobility
+    assert [row.row.name for row in report.redundant] == [row.row.name for row in alike.redundant]
+    assert [point.kind for point in report.singular] == [point.kind for point in alike.singular]
+    for drivers, ours, theirs in zip(mechanism.drivers, report.singular, alike.singular, strict=False):
+        if drivers.measured().kind == "angle":
+            assert ours.value == pytest.approx(theirs.value, abs=1e-10)
+    assert len(report.notes) == len(alike.notes)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_four_bars_of_all_sizes_are_right_to_round_off(scale: float) -> None:
+    bars = [written(bar * scale) for bar in BARS]
+    run = kinfmu.solve(crank_rocker(bars), crank_angle=ANGLES)
+    assert max(angles_off(run, oracle.fourbar(*map(repr, bars), ANGLES))) < 2e-15
+    assert max(tips_off(run, bars[1])) < 1e-15 * max(bars)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_slides_of_all_sizes_are_right_to_round_off(scale: float) -> None:
+    crank, rod = written(1.1 * scale), written(3.2 * scale)
+    run = kinfmu.solve(_slider_crank(crank, rod), crank_angle=ANGLES)
+    exact = oracle.slider_crank(repr(crank), repr(rod), "0", ANGLES)
+    for order, column in enumerate(("block.x", "block.vx", "block.ax")):
+        assert largest_error(run[column], exact[order][:, 2]) < 2e-15 * rod
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_fmus_of_all_sizes_are_right_to_round_off(scale: float, tmp_path: Path) -> None:
+    bars = [written(bar * scale) for bar in BARS]
+    run = kinfmu.simulate(kinfmu.build(crank_rocker(bars), tmp_path / "small.fmu"), stop=5.0, step=0.5)
+    assert run.good.all()
+    u = run["crank_angle"].tolist()
+    assert max(angles_off(run, oracle.fourbar(*map(repr, bars), u))) < 2e-15
+    assert max(tips_off(run, bars[1])) < 1e-15 * max(bars)
+
+
+@pytest.mark.parametrize("scale", [2.0**-20, 1e-6, 1.0, 1e6])
+def test_change_points_are_bridged_alike_at_all_sizes_where_the_unknown_is_a_length(scale: float) -> None:
+    angles = np.array([1.0, math.pi / 2 - 1e-3, math.pi / 2, math.pi / 2 + 0.04, 2.5, 3 * math.pi / 2, 6.0])
+    folding = Mechanism(
+        "folding",
+        [
+            Body("ground", {"O": (0, 0)}),
+            Body("crank", {"O": (0, 0), "P": (scale, 0)}, (0, 0, 1.0)),
+            Body("block", {"S": (0, 0)}, (1.08 * scale, 0, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Translational("slide", ("ground.O", "block.S")),
+            Distance("rod", ("crank.P", "block.S"), length=scale),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
+    )
+    assert compile_plan(folding).unknowns == ("block.x",)
+    run = kinfmu.solve(folding, crank_angle=angles)
+    assert run.status.tolist().count(Status.BRIDGED) == 4
+    assert (run.status <= Status.BRIDGED).all()
+    np.testing.assert_allclose(run["block.x"] / scale, 2 * np.cos(angles), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run["block.ax"] / scale, -2 * np.cos(angles), rtol=0, atol=1e-10)
+
+
+# ------------------------------------------------------------------------------------------- long and short links
+
+
+@pytest.mark.parametrize("ratio", [1e2, 1e4])
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_short_cranks_on_long_links_are_right_relative_to_the_size(ratio: float, scale: float) -> None:
+    bars = [written(bar * scale) for bar in (ratio + 0.3, 1.1, ratio, 1.7)]
+    run = kinfmu.solve(crank_rocker(bars), crank_angle=ANGLES)
+    exact = oracle.fourbar(*map(repr, bars), ANGLES)
+    angles = angles_off(run, exact)
+    assert max(tips_off(run, bars[1])) < 1e-15 * ratio * scale
+    assert max(angles) < 2e-15 * ratio  # of a short link between ends that are known to eps of the size
+    assert (np.array(angles) <= run.error.max(axis=0)).all()
+    report = kinfmu.check(crank_rocker(bars))
+    assert (report.mobility, report.redundancy.dependent, report.problem) == (1, (), None)
+
+
+# ----------------------------------------------------------------------------------------------- redundant bars
+
+
+def third_crank(ratio: float, wrong: float, *, is_body: bool, at: tuple[float, float] = (0.0, 0.0)) -> Mechanism:
+    """Three parallel cranks of length 1.1 under a coupler `ratio` long; the third is longer by `wrong` of itself."""
+    crank, ground, (x, y) = 1.1, written(0.9 * ratio), (written(0.4 * ratio), 0.3)
+    wrong_crank = crank * (1.0 + wrong)
+    there = (written(at[0] + x), written(at[1] + y))
+    bodies = [
+        Body("ground", {"O": at, "C": (written(at[0] + ground), at[1]), "B": there}),
+        Body("crank", {"O": (0, 0), "P": (crank, 0)}, (*at, 1.0)),
+        Body("coupler", {"P": (0, 0), "Q": (ground, 0), "A": (x, y)}, (at[0] + 0.594, at[1] + 0.926, 0)),
+        Body("rocker", {"C": (0, 0), "Q": (crank, 0)}, (at[0] + ground, at[1], 1.0)),
+    ]
+    joints: list[Revolute | Distance] = [
+        Revolute("O", ("ground.O", "crank.O")),
+        Revolute("P", ("crank.P", "coupler.P")),
+        Revolute("Q", ("coupler.Q", "rocker.Q")),
+        Revolute("C", ("ground.C", "rocker.C")),
+    ]
+    if is_body:
+        bodies.append(Body("bar", {"B": (0, 0), "A": (wrong_crank, 0)}, (*there, 1.0)))
+        joints += [Revolute("B", ("ground.B", "bar.B")), Revolute("A", ("coupler.A", "bar.A"))]
+    else:
+        joints.append(Distance("AB", ("ground.B", "coupler.A"), length=wrong_crank))
+    return Mechanism("third_crank", bodies, joints, [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))])
+
+
+@pytest.mark.parametrize("is_body", [False, True])
+@pytest.mark.parametrize(
+    ("ratio", "scale", "at"),
+    [
+        (2.0, 1.0, (0.0, 0.0)),
+        (2.0, 1e-6, (0.0, 0.0)),
+        (2.0, 1e6, FAR),
+        (1e4, 1.0, (0.0, 0.0)),
+    ],
+)
+def test_a_third_crank_wrong_by_1e_9_of_its_length_is_told_from_a_right_one(
+    ratio: float, scale: float, at: tuple[float, float], is_body: bool
+) -> None:
+    def made(wrong: float) -> Mechanism:
+        return scaled(third_crank(ratio, wrong, is_body=is_body, at=at), scale)
+
+    report = kinfmu.check(made(0.0))
+    assert (len(report.redundant), len(report.inconsistent)) == (1, 0)
+    assert report.plan is not None
+    run = kinfmu.solve(report.plan, crank_angle=ANGLES[:4])
+    np.testing.assert_allclose(run["rocker.phi"], ANGLES[:4], rtol=0, atol=3e-15 * ratio)
+    for wrong in (1e-9, -1e-9):
+        report = kinfmu.check(made(wrong))
+        assert (len(report.redundant), len(report.inconsistent)) == (0, 1)
+        assert isinstance(report.problem, InconsistentError)
+
+
+def test_the_tolerance_is_1e_11_of_the_link_and_check_states_it() -> None:
+    report = kinfmu.check(third_crank(2.0, 0.0, is_body=False))
+    (row,) = report.redundant
+    assert row.tolerance == pytest.approx(1e-11 * 1.1)
+    assert "it follows from O, P, Q, C, to within 1.1e-11 m; set aside and kept on watch" in str(report)
+    report = kinfmu.check(third_crank(2.0, 1e-9, is_body=False))
+    assert "open by 1.1" in str(report)
+    assert "up to 1.1e-11 m would count as redundant" in str(report)
+
+
+# --------------------------------------------------------------------------------------------- far from the origin
+
+
+@pytest.mark.parametrize("at", [FAR, (1e6, -1e6), (-123456.7, 1000000.9)])
+def test_far_from_the_origin_angles_and_rates_are_as_near_it(at: tuple[float, float], tmp_path: Path) -> None:
+    mechanism, exact = crank_rocker(BARS, at), oracle.fourbar(*map(repr, BARS), ANGLES)
+    run = kinfmu.solve(mechanism, crank_angle=ANGLES)
+    position, velocity, acceleration = tips_off(run, BARS[1], at)
+    assert max(angles_off(run, exact)) < 2e-15
+    assert max(velocity, acceleration) < 4e-15
+    assert position < 1.5e-16 * math.hypot(*at)
+    assert position <= run.error[:, 0].max() * 4.0  # sizes
+    assert kinfmu.check(mechanism).problem is None
+
+    simulated = kinfmu.simulate(kinfmu.build(mechanism, tmp_path / "far.fmu"), stop=5.0, step=0.5)
+    exact = oracle.fourbar(*map(repr, BARS), simulated["crank_angle"].tolist())
+    position, velocity, acceleration = tips_off(simulated, BARS[1], at)
+    assert max(angles_off(simulated, exact)) < 2e-15
+    assert max(velocity, acceleration) < 4e-15
+    assert position < 1.5e-16 * math.hypot(*at)
+
+
+def test_coordinates_held_far_from_the_origin_are_decimal_numbers_too() -> None:
+    def folded(at: float) -> Mechanism:
+        return Mechanism(
+            "pin_on_a_line",
+            [
+                Body("ground", {"O": (at, at)}),
+                Body("crank", {"O": (0, 0), "P": (0.5, 0)}, (at, at, 1.0)),
+                Body("rod", {"P": (0, 0), "S": (1.3, 0)}, (at + 0.27, at + 0.42, -0.1)),
+            ],
+            [
+                Revolute("O", ("ground.O", "crank.O")),
+                Revolute("P", ("crank.P", "rod.P")),
+                kinfmu.Coordinate("line", "rod.S", "y", written(at + 0.3)),
+            ],
+            [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
+        )
+
+    far, near = (kinfmu.solve(folded(at), crank_angle=ANGLES) for at in (1000000.1, 0.0))
+    np.testing.assert_allclose(far["rod.phi"], near["rod.phi"], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(far["rod.omega"], near["rod.omega"], rtol=0, atol=1e-15)
+
+
+def _slider_crank(crank: float, rod: float) -> Mechanism:
+    tip = (crank * math.cos(1.0), crank * math.sin(1.0))
+    lean = -math.asin(tip[1] / rod)
+    return Mechanism(
+        "slider_crank",
+        [
+            Body("ground", {"O": (0, 0)}),
+            Body("crank", {"O": (0, 0), "P": (crank, 0)}, (0, 0, 1.0)),
+            Body("rod", {"P": (0, 0), "S": (rod, 0)}, (*tip, lean)),
+            Body("block", {"S": (0, 0)}, (tip[0] + rod * math.cos(lean), 0, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "rod.P")),
+            Revolute("S", ("rod.S", "block.S")),
+            Translational("slide", ("ground.O", "block.S")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
+    )
