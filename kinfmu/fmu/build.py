@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.joints.laws import External
 from kinfmu.mechanism import Mechanism
 
-FLAVOURS = ("python",)
+FLAVOURS = ("python", "native")
+FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
+PLATFORMS = ("host", "all")
 
 
 def build(
@@ -21,25 +24,47 @@ def build(
     flavour: str = "python",
     drive: Drive | None = None,
     outputs: Sequence[str] | None = None,
+    fmi: int = 2,
+    platforms: str = "host",
+    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
-    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. drive: what drives at first,
-    'time' (the law in the file) or 'inputs'; if nothing is said time, unless a driver's law is external. outputs:
-    coordinates such as 'coupler.x' that the FMU shall have, all if nothing is said; what no output needs is not solved.
-    The same mechanism gives the same bytes.
+    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. flavour: 'python' (through
+    pythonfmu, for hosts that are Python processes) or 'native' (C, for all hosts). drive: what drives at first, 'time'
+    (the law in the file) or 'inputs'; if nothing is said time, unless a driver's law is external. outputs: coordinates
+    such as 'coupler.x' that the FMU shall have, all if nothing is said; what no output needs is not solved. fmi: 2 or
+    3; the python flavour is FMI 2.0 only. platforms: of the native flavour, 'host' (by the system's compiler) or 'all'
+    (by zig). progress: called with (platforms done, platforms in all) while they compile.
+
+    The same mechanism, compiled by the same compiler, gives the same bytes. CompilerError if there is no compiler.
     """
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}")
     drive = default_drive(mechanism) if drive is None else drive
     if drive not in DRIVES:
         raise FmuError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
+    if fmi not in FMI_VERSIONS:
+        raise FmuError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
+    if platforms not in PLATFORMS:
+        raise FmuError(
+            f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
+        )
+    if flavour == "python" and (fmi != 2 or platforms != "host"):
+        raise FmuError("the python flavour is FMI 2.0 on pythonfmu's platforms; flavour 'native' has fmi and platforms")
     from kinfmu import VERSION
-    from kinfmu.fmu.python_flavour import archive
     from kinfmu.plan import compile_plan
 
     path = _file(path, mechanism.name)
-    data = archive(compile_plan(mechanism, outputs), drive, VERSION)
+    plan = compile_plan(mechanism, outputs)
+    if flavour == "python":
+        from kinfmu.fmu.python_flavour import archive
+
+        data = archive(plan, drive, VERSION)
+    else:
+        from kinfmu.fmu import native
+
+        data = native.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress)
     unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

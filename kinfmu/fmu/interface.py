@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from kinfmu.errors import FmuError
@@ -41,7 +41,7 @@ class Variable:
 
     name: str
     type: Literal["Real", "Integer", "Enumeration", "Boolean", "String"]
-    causality: Literal["input", "output", "parameter", "calculatedParameter", "local"]
+    causality: Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
     variability: Literal["constant", "fixed", "tunable", "discrete", "continuous"]
     description: str
     initial: Literal["exact", "calculated"] | None = None
@@ -105,12 +105,15 @@ class Interface:
         return {variable.name: reference for reference, variable in enumerate(self)}
 
 
-def interface(plan: SolvePlan, drive: Drive = "time") -> Interface:
-    """The variables of the FMU of a plan; `drive` chooses the default of `driven_by_time`."""
+def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False) -> Interface:
+    """The variables of the FMU of a plan; `drive` chooses the default of `driven_by_time`.
+
+    has_time: time is a variable, too, the last one, as FMI 3.0 wants it; what the drivers move depends on it.
+    """
     mechanism = plan.mechanism
     every = tuple(range(len(plan.drivers)))
     depends = {name: plan.depends(name) for name in plan.outputs}
-    parts = (
+    parts: tuple[Part, ...] = (
         Part("inputs", tuple(_inputs(plan))),
         Part("values", tuple(_output(plan, name, 0, depends[name]) for name in plan.outputs)),
         Part("rates", tuple(_output(plan, name, 1, depends[name]) for name in plan.outputs)),
@@ -128,6 +131,8 @@ def interface(plan: SolvePlan, drive: Drive = "time") -> Interface:
         Part("drive", (_driven_by_time(drive),)),
         Part("message", (_MESSAGE,)),
     )
+    if has_time:
+        parts = (*(Part(part.name, tuple(map(_in_time, part.variables))) for part in parts), Part("time", (_TIME,)))
     return Interface(
         mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), parts
     )
@@ -146,6 +151,8 @@ _TOLERANCE = Variable(
     maximum=1.0,
 )
 
+_TIME = Variable("time", "Real", "independent", "continuous", "Time", unit="s")
+
 _MESSAGE = Variable(
     "solver.message",
     "String",
@@ -154,6 +161,16 @@ _MESSAGE = Variable(
     "Why the pose cannot be had: driver, value and limit; empty when all is well",
     initial="calculated",
 )
+
+
+def _in_time(variable: Variable) -> Variable:
+    """The same variable, depending on time if it does on drivers."""
+    return replace(
+        variable,
+        dependencies=variable.dependencies and (*variable.dependencies, _TIME.name),
+        initial_dependencies=variable.initial_dependencies
+        and (*variable.initial_dependencies, *((_TIME.name,) if variable.dependencies else ())),
+    )
 
 
 def _driven_by_time(drive: Drive) -> Variable:

@@ -17,11 +17,8 @@ from a package that the host may hold in another version: `kinfmu` and `pythonfm
 from __future__ import annotations
 
 import ast
-import hashlib
-import io
 import re
 import sys
-import zipfile
 from collections.abc import Mapping
 from importlib.metadata import distribution
 from importlib.resources import files
@@ -29,6 +26,7 @@ from importlib.resources import files
 from kinfmu.backends.python import emit
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
+from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.interface import Drive, Interface, interface
 from kinfmu.mechanism import toml_file
 from kinfmu.plan import SolvePlan
@@ -46,7 +44,6 @@ CAPABILITIES = {
 RUN_TIME = ("slave.py", "layout.py", "fetch.py", "estimated_rates.py", "hold.py")  # of this room
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive")
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
@@ -76,8 +73,7 @@ def archive(plan: SolvePlan, drive: Drive, version: str) -> bytes:
     """The FMU of a plan as the bytes of its zip archive; the same plan gives the same bytes."""
     variables = interface(plan, drive)
     contents = _contents(plan, variables, version)
-    token = hashlib.sha256(b"".join(name.encode() + b"\0" + data for name, data in contents.items())).hexdigest()
-    return _zipped(_named(contents, variables, version, token))
+    return zipped(_named(contents, variables, version, digest(contents)))
 
 
 def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, bytes]:
@@ -87,7 +83,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
     solver, room = files("kinfmu.solver"), files("kinfmu.fmu")
     base = files(pythonfmu)
     contents = {
-        "modelDescription.xml": _description(variables, version, token=""),
+        "modelDescription.xml": _description(variables, version, guid=""),
         "documentation/index.html": documentation.page(variables).encode(),
         "resources/mechanism.toml": toml_file.text(plan.mechanism).encode(),
         "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
@@ -121,9 +117,9 @@ def _binaries(identifier: str) -> dict[str, bytes]:
     return found
 
 
-def _description(variables: Interface, version: str, token: str) -> bytes:
+def _description(variables: Interface, version: str, guid: str) -> bytes:
     return description.write(
-        description.Description(variables, token, variables.name, f"kinfmu {version}"), CAPABILITIES
+        description.Description(variables, guid, variables.name, f"kinfmu {version}"), {"CoSimulation": CAPABILITIES}
     )
 
 
@@ -142,10 +138,10 @@ def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
     )
 
 
-def _named(contents: Mapping[str, bytes], variables: Interface, version: str, token: str) -> dict[str, bytes]:
+def _named(contents: Mapping[str, bytes], variables: Interface, version: str, digits: str) -> dict[str, bytes]:
     """The files under their final names, modules checked to import nothing but themselves and the standard library."""
-    package = f"kinfmu_{variables.name}_{token[:12]}"
-    guid = "{" + "-".join((token[:8], token[8:12], token[12:16], token[16:20], token[20:32])) + "}"
+    package = f"kinfmu_{variables.name}_{digits[:12]}"
+    guid = token(digits)
     named = {"modelDescription.xml": _description(variables, version, guid)}
     for path, data in contents.items():
         if path.startswith("kinfmu/"):
@@ -179,16 +175,3 @@ def _check_imports(contents: Mapping[str, bytes], package: str) -> None:
             for name in names:
                 if name.partition(".")[0] not in (package, *sys.stdlib_module_names):
                     raise FmuError(f"{path} imports {name}; a python FMU may import the standard library only")
-
-
-def _zipped(contents: Mapping[str, bytes]) -> bytes:
-    """A zip archive whose bytes depend on the contents alone: fixed dates, permissions, system and order."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as zipped:
-        for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):
-            entry = zipfile.ZipInfo(path, EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.create_system = 3  # Unix: it holds the permissions that follow
-            entry.external_attr = (0o100755 if path.startswith("binaries/") else 0o100644) << 16
-            zipped.writestr(entry, contents[path])
-    return buffer.getvalue()

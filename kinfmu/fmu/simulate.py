@@ -6,22 +6,22 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MechanismError, MissingPackageError, listed, suggestion
+from kinfmu.errors import FmuError, MechanismError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interrupt import interruptible
+from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.solver.status import Status
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
-_LEVELS = ("info", "warning", "error", "error", "error", "info")  # of fmi2OK, Warning, Discard, Error, Fatal, Pending
+_LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _WARNING, _DISCARD, _ERROR = 1, 2, 3
 
 
@@ -74,10 +74,10 @@ def simulate(
         if table is None and not _time_drives(interface, chosen):
             samples.now = float(t[0])
             samples.log(_WARNING, "driven by inputs, and none are given: the drivers stay at their start values")
-        with interruptible() as interrupted, _slave(about, folder, samples.log) as slave:
-            _initialize(slave, interface, chosen, t)
-            samples.read_fixed(slave)
-            _step_through(slave, interface, samples, t, table, progress, interrupted)
+        with interruptible() as interrupted, slave(about, folder, samples.log) as one:
+            _initialize(one, chosen, t, samples.said)
+            samples.read_fixed(one)
+            _step_through(one, samples, t, table, progress, interrupted)
         mechanism_text = (folder / "resources" / "mechanism.toml").read_text(encoding="utf-8")
     return samples.run(about, mechanism_text, chosen)
 
@@ -150,97 +150,24 @@ def _time_drives(interface: Interface, parameters: Mapping[str, float | bool]) -
     return bool(parameters.get(switch.name, switch.start))
 
 
-@contextmanager
-def _slave(about: Description, folder: Path, log: Callable[[int, str], None]) -> Iterator[Any]:
-    """fmpy's slave, instantiated; freed in the end, its traces in `sys.path` removed."""
-    try:
-        from fmpy.fmi2 import FMU2Slave
-    except ImportError:
-        raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
-    path_before = list(sys.path)
-    messages: list[str] = []
-
-    def logged(status: int, text: str) -> None:
-        messages.append(text)
-        log(status, text)
-
-    try:
-        slave = FMU2Slave(
-            instanceName=about.interface.name,
-            guid=about.token,
-            modelIdentifier=about.model_identifier,
-            unzipDirectory=str(folder),
-        )
-        _instantiate(slave, folder, fmi_callbacks(logged))
-    except Exception as error:  # fmpy raises bare exceptions
-        sys.path[:] = path_before
-        raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
-    try:
-        yield slave
-    finally:
-        slave.freeInstance()
-        sys.path[:] = path_before  # pythonfmu puts the FMU's resources there for good
-
-
-def _instantiate(slave: Any, folder: Path, callbacks: Any) -> None:
-    """What fmpy's `instantiate` does, with the resources' address unquoted.
-
-    pythonfmu's binary turns back no quoted sign but a blank, and takes the process down when it finds no folder there.
-    """
-    from ctypes import byref
-
-    from fmpy.fmi2 import fmi2CoSimulation
-
-    path = (folder / "resources").absolute().as_posix()
-    address = f"file://{path}" if path.startswith("/") else f"file:///{path}"
-    slave.callbacks = callbacks  # the binary keeps a pointer to it
-    slave.component = slave.fmi2Instantiate(
-        slave.instanceName.encode(), fmi2CoSimulation, slave.guid.encode(), address.encode(), byref(callbacks), 0, 1
-    )
-    if slave.component is None:
-        raise FmuError("the slave did not start")
-
-
-def fmi_callbacks(log: Callable[[int, str], None]) -> Any:
-    """FMI's callbacks: messages go to `log`, nothing to the terminal.
-
-    Without fmpy's proxy for printf-like messages: it serves one logger in a process, and our FMUs send finished text.
-    """
-    from fmpy import calloc, free
-    from fmpy.fmi2 import (
-        fmi2CallbackAllocateMemoryTYPE,
-        fmi2CallbackFreeMemoryTYPE,
-        fmi2CallbackFunctions,
-        fmi2CallbackLoggerTYPE,
-    )
-
-    def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-        log(status, (message or b"").decode("utf-8", errors="replace"))
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(logger)
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    return callbacks
-
-
 def _initialize(
-    slave: Any, interface: Interface, parameters: Mapping[str, float | bool], t: NDArray[np.float64]
+    slave: Slave, parameters: Mapping[str, float | bool], t: NDArray[np.float64], messages: Callable[[], str]
 ) -> None:
-    references = interface.value_references()
-    for name, value in parameters.items():
-        if isinstance(value, bool):
-            slave.setBoolean([references[name]], [value])
-        else:
-            slave.setReal([references[name]], [value])
-    slave.setupExperiment(startTime=t[0])
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
+    from fmpy.fmi1 import FMICallException
+
+    try:
+        for name, value in parameters.items():
+            if isinstance(value, bool):
+                slave.set_boolean(slave.references[name], value)
+            else:
+                slave.set([slave.references[name]], [value])
+        slave.initialize(float(t[0]))
+    except FMICallException as failure:
+        raise FmuError(messages() or str(failure)) from None
 
 
 def _step_through(
-    slave: Any,
-    interface: Interface,
+    slave: Slave,
     samples: _Samples,
     t: NDArray[np.float64],
     table: InputTable | None,
@@ -248,13 +175,7 @@ def _step_through(
     interrupted: Callable[[], bool],
 ) -> None:
     """The loop: set at t_k, get, record, step."""
-    from fmpy.fmi1 import FMICallException
-
-    references = interface.value_references()
-    reals = [references[v.name] for part in _REALS for v in interface.part(part)]
-    counts = [references["solver.status"], references["solver.iterations"]]
-    message = [references["solver.message"]]
-    inputs = [] if table is None else [references[name] for name in table.names]
+    inputs = [] if table is None else [slave.references[name] for name in table.names]
     settings = np.empty((len(t), 0)) if table is None else table.at(t)
     for k, time in enumerate(t.tolist()):
         samples.now = time
@@ -262,24 +183,17 @@ def _step_through(
             samples.log(_ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
         if inputs:
-            slave.setReal(inputs, settings[k].tolist())
-        status, iterations = slave.getInteger(counts)
-        samples.add(time, slave.getReal(reals), status, iterations)
+            slave.set(inputs, settings[k].tolist())
+        good = samples.read(time, slave)
         if progress is not None:
             progress(k + 1, len(t))
-        if status > Status.BRIDGED:
-            samples.log(_DISCARD, f"at t = {time:g} s: {slave.getString(message)[0].decode()}")
+        if not good:
+            samples.log(_DISCARD, f"at t = {time:g} s: {slave.message()}")
             return
-        if k + 1 < len(t):
-            try:
-                slave.doStep(time, float(t[k + 1]) - time)
-            except FMICallException as failure:
-                if failure.status != _DISCARD:
-                    raise FmuError(f"at t = {time:g} s: {failure}") from None
-                status, iterations = slave.getInteger(counts)
-                if status > Status.BRIDGED:  # what the step asked for lies out of reach
-                    samples.add(float(t[k + 1]), slave.getReal(reals), status, iterations)
-                return
+        if k + 1 < len(t) and not slave.step(time, float(t[k + 1]) - time):
+            if slave.counts()[0] > Status.BRIDGED:  # what the step asked for lies out of reach
+                samples.read(float(t[k + 1]), slave)
+            return
 
 
 class _Samples:
@@ -292,6 +206,9 @@ class _Samples:
         self._t = np.empty(count)
         self._counts = np.empty((count, 2), dtype=np.int64)
         self._size = 0
+        references = interface.value_references()
+        self._references = {part: [references[v.name] for v in interface.part(part)] for part in _REALS}
+        self._every = [reference for part in _REALS for reference in self._references[part]]
         self._events: list[Event] = []
         self.now = 0.0
         self.fixed: dict[str, float] = {}
@@ -302,30 +219,40 @@ class _Samples:
         if not self._events or self._events[-1] != event:
             self._events.append(event)
 
-    def read_fixed(self, slave: Any) -> None:
+    def said(self) -> str:
+        """The last message."""
+        return self._events[-1].text if self._events else ""
+
+    def read_fixed(self, slave: Slave) -> None:
         """Coordinates that never move: constants, or what follows from the parameters."""
         names = [variable.name for variable in self._interface.part("fixed")]
-        references = self._interface.value_references()
-        values = slave.getReal([references[name] for name in names]) if names else []
+        values = slave.get([slave.references[name] for name in names]) if names else []
         self.fixed = dict(zip(names, values, strict=True))
 
-    def add(self, t: float, reals: list[float], status: int, iterations: int) -> None:
+    def read(self, t: float, slave: Slave) -> bool:
+        """Read a sample; False if it holds no numbers but the drivers' values asked for."""
+        status, iterations = slave.counts()
+        good = status <= Status.BRIDGED
+        row = self._reals[self._size]
+        if good:
+            row[:] = slave.get(self._every)
+        else:
+            row[:] = np.nan
+            first = _REALS.index("driven")
+            row[self._ends[first - 1] : self._ends[first]] = slave.get(self._references["driven"])
         self._t[self._size] = t
-        self._reals[self._size] = reals
         self._counts[self._size] = status, iterations
         self._size += 1
+        return good
 
     def run(self, about: Description, mechanism_text: str, parameters: Mapping[str, float | bool]) -> Run:
-        """All rows as a Run; rows whose status is 3 to 5 hold no numbers but the drivers' values asked for."""
+        """All rows as a Run."""
         n = self._size
-        t, status = self._t[:n], self._counts[:n, 0]
         pieces = np.split(self._reals[:n].copy(), self._ends[:-1], axis=1)
         part = dict(zip(_REALS, pieces, strict=True))
-        for name in ("values", "rates", "accelerations", "residual", "margin", "errors", "watch"):
-            part[name][status > Status.BRIDGED] = np.nan
         interface = self._interface
         return Run(
-            t=t,
+            t=self._t[:n],
             outputs=tuple(variable.name for variable in interface.part("values")),
             coordinate_count=interface.coordinate_count,
             values=part["values"],
@@ -334,7 +261,7 @@ class _Samples:
             fixed=self.fixed,
             input_names=tuple(variable.name for variable in interface.part("inputs")),
             inputs=part["driven"],
-            status=status,
+            status=self._counts[:n, 0],
             iterations=self._counts[:n, 1],
             residual=part["residual"][:, 0],
             margin=part["margin"][:, 0],

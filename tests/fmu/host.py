@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 from kinfmu.fmu import description
-from kinfmu.fmu.simulate import fmi_callbacks
+from kinfmu.fmu.slaves import fmi2_callbacks
 
 DISCARD, TERMINATED, LAST_SUCCESSFUL_TIME = 2, 3, 2
 
@@ -34,7 +34,7 @@ class Host:
             unzipDirectory=str(folder),
             instanceName="under_test",
         )
-        self.slave.instantiate(callbacks=fmi_callbacks(lambda *message: self.messages.append(message)), loggingOn=True)
+        self.slave.instantiate(callbacks=fmi2_callbacks(lambda *message: self.messages.append(message)), loggingOn=True)
 
     def initialize(self, t: float) -> None:
         self.slave.setupExperiment(startTime=t)

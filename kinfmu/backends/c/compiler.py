@@ -27,6 +27,8 @@ SOLVER = (*MODEL, "solver.h", "way.h", "turns.c", "pose.c", "hermite.c", "span.c
           "advance.c", "message.c", "solver.c", "continuation.c", "estimate.c")  # fmt: skip
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
 
+_ZIG = (sys.executable, "-m", "ziglang", "cc")
+
 
 def sources(names: Sequence[str]) -> dict[str, str]:
     """Texts of files of the run time, by name."""
@@ -38,18 +40,19 @@ def runtime() -> dict[str, str]:
     return sources(sorted(path.name for path in RUNTIME.iterdir() if path.suffix in (".c", ".h")))
 
 
-def shared_library(files: Mapping[str, str], flags: Sequence[str] = ()) -> Path:
+def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
     """A shared library of C files (and the headers that they include), by name; compiled if the cache has it not.
 
+    target: a platform in zig's words, such as x86_64-windows-gnu, for which zig compiles; this one if nothing is said.
     CompilerError if there is no compiler, or if it fails.
     """
-    compiler = command()
+    compiler = command() if target is None else zig(target)
     wanted = [*FLAGS, *flags]
     content = [platform.machine(), _processor(), *_version(tuple(compiler)), *wanted]
     content += [part for name in sorted(files) for part in (name, files[name])]
     key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
     folder = cache_folder()
-    library = folder / f"{key}{_suffix()}"
+    library = folder / f"{key}{_suffix(target)}"
     if not library.exists():
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
@@ -64,19 +67,29 @@ def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[
     with tempfile.TemporaryDirectory() as scratch:
         for name, text in files.items():
             (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
-        units = sorted(name for name in files if name.endswith(".c"))
+        units = sorted((name for name in files if name.endswith(".c")), key=lambda name: (-len(files[name]), name))
         libraries = [] if os.name == "nt" else ["-lm"]
-        done = subprocess.run(  # noqa: S603  a compiler that we looked up, on sources of our own
-            [*compiler, *flags, *units, "-o", str(output.resolve()), *libraries],
-            cwd=scratch,
-            capture_output=True,
-            text=True,
-            check=False,
+        if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles side by side itself
+            shares = [units[k :: os.cpu_count() or 1] for k in range(os.cpu_count() or 1)]
+            _run([[*compiler, *flags, "-c", *share] for share in shares if share], scratch)
+            units = [f"{name.removesuffix('.c')}.o" for name in units]
+        _run([[*compiler, *flags, *sorted(units), "-o", str(output.resolve()), *libraries]], scratch)
+
+
+def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
+    """Run compilers side by side; CompilerError with the first complaint if one fails."""
+    running = [
+        subprocess.Popen(  # noqa: S603  a compiler that we looked up, on sources of our own
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8"
         )
-    if done.returncode != 0:
-        lines = done.stderr.splitlines() or ["no word of why"]
-        complaint = next((line for line in lines if "error" in line), lines[0])
-        raise CompilerError(f"{' '.join(compiler)} cannot compile the generated C: {complaint}")
+        for command in commands
+    ]
+    told = [process.communicate()[1] for process in running]
+    for process, command, text in zip(running, commands, told, strict=True):
+        if process.returncode != 0:
+            lines = text.splitlines() or ["no word of why"]
+            complaint = next((line for line in lines if "error" in line), lines[0])
+            raise CompilerError(f"{command[0]} cannot compile the generated C: {complaint}")
 
 
 @cache
@@ -88,9 +101,16 @@ def command() -> tuple[str, ...]:
         if found:
             return (found,)
     if find_spec("ziglang") is not None:
-        return (sys.executable, "-m", "ziglang", "cc")
+        return _ZIG
     looked = f"CC names {named!r}, which is not there" if named else "neither cc, gcc nor clang is there"
     raise CompilerError(f"no C compiler: {looked}; pip install 'kinfmu[native]' brings one")
+
+
+def zig(target: str) -> tuple[str, ...]:
+    """Zig's compiler for a platform; CompilerError if it is not installed."""
+    if find_spec("ziglang") is None:
+        raise CompilerError("compiling for other platforms needs ziglang; pip install 'kinfmu[native]'")
+    return (*_ZIG, "-target", target)
 
 
 def cache_folder() -> Path:
@@ -105,8 +125,9 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kinfmu"
 
 
-def _suffix() -> str:
-    return {"nt": ".dll"}.get(os.name, ".dylib" if sys.platform == "darwin" else ".so")
+def _suffix(target: str | None) -> str:
+    system = target or {"win32": "windows", "darwin": "macos"}.get(sys.platform, "")
+    return ".dll" if "windows" in system else ".dylib" if "macos" in system else ".so"
 
 
 @cache

@@ -1,0 +1,33 @@
+"""The zip archive of an FMU: bytes that depend on the contents alone, and the token that names them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from collections.abc import Mapping
+
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
+
+
+def digest(contents: Mapping[str, bytes]) -> str:
+    """Hash of files by path, 64 hexadecimal digits."""
+    return hashlib.sha256(b"".join(name.encode() + b"\0" + data for name, data in contents.items())).hexdigest()
+
+
+def token(digits: str) -> str:
+    """A hash in the form of a guid, which FMI 2.0 calls it: '{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}'."""
+    return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
+
+
+def zipped(contents: Mapping[str, bytes]) -> bytes:
+    """A zip archive with fixed dates, permissions, system and order; modelDescription.xml comes first."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):
+            entry = zipfile.ZipInfo(path, EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3  # Unix: it holds the permissions that follow
+            entry.external_attr = (0o100755 if path.startswith("binaries/") else 0o100644) << 16
+            archive.writestr(entry, contents[path])
+    return buffer.getvalue()

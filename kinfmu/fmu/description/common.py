@@ -1,0 +1,110 @@
+"""What model descriptions of both versions of FMI have in common."""
+
+from __future__ import annotations
+
+from typing import Literal
+from xml.etree.ElementTree import Element, SubElement
+
+from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.mechanism import RunSettings
+from kinfmu.solver.status import Status
+from kinfmu.units import METRES, display_units
+
+TOOL = "kinfmu"  # name of the annotation that tells our FMUs from others
+STATUS_TYPE = "Status"
+LOG_CATEGORIES = {
+    "logStatusWarning": "What the host may have meant otherwise",
+    "logStatusDiscard": "Steps that cannot be done: driver, value and limit",
+    "logStatusError": "Values that were refused",
+}
+_STATUS_WORDS = {
+    Status.OK: "converged to round-off",
+    Status.NEAR_SINGULAR: "right, but with fewer digits",
+    Status.BRIDGED: "interpolated across a singular point",
+    Status.OUTSIDE: "the drivers cannot take the mechanism there",
+    Status.INCONSISTENT: "a constraint set aside as redundant does not hold",
+    Status.NOT_CONVERGED: "no solution found",
+}
+UnknownKind = Literal["outputs", "initial"]
+
+
+def text(value: float | bool) -> str:
+    """A number so that it reads back bitwise, a truth value as XML writes it."""
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def number(value: str | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def limits(variable: Variable) -> dict[str, str]:
+    """The attributes min, max and start, of those that a variable has."""
+    given = (("min", variable.minimum), ("max", variable.maximum), ("start", variable.start))
+    return {
+        key: text(float(value)) if variable.type == "Real" else text(value if isinstance(value, bool) else int(value))
+        for key, value in given
+        if value is not None
+    }
+
+
+def units(root: Element, interface: Interface) -> None:
+    """UnitDefinitions: every unit that a variable has."""
+    definitions = SubElement(root, "UnitDefinitions")
+    for name in sorted({variable.unit for variable in interface if variable.unit}):
+        unit = SubElement(definitions, "Unit", name=name)
+        SubElement(unit, "BaseUnit", _base_unit(name))
+        for display, factor in display_units(name).items():
+            SubElement(unit, "DisplayUnit", name=display, factor=text(factor))
+
+
+def _base_unit(name: str) -> dict[str, str]:
+    """Exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
+    base, _, per = name.partition("/")
+    exponents = {"s": -int(per[1:] or 1) if per else 0}
+    factor = 1.0
+    if base == "rad":
+        exponents = {"rad": 1, **exponents}
+    elif base in METRES:
+        exponents, factor = {"m": 1, **exponents}, METRES[base]
+    elif base == "s":
+        exponents["s"] += 1
+    attributes = {key: str(exponent) for key, exponent in exponents.items() if exponent}
+    return attributes if factor == 1.0 else {**attributes, "factor": text(factor)}
+
+
+def statuses(enumeration: Element) -> None:
+    """The items of the type of solver.status."""
+    for status in Status:
+        item = {"name": status.name.lower(), "value": str(int(status)), "description": _STATUS_WORDS[status]}
+        SubElement(enumeration, "Item", item)
+
+
+def log_categories(root: Element) -> None:
+    categories = SubElement(root, "LogCategories")
+    for name, meaning in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=name, description=meaning)
+
+
+def experiment(root: Element, settings: RunSettings) -> None:
+    """DefaultExperiment."""
+    attributes = {"startTime": text(float(settings.start))}
+    if settings.stop > settings.start:  # FMI wants stopTime > startTime
+        attributes["stopTime"] = text(float(settings.stop))
+    SubElement(root, "DefaultExperiment", attributes, stepSize=text(float(settings.step)))
+
+
+def annotation(parent: Element, interface: Interface) -> None:
+    """Which parts the list of variables has, for `read`."""
+    parts = SubElement(parent, "Parts", coordinates=str(interface.coordinate_count), lengthUnit=interface.length_unit)
+    for part in interface.parts:
+        SubElement(parts, "Part", name=part.name, variables=str(len(part.variables)))
+
+
+def unknowns(interface: Interface, kind: UnknownKind) -> list[tuple[Variable, tuple[str, ...] | None]]:
+    """What the model structure lists, with what it depends on: outputs, at first also what follows from parameters."""
+    causalities = ("output",) if kind == "outputs" else ("output", "calculatedParameter")
+    return [
+        (variable, variable.dependencies if kind == "outputs" else variable.initial_dependencies)
+        for variable in interface
+        if variable.causality in causalities
+    ]

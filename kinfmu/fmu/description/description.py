@@ -1,0 +1,120 @@
+"""Model description: an Interface as modelDescription.xml of FMI 2.0 or 3.0, and read back from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element
+
+from kinfmu.errors import FmuError
+from kinfmu.fmu.description import fmi2, fmi3
+from kinfmu.fmu.description.common import number, text
+from kinfmu.fmu.interface import Interface, Part, Variable
+from kinfmu.mechanism import RunSettings
+
+FmiVersion = Literal["2.0", "3.0"]
+_VERSIONS: dict[FmiVersion, Any] = {"2.0": fmi2, "3.0": fmi3}
+
+
+@dataclass(frozen=True)
+class Description:
+    """A model description: the variables and who the FMU is.
+
+    token: hash of its content, the guid in FMI 2.0's words; sources: names of the C files inside, if it carries some.
+    """
+
+    interface: Interface
+    token: str
+    model_identifier: str
+    generation_tool: str
+    version: FmiVersion = "2.0"
+    sources: tuple[str, ...] = ()
+
+
+def write(description: Description, kinds: Mapping[str, Mapping[str, float | bool]]) -> bytes:
+    """modelDescription.xml; kinds: capabilities such as canGetAndSetFMUstate of CoSimulation and of ModelExchange.
+
+    It carries no date: the same content gives the same bytes.
+    """
+    interface = description.interface
+    version = _VERSIONS[description.version]
+    root = Element(
+        "fmiModelDescription",
+        {"fmiVersion": description.version, "modelName": interface.name, version.TOKEN: description.token}
+        | {"description": interface.title or interface.name, "generationTool": description.generation_tool}
+        | version.ROOT,
+    )
+    told = {
+        kind: {"modelIdentifier": description.model_identifier, **{name: text(flag) for name, flag in flags.items()}}
+        for kind, flags in kinds.items()
+    }
+    version.write(root, interface, told, description.sources)
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+
+
+def read(data: bytes, where: str) -> Description:
+    """The description in modelDescription.xml of one of our FMUs; `where` names the file in messages."""
+    try:
+        root = ET.fromstring(data)  # noqa: S314  # the stdlib parser loads no external entities
+    except ET.ParseError as error:
+        raise FmuError(f"{where}: modelDescription.xml is not XML ({error})") from None
+    said = root.get("fmiVersion", "unknown")
+    if said not in _VERSIONS:
+        raise FmuError(f"{where}: FMI version {said}; kinfmu simulates FMI 2.0 and 3.0")
+    version = _VERSIONS[said]
+    parts = version.parts(root)
+    simulation = root.find("CoSimulation")
+    if parts is None or simulation is None:
+        tool = root.get("generationTool", "an unknown tool")
+        raise FmuError(f"{where}: made by {tool}; kinfmu simulates the co-simulation FMUs that kinfmu built")
+    interface = _interface(root, parts, [_variable(**fields) for fields in version.variables(root)])
+    return Description(
+        interface,
+        token=root.get(version.TOKEN, ""),
+        model_identifier=simulation.get("modelIdentifier", ""),
+        generation_tool=root.get("generationTool", ""),
+        version=said,
+        sources=tuple(file.get("name", "") for file in simulation.iterfind("SourceFiles/File")),
+    )
+
+
+def _interface(root: Element, parts: Element, variables: Sequence[Variable]) -> Interface:
+    groups, first = [], 0
+    for part in parts:
+        count = int(part.get("variables", "0"))
+        groups.append(Part(part.get("name", ""), tuple(variables[first : first + count])))
+        first += count
+    title, name = root.get("description", ""), root.get("modelName", "")
+    return Interface(
+        name=name,
+        title="" if title == name else title,
+        length_unit=parts.get("lengthUnit", "m"),
+        experiment=_experiment(root.find("DefaultExperiment")),
+        coordinate_count=int(parts.get("coordinates", "0")),
+        parts=tuple(groups),
+    )
+
+
+def _experiment(element: Element | None) -> RunSettings:
+    attributes = {} if element is None else element.attrib
+    start = float(attributes.get("startTime", "0"))
+    return RunSettings(start, float(attributes.get("stopTime", start)), float(attributes.get("stepSize", "0.01")))
+
+
+def _variable(attributes: Mapping[str, str], **fields: Any) -> Variable:
+    start = attributes.get("start")
+    return Variable(
+        name=attributes.get("name", ""),
+        causality=cast("Any", attributes.get("causality", "local")),
+        variability=cast("Any", attributes.get("variability", "continuous")),
+        description=attributes.get("description", ""),
+        initial=cast("Any", attributes.get("initial")),
+        unit=attributes.get("unit"),
+        start=start == "true" if start in ("true", "false") else number(start),
+        minimum=number(attributes.get("min")),
+        maximum=number(attributes.get("max")),
+        **fields,
+    )

@@ -1,0 +1,105 @@
+"""Model descriptions of FMI 3.0."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+from kinfmu.fmu.description import common
+from kinfmu.fmu.interface import Interface, Variable
+
+ROOT = {"fmiVersion": "3.0", "variableNamingConvention": "structured"}
+TOKEN = "instantiationToken"  # noqa: S105  # the attribute's name
+TYPES = {
+    "Real": "Float64",
+    "Integer": "Int32",
+    "Enumeration": "Enumeration",
+    "Boolean": "Boolean",
+    "String": "String",
+}
+_TYPES_BACK = {theirs: ours for ours, theirs in TYPES.items()}
+
+
+def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str]], _sources: Sequence[str]) -> None:
+    """Everything below the root. Sources are told in sources/buildDescription.xml."""
+    for kind, attributes in kinds.items():
+        SubElement(root, kind, attributes)
+    common.units(root, interface)
+    definitions = SubElement(root, "TypeDefinitions")
+    common.statuses(SubElement(definitions, "EnumerationType", name=common.STATUS_TYPE))
+    common.log_categories(root)
+    common.experiment(root, interface.experiment)
+    references = interface.value_references()
+    variables = SubElement(root, "ModelVariables")
+    for variable in interface:
+        _variable(variables, variable, references)
+    _structure(root, interface, references)
+    common.annotation(SubElement(SubElement(root, "Annotations"), "Annotation", type=common.TOOL), interface)
+
+
+def _variable(parent: Element, variable: Variable, references: Mapping[str, int]) -> None:
+    attributes = {
+        "name": variable.name,
+        "valueReference": str(references[variable.name]),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    if variable.initial:
+        attributes["initial"] = variable.initial
+    if variable.type == "Enumeration":
+        attributes["declaredType"] = common.STATUS_TYPE
+    if variable.unit:
+        attributes["unit"] = variable.unit
+    if variable.display_unit:
+        attributes["displayUnit"] = variable.display_unit
+    attributes |= common.limits(variable)
+    if variable.derivative_of:
+        attributes["derivative"] = str(references[variable.derivative_of])
+    SubElement(parent, TYPES[variable.type], attributes)
+
+
+def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
+    """Output and InitialUnknown elements, by value references."""
+    structure = SubElement(root, "ModelStructure")
+    lists: tuple[tuple[str, common.UnknownKind], ...] = (("Output", "outputs"), ("InitialUnknown", "initial"))
+    for element, kind in lists:
+        for variable, names in common.unknowns(interface, kind):
+            unknown = {"valueReference": str(references[variable.name])}
+            if names is not None:
+                unknown["dependencies"] = " ".join(str(k) for k in sorted(references[name] for name in names))
+                unknown["dependenciesKind"] = " ".join("dependent" for _ in names)
+            SubElement(structure, element, unknown)
+
+
+def parts(root: Element) -> Element | None:
+    """The annotation that tells our FMUs from others."""
+    return root.find(f"Annotations/Annotation[@type='{common.TOOL}']/Parts")
+
+
+def variables(root: Element) -> list[dict[str, Any]]:
+    """The fields of each variable."""
+    elements = list(root.iterfind("ModelVariables/*"))
+    names = {element.get("valueReference", ""): element.get("name", "") for element in elements}
+    outputs = _unknowns(root.iterfind("ModelStructure/Output"), names)
+    initial = _unknowns(root.iterfind("ModelStructure/InitialUnknown"), names)
+    return [
+        {
+            "attributes": element.attrib,
+            "type": _TYPES_BACK[element.tag],
+            "derivative_of": names.get(element.get("derivative", "none")),
+            "dependencies": outputs.get(element.get("name", "")),
+            "initial_dependencies": initial.get(element.get("name", "")),
+        }
+        for element in elements
+    ]
+
+
+def _unknowns(elements: Iterable[Element], names: Mapping[str, str]) -> dict[str, tuple[str, ...] | None]:
+    found: dict[str, tuple[str, ...] | None] = {}
+    for unknown in elements:
+        listed = unknown.get("dependencies")
+        depends = None if listed is None else tuple(names[reference] for reference in listed.split())
+        found[names[unknown.get("valueReference", "")]] = depends
+    return found

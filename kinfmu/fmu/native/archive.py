@@ -1,0 +1,120 @@
+"""The native flavour: an FMU of generated C, for co-simulation and model exchange, with its sources inside.
+
+    modelDescription.xml
+    documentation/index.html
+    binaries/<platform>/<identifier>.so|dll|dylib
+    sources/*.c, *.h                              all that `fmpy compile` and other tools need to build it again
+    sources/buildDescription.xml                  (FMI 3.0) which of them
+    resources/mechanism.toml
+
+It needs no Python and nothing but the C library, holds no global state and reads no file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element, SubElement
+
+from kinfmu.backends.c import compiler
+from kinfmu.fmu import description, documentation
+from kinfmu.fmu.archive import digest, token, zipped
+from kinfmu.fmu.description import Description, FmiVersion
+from kinfmu.fmu.interface import Drive, Interface, interface
+from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
+from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.mechanism import toml_file
+from kinfmu.plan import SolvePlan
+
+FLAGS = ("-fvisibility=hidden", "-s")  # only FMI's functions are seen from outside
+_COMMON: dict[str, float | bool] = {"needsExecutionTool": False, "canBeInstantiatedOnlyOncePerProcess": False}
+CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
+    "2.0": {
+        "ModelExchange": _COMMON
+        | {"completedIntegratorStepNotNeeded": False, "canNotUseMemoryManagementFunctions": True}
+        | {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "providesDirectionalDerivative": True},
+        "CoSimulation": _COMMON
+        | {"canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True}
+        | {"maxOutputDerivativeOrder": 2, "canRunAsynchronuously": False, "canNotUseMemoryManagementFunctions": True}
+        | {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "providesDirectionalDerivative": True},
+    },
+    "3.0": {
+        "ModelExchange": _COMMON
+        | {"canGetAndSetFMUState": True, "canSerializeFMUState": True, "providesDirectionalDerivatives": True}
+        | {"providesAdjointDerivatives": False, "needsCompletedIntegratorStep": True},
+        "CoSimulation": _COMMON
+        | {"canGetAndSetFMUState": True, "canSerializeFMUState": True, "providesDirectionalDerivatives": True}
+        | {"providesAdjointDerivatives": False, "canHandleVariableCommunicationStepSize": True}
+        | {"maxOutputDerivativeOrder": 2, "hasEventMode": False},
+    },
+}
+
+
+def archive(
+    plan: SolvePlan,
+    drive: Drive,
+    version: str,
+    fmi: FmiVersion,
+    platforms: str,
+    progress: Callable[[int, int], None] | None = None,
+) -> bytes:
+    """The FMU of a plan as the bytes of its zip archive; the same plan and the same compiler give the same bytes.
+
+    version: of kinfmu; platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig; progress:
+    called with (platforms done, platforms in all). CompilerError without a compiler.
+    """
+    variables = interface(plan, drive, has_time=fmi == "3.0")
+    unnamed = _contents(plan, variables, version, fmi, "")
+    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)))
+    wanted = [host()] if platforms == "host" else list(PLATFORMS)
+    for done, platform in enumerate(wanted):
+        if progress is not None:
+            progress(done, len(wanted))
+        target = None if platforms == "host" else platform.target
+        contents[_binary(platform, variables, fmi)] = _compiled(contents, fmi, variables.name, platform, target)
+    if progress is not None:
+        progress(len(wanted), len(wanted))
+    return zipped(contents)
+
+
+def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersion, guid: str) -> dict[str, bytes]:
+    """Every file but the binaries, by its path in the FMU."""
+    code = sources(plan, variables, fmi, guid)
+    units = tuple(name for name in code if name.endswith(".c"))
+    about = Description(variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else ())
+    contents = {
+        "modelDescription.xml": description.write(about, CAPABILITIES[fmi]),
+        "documentation/index.html": documentation.page(variables).encode(),
+        "resources/mechanism.toml": toml_file.text(plan.mechanism).encode(),
+    }
+    if fmi == "3.0":
+        contents["sources/buildDescription.xml"] = _build_description(variables.name, units)
+    return contents | {f"sources/{name}": text.encode() for name, text in code.items()}
+
+
+def _build_description(identifier: str, units: tuple[str, ...]) -> bytes:
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    files = SubElement(configuration, "SourceFileSet", language="C99")
+    for name in units:
+        SubElement(files, "SourceFile", name=name)
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
+
+
+def _binary(platform: Platform, variables: Interface, fmi: FmiVersion) -> str:
+    return f"binaries/{platform.folder(fmi)}/{variables.name}{platform.suffix}"
+
+
+def _compiled(
+    contents: Mapping[str, bytes], fmi: FmiVersion, identifier: str, platform: Platform, target: str | None
+) -> bytes:
+    """The library of one platform, from the sources in the FMU."""
+    files = {
+        path.removeprefix("sources/"): data.decode()
+        for path, data in contents.items()
+        if path.startswith("sources/") and path.endswith((".c", ".h"))
+    }
+    own = (f"-Wl,-install_name,@rpath/{identifier}.dylib",) if platform.suffix == ".dylib" else ()
+    library = compiler.shared_library(files | headers(fmi), (*FLAGS, *own), target)
+    return library.read_bytes()

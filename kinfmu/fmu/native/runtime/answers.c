@@ -1,0 +1,55 @@
+/* Messages to the host. A message tells why an answer is not OK; text is finished before it is handed over, since hosts
+ * show the format of a message at best.
+ */
+#include "instance.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+const char *const kf_categories[3] = {"logStatusWarning", "logStatusDiscard", "logStatusError"};
+
+kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...)
+{
+    char text[KF_MESSAGE + 120];
+    const int category = answer == KF_WARN ? 0 : answer == KF_DISCARD ? 1 : 2;
+    va_list arguments;
+    if (instance->tell != NULL && !instance->silent && !(instance->muted >> category & 1u)) {
+        va_start(arguments, format);
+        vsnprintf(text, sizeof text, format, arguments);
+        va_end(arguments);
+        instance->tell(instance->host, answer, kf_categories[category], text);
+    }
+    return answer;
+}
+
+/* Of the categories named, or of all if none is. */
+kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories)
+{
+    kf_answer answer = KF_DONE;
+    unsigned named = 0;
+    size_t k;
+    for (k = 0; categories != NULL && k < count; ++k) {
+        int category = 0;
+        while (category < 3 && (categories[k] == NULL || strcmp(categories[k], kf_categories[category]) != 0)) {
+            ++category;
+        }
+        if (category < 3) {
+            named |= 1u << category;
+        } else {
+            answer = kf_answered(instance, KF_WARN, "log category '%s' is not known; categories: %s, %s, %s",
+                            categories[k] ? categories[k] : "(NULL)", kf_categories[0], kf_categories[1],
+                            kf_categories[2]);
+        }
+    }
+    if (!count) {
+        instance->silent = !on;
+        instance->muted = 0;
+    } else if (on) {
+        instance->silent = false;
+        instance->muted = ~named;
+    } else {
+        instance->muted |= named;
+    }
+    return answer;
+}

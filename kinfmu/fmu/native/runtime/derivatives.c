@@ -1,0 +1,377 @@
+/* Derivatives: of outputs with respect to inputs, parameters and time; of outputs over time; of inputs over a step.
+ *
+ * A direction of what is known moves the drivers by (du, dv, da): values, speeds, accelerations. With R(v) the rates of the
+ * outputs at driver speeds v, and H(v, w) the bilinear part of their accelerations, H(v, v) = accelerations at rest of v,
+ *
+ *     d values = R(du),   d rates = R(dv) + H(ud, du),   d accelerations = R(da) + 2 H(ud, dv) + T du
+ *
+ * come from the linear solves of the pose. T, the third derivative, what diagnostics change by, and what parameters of the
+ * geometry do (in initialization only: each trial binds them anew) are central differences of sixth order:
+ *
+ *     f' = (45 (f1 - f-1) - 9 (f2 - f-2) + (f3 - f-3)) / 60 h
+ */
+#include "instance.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define STEP 2e-3    /* [rad, sizes], far from singular points: both rounding and what is cut off stay near 1e-13 */
+#define SMALLEST 0.1 /* of a margin that the step goes with the square of: functions bend so fast near singular points */
+#define TRIES 12     /* halvings of the step where a trial cannot be had */
+
+static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
+
+/* A direction: of the drivers, of the parameters. */
+typedef struct {
+    double du[KF_DRIVERS], dv[KF_DRIVERS], da[KF_DRIVERS];
+} kf_way;
+
+static const double at_rest[KF_DRIVERS];
+
+/* rates += R(v) */
+static void add_rates(kf_state *s, const double *v, double *rates)
+{
+    double row[KF_ROOM(KF_OUTPUTS)];
+    int k;
+    kf_motion(&s->solver, kf_shown(s), v, at_rest, NULL, row, NULL);
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        rates[k] += row[k];
+    }
+}
+
+static double length_of(const double *v)
+{
+    double largest = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        largest = fmax(largest, fabs(v[k]) / kf_reach[k]);
+    }
+    return largest;
+}
+
+/* row += factor H(v, w), by H(v + w, v + w) - H(v - w, v - w) = 4 H(v, w) with v and w made equally long */
+static void add_bilinear(kf_state *s, const double *v, const double *w, double factor, double *row)
+{
+    double sum[KF_DRIVERS], difference[KF_DRIVERS], plus[KF_ROOM(KF_OUTPUTS)], minus[KF_ROOM(KF_OUTPUTS)];
+    const double of_v = length_of(v), of_w = length_of(w);
+    int k;
+    if (of_v == 0.0 || of_w == 0.0) {
+        return;
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum[k] = v[k] / of_v + w[k] / of_w;
+        difference[k] = v[k] / of_v - w[k] / of_w;
+    }
+    kf_motion(&s->solver, kf_shown(s), sum, at_rest, NULL, NULL, plus);
+    kf_motion(&s->solver, kf_shown(s), difference, at_rest, NULL, NULL, minus);
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        row[k] += factor * 0.25 * of_v * of_w * (plus[k] - minus[k]);
+    }
+}
+
+/* How the drivers move when the inputs do; estimated rates follow the values that they are estimated from. */
+static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
+{
+    kf_sample still[KF_SAMPLES];
+    double dv[KF_DRIVERS], da[KF_DRIVERS], u[KF_DRIVERS], t;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        way->du[k] = seed[3 * k];
+        way->dv[k] = seed[3 * k + 1];
+        way->da[k] = seed[3 * k + 2];
+    }
+    if (s->model_exchange) {
+        return;
+    }
+    memcpy(still, s->history, sizeof still);
+    for (k = 0; k < s->samples; ++k) {
+        memset(still[k].u, 0, sizeof still[k].u);
+    }
+    kf_moment(s, &t, u);
+    kf_estimated_rates(still, s->samples, t, way->du, dv, da);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        way->dv[k] += s->wired[3 * k + 1] ? 0.0 : dv[k];
+        way->da[k] += s->wired[3 * k + 2] ? 0.0 : da[k];
+    }
+}
+
+/* How the drivers move with time and with the constants of their laws: differences of the laws. */
+static void way_of_time(kf_state *s, const double *seed, double time_seed, kf_way *way)
+{
+    const double *const constants = KF_REAL(s, KF_PART_CONSTANTS);
+    double moved[KF_ROOM(KF_CONSTANTS)], u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS], fastest, h;
+    int k, j, sign;
+    fastest = fabs(time_seed);
+    for (k = 0; k < KF_CONSTANTS; ++k) {
+        fastest = fmax(fastest, fabs(seed[k]) / (constants[k] != 0.0 ? fabs(constants[k]) : 1.0));
+    }
+    if (fastest == 0.0) {
+        return;
+    }
+    h = STEP / fastest;
+    for (j = 1; j <= 3; ++j) {
+        for (sign = -1; sign <= 1; sign += 2) {
+            const double weight = sign * weights[j - 1] / h;
+            for (k = 0; k < KF_CONSTANTS; ++k) {
+                moved[k] = constants[k] + sign * j * h * seed[k];
+            }
+            kf_drive(&s->solver.model, s->time + sign * j * h * time_seed, moved, u, ud, udd);
+            for (k = 0; k < KF_DRIVERS; ++k) {
+                way->du[k] += weight * u[k];
+                way->dv[k] += weight * ud[k];
+                way->da[k] += weight * udd[k];
+            }
+        }
+    }
+}
+
+/* A trial: what parts say at driver values u, with speeds and accelerations, by a solver from a start. */
+static bool try_at(kf_solver *solver, kf_pose *start, kf_pose *pose, const double *const drive[3], unsigned parts,
+                   double *row)
+{
+    if (!KF_GOOD(kf_solve(solver, start, drive[0], pose))) {
+        return false;
+    }
+    kf_motion(solver, pose, drive[1], drive[2], parts & KF_BIT(KF_PART_VALUES) ? row + kf_part_first[KF_PART_VALUES] : NULL,
+              parts & KF_BIT(KF_PART_RATES) ? row + kf_part_first[KF_PART_RATES] : NULL,
+              parts & KF_BIT(KF_PART_ACCELERATIONS) ? row + kf_part_first[KF_PART_ACCELERATIONS] : NULL);
+    row[kf_part_first[KF_PART_RESIDUAL]] = pose->found.residual;
+    if (parts & KF_BIT(KF_PART_MARGIN)) {
+        row[kf_part_first[KF_PART_MARGIN]] = kf_margin(solver, pose);
+    }
+    if (parts & KF_BIT(KF_PART_ERRORS)) {
+        kf_errors(solver, pose, drive[1], drive[2], row + kf_part_first[KF_PART_ERRORS]);
+    }
+    if (parts & KF_BIT(KF_PART_WATCH)) {
+        kf_watches(&solver->model, &pose->found, row + kf_part_first[KF_PART_WATCH]);
+    }
+    if (parts & KF_BIT(KF_PART_FIXED)) {
+        kf_fixed(&solver->model, row + kf_part_first[KF_PART_FIXED]);
+    }
+    return true;
+}
+
+/* slope[...] += differences of the parts along du and, if a solver to bind is given, along the parameters' seed. */
+static bool add_differences(kf_instance *instance, const double *du, kf_solver *other, const double *seed, double h,
+                            unsigned parts)
+{
+    kf_state *const s = &instance->now;
+    kf_solver *const solver = other ? other : &s->solver;
+    kf_pose *const start = other ? &other->anchor : &s->poses[s->committed];
+    kf_pose *const pose = &s->poses[s->committed == 0 ? 1 : 0];
+    const double *const given = KF_REAL(s, KF_PART_PARAMETERS);
+    double moved[KF_ROOM(KF_PARAMETERS)], u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+    const double *drive[3];
+    double *const total = instance->total;
+    int k, j, part, sign;
+    memset(total, 0, sizeof instance->total);
+    drive[0] = u;
+    drive[1] = ud;
+    drive[2] = udd;
+    memcpy(ud, s->ud, sizeof ud);
+    memcpy(udd, s->udd, sizeof udd);
+    for (j = 1; j <= 3; ++j) {
+        for (sign = -1; sign <= 1; sign += 2) {
+            for (k = 0; k < KF_DRIVERS; ++k) {
+                u[k] = s->u[k] + sign * j * h * (other ? 0.0 : du[k]);
+            }
+            for (k = 0; other && k < KF_PARAMETERS; ++k) {
+                moved[k] = given[k] + sign * j * h * seed[k];
+            }
+            if (other && !kf_solver_bind(other, moved)) {
+                return false;
+            }
+            if (other && s->driven_by_time) { /* parameters may drive, too */
+                kf_drive(&other->model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+            }
+            if (!try_at(solver, start, pose, drive, parts, instance->trial)) {
+                return false;
+            }
+            for (k = 0; k < KF_REALS; ++k) {
+                total[k] += sign * weights[j - 1] / h * instance->trial[k];
+            }
+        }
+    }
+    for (part = 0; part < KF_PARTS; ++part) {
+        for (k = kf_part_first[part]; (parts >> part & 1u) && k < kf_part_first[part + 1]; ++k) {
+            instance->slope[k] += total[k];
+        }
+    }
+    return true;
+}
+
+static kf_answer differences(kf_instance *instance, const double *du, kf_solver *other, const double *seed, double fastest,
+                             unsigned parts)
+{
+    kf_state *const s = &instance->now;
+    const double margin = fmax(kf_margin(&s->solver, kf_shown(s)), SMALLEST);
+    double h = STEP * margin * margin / fastest;
+    bool done = false;
+    int k;
+    memset(instance->trial, 0, sizeof instance->trial);
+    for (k = 0; k < TRIES && !done; ++k, h *= 0.5) {
+        done = add_differences(instance, du, other, seed, h, parts);
+    }
+    if (s->asked != s->committed) { /* the trials went where the pose was; it is solved again when it is wanted */
+        s->solved = false;
+    }
+    if (!done) {
+        return kf_answered(instance, KF_DISCARD, "there is no directional derivative: no pose beside this one can be had");
+    }
+    return KF_DONE;
+}
+
+static kf_answer along_parameters(kf_instance *instance, const double *seed, unsigned parts)
+{
+    kf_state *const s = &instance->now;
+    const double *const given = KF_REAL(s, KF_PART_PARAMETERS);
+    const double least = fmin(1.0, KF_SIZE);
+    double fastest = 0.0;
+    kf_solver *other;
+    kf_answer answer;
+    int k;
+    for (k = 0; k < KF_PARAMETERS; ++k) {
+        fastest = fmax(fastest, fabs(seed[k]) / (given[k] != 0.0 ? fabs(given[k]) : least));
+    }
+    if (fastest == 0.0) {
+        return KF_DONE;
+    }
+    other = malloc(sizeof *other);
+    if (other == NULL) {
+        return kf_answered(instance, KF_ERROR, "getDirectionalDerivative: out of memory");
+    }
+    memset(other, 0, sizeof *other);
+    kf_solver_start(other);
+    other->tolerance = s->solver.tolerance;
+    answer = differences(instance, NULL, other, seed, fastest, parts);
+    free(other);
+    return answer;
+}
+
+/* The derivatives of all parts along a direction, in instance->slope. */
+static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
+{
+    const unsigned linear = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES);
+    kf_state *const s = &instance->now;
+    double *const seed = instance->seed, *const slope = instance->slope;
+    kf_way way;
+    kf_answer answer = KF_DONE;
+    int k;
+    memset(&way, 0, sizeof way);
+    memset(slope, 0, sizeof instance->slope);
+    if (s->driven_by_time) {
+        way_of_time(s, seed + kf_part_first[KF_PART_CONSTANTS], time_seed, &way);
+    } else {
+        way_of_inputs(s, seed, &way);
+    }
+    add_rates(s, way.du, slope + kf_part_first[KF_PART_VALUES]);
+    add_rates(s, way.dv, slope + kf_part_first[KF_PART_RATES]);
+    add_bilinear(s, s->ud, way.du, 1.0, slope + kf_part_first[KF_PART_RATES]);
+    add_rates(s, way.da, slope + kf_part_first[KF_PART_ACCELERATIONS]);
+    add_bilinear(s, s->ud, way.dv, 2.0, slope + kf_part_first[KF_PART_ACCELERATIONS]);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        double *const driven = slope + kf_part_first[KF_PART_DRIVEN] + 3 * k;
+        driven[0] = way.du[k];
+        driven[1] = way.dv[k];
+        driven[2] = way.da[k];
+    }
+    if (length_of(way.du) > 0.0 && (parts & ~linear)) {
+        answer = differences(instance, way.du, NULL, NULL, length_of(way.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
+    }
+    if (answer == KF_DONE) {
+        answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts & ~KF_BIT(KF_PART_DRIVEN));
+    }
+    return answer;
+}
+
+static bool is_unknown(unsigned reference)
+{
+    return reference < KF_REALS && !(KF_BIT(kf_part_of[reference]) & KF_GIVEN_PARTS);
+}
+
+/* What may move: inputs and time, before the end of initialization parameters too. */
+static bool is_known(const kf_state *s, unsigned reference)
+{
+    if (reference >= KF_REALS) {
+        return reference == KF_TIME;
+    }
+    return kf_part_of[reference] == KF_PART_INPUTS ||
+           (s->mode <= KF_INITIALIZATION && (KF_BIT(kf_part_of[reference]) & KF_GIVEN_PARTS) != 0);
+}
+
+kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
+                         size_t known_count, const double *seed, double *sensitivity)
+{
+    kf_state *const s = &instance->now;
+    unsigned parts = 0;
+    double time_seed = 0.0;
+    kf_answer answer;
+    size_t k;
+    memset(instance->seed, 0, sizeof instance->seed);
+    for (k = 0; k < unknown_count; ++k) {
+        if (!is_unknown(unknowns[k])) {
+            const char *const name = kf_name_of(unknowns[k]);
+            return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no directional derivative",
+                          name ? name : "what is not there", unknowns[k]);
+        }
+        parts |= KF_BIT(kf_part_of[unknowns[k]]);
+    }
+    for (k = 0; k < known_count; ++k) {
+        if (!is_known(s, knowns[k]) || !isfinite(seed[k])) {
+            const char *const name = kf_name_of(knowns[k]);
+            return kf_answered(instance, KF_ERROR, "no directional derivative along %s (value reference %u) now, by %g",
+                          name ? name : "what is not there", knowns[k], seed[k]);
+        }
+        if (knowns[k] == KF_TIME) {
+            time_seed += seed[k];
+        } else {
+            instance->seed[knowns[k]] += seed[k];
+        }
+    }
+    if (!KF_GOOD(kf_ask(instance))) {
+        return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", s->time, s->message);
+    }
+    kf_find_drive(s);
+    answer = along(instance, time_seed, parts);
+    for (k = 0; answer == KF_DONE && k < unknown_count; ++k) {
+        sensitivity[k] = instance->slope[unknowns[k]];
+    }
+    return answer;
+}
+
+/* Of positions orders 1 and 2, of rates order 1. */
+kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int order, double *value)
+{
+    const int part = reference < KF_REALS ? kf_part_of[reference] : KF_PARTS;
+    const int wanted = part + order;
+    unsigned place;
+    kf_answer answer;
+    if ((part != KF_PART_VALUES && part != KF_PART_RATES) || order < 1 || wanted > KF_PART_ACCELERATIONS) {
+        const char *const name = kf_name_of(reference);
+        return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no derivative of order %d: positions have 1 and 2, "
+                      "rates 1", name ? name : "what is not there", reference, order);
+    }
+    answer = kf_read(instance, KF_BIT(wanted));
+    place = reference - (unsigned)kf_part_first[part];
+    *value = instance->now.real[(unsigned)kf_part_first[wanted] + place];
+    return answer;
+}
+
+/* Of an input, which follows it during the next step. */
+kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int order, double value)
+{
+    kf_state *const s = &instance->now;
+    const char *const name = kf_name_of(reference);
+    if (reference >= 3 * KF_DRIVERS) {
+        return kf_not_settable(instance, reference, KF_REAL_WORD);
+    }
+    if (order < 1 || order > KF_INPUT_ORDERS || !isfinite(value)) {
+        return kf_answered(instance, KF_ERROR, "%s: derivative of order %d = %g; orders 1 to %d and finite numbers are taken", name,
+                      order, value, KF_INPUT_ORDERS);
+    }
+    s->input_rates[reference][order - 1] = value;
+    s->moving = true;
+    s->stray = s->stray || s->driven_by_time;
+    return KF_DONE;
+}

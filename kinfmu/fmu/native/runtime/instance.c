@@ -1,0 +1,320 @@
+/* The life of an instance: initialization, steps, what is asked for and what is committed. */
+#include "instance.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
+
+bool kf_token_fits(const char *token)
+{
+    return token != NULL && strcmp(token, KF_TOKEN) == 0;
+}
+
+void kf_start(kf_instance *instance, bool model_exchange)
+{
+    kf_state *const s = &instance->now;
+    int k;
+    memset(s, 0, sizeof *s);
+    kf_solver_start(&s->solver);
+    s->poses[0] = s->solver.anchor;
+    s->model_exchange = model_exchange;
+    memcpy(s->real, kf_real_starts, sizeof s->real);
+    s->driven_by_time = kf_driven_by_time_start;
+    s->time = s->last_time = kf_start_time;
+    s->mode = KF_INSTANTIATED;
+    memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
+    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
+        s->committed_inputs[k] = s->real[k];
+    }
+    kf_forget(s);
+}
+
+/* What is asked for */
+
+void kf_forget_motion(kf_state *s)
+{
+    s->known = KF_GIVEN_PARTS;
+    s->drive_known = false;
+}
+
+void kf_forget(kf_state *s)
+{
+    s->solved = s->ahead = false;
+    kf_forget_motion(s);
+}
+
+/* A place for a pose beside two others. */
+static int beside(int a, int b)
+{
+    return a == b ? (a + 1) % 3 : 3 - a - b;
+}
+
+static kf_answer bind(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    s->unbound = false;
+    s->stuck = !kf_solver_bind(&s->solver, KF_REAL(s, KF_PART_PARAMETERS));
+    s->committed = s->asked = 0;
+    s->poses[0] = s->solver.anchor;
+    s->committed_status = KF_OK;
+    memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
+    s->samples = 0;
+    kf_forget(s);
+    return s->stuck ? kf_answered(instance, KF_ERROR, "%s", s->solver.message) : KF_DONE;
+}
+
+/* The pose at driver values u from the committed one, in poses[asked]. */
+static void solve(kf_state *s, const double *u)
+{
+    s->solver.tolerance = *KF_REAL(s, KF_PART_TOLERANCE);
+    if (!s->stuck && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
+        s->asked = s->committed;
+        s->status = s->committed_status;
+    } else {
+        s->asked = beside(s->committed, s->committed);
+        s->status = kf_solve(&s->solver, &s->poses[s->committed], u, &s->poses[s->asked]);
+    }
+    if (KF_GOOD(s->status)) {
+        s->message[0] = '\0';
+    } else {
+        memcpy(s->message, s->solver.message, sizeof s->message);
+    }
+    s->solved = true;
+}
+
+kf_status kf_ask(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    if (!s->solved) {
+        double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+        if (s->unbound) {
+            bind(instance);
+        }
+        if (s->driven_by_time) {
+            kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+        } else {
+            int k;
+            for (k = 0; k < KF_DRIVERS; ++k) {
+                u[k] = s->real[3 * k];
+            }
+        }
+        solve(s, u);
+    }
+    return s->status;
+}
+
+kf_pose *kf_shown(kf_state *s)
+{
+    return &s->poses[KF_GOOD(s->status) ? s->asked : s->committed];
+}
+
+/* What is committed */
+
+/* The pose asked for becomes the one that all others are followed from. */
+static void commit(kf_state *s, double t)
+{
+    kf_sample *sample;
+    const double *const u = KF_POSE_U(&s->poses[s->asked]);
+    while (s->samples && s->history[s->samples - 1].t >= t) { /* the host went back */
+        --s->samples;
+    }
+    if (s->samples == KF_SAMPLES) {
+        memmove(s->history, s->history + 1, (KF_SAMPLES - 1) * sizeof s->history[0]);
+        --s->samples;
+    }
+    sample = &s->history[s->samples++];
+    sample->t = t;
+    memcpy(sample->u, u, sizeof sample->u);
+    memcpy(s->committed_u, u, sizeof s->committed_u);
+    memcpy(s->committed_inputs, s->real, sizeof s->committed_inputs);
+    s->committed = s->asked;
+    s->committed_status = s->status;
+    s->touched = false;
+}
+
+/* A step that cannot be done. Asked for again from the same point, no smaller, it will not be possible either: the master
+ * that goes on nevertheless is told to stop.
+ */
+static kf_answer discard(kf_instance *instance, double time, double step, double at)
+{
+    kf_state *const s = &instance->now;
+    s->terminated = s->failed && s->failed_time == time && step >= s->failed_step;
+    s->failed = true;
+    s->failed_time = time;
+    s->failed_step = step;
+    s->last_time = time;
+    return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", at, s->message);
+}
+
+/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. */
+static void move_inputs(kf_state *s, double step)
+{
+    int k, order;
+    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
+        double term = 1.0;
+        for (order = 0; order < KF_INPUT_ORDERS; ++order) {
+            term *= step / (order + 1);
+            s->real[k] += s->input_rates[k][order] * term;
+        }
+    }
+    kf_forget(s);
+}
+
+/* When inputs drive, the pose at the communication point is committed; at its end, too, if the inputs move. */
+static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
+{
+    kf_state *const s = &instance->now;
+    double kept[3 * KF_DRIVERS];
+    if (s->ahead) {
+        kf_forget(s);
+    }
+    if (!KF_GOOD(kf_ask(instance))) {
+        return discard(instance, time, step, time);
+    }
+    if (!s->touched || time != s->time) { /* inputs are held, or clocks differ: estimates see another time */
+        kf_forget_motion(s);
+    }
+    commit(s, time);
+    s->time = time + step;
+    if (!s->moving) {
+        return KF_DONE;
+    }
+    memcpy(kept, s->real, sizeof kept);
+    move_inputs(s, step);
+    if (!KF_GOOD(kf_ask(instance))) {
+        memcpy(s->real, kept, sizeof kept);
+        s->time = time;
+        s->ahead = true;
+        return discard(instance, time, step, time + step);
+    }
+    commit(s, s->time);
+    s->moving = false;
+    memset(s->input_rates, 0, sizeof s->input_rates);
+    return KF_DONE;
+}
+
+/* When time drives, the poses at both ends of a step are committed. */
+static kf_answer step_by_time(kf_instance *instance, double time, double step)
+{
+    kf_state *const s = &instance->now;
+    const double last = s->samples ? s->history[s->samples - 1].t : 0.0;
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+    kf_forget(s);
+    if (s->unbound) {
+        bind(instance);
+    }
+    if (!s->samples || s->touched || fabs(time - last) > SAME_TIME * step) {
+        s->time = time;
+        if (!KF_GOOD(kf_ask(instance))) {
+            return discard(instance, time, step, time);
+        }
+        commit(s, time);
+    }
+    s->time = time + step;
+    kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    kf_forget(s);
+    solve(s, u);
+    if (!KF_GOOD(s->status)) {
+        return discard(instance, time, step, s->time);
+    }
+    commit(s, s->time);
+    return KF_DONE;
+}
+
+kf_answer kf_step(kf_instance *instance, double time, double step)
+{
+    kf_state *const s = &instance->now;
+    kf_answer answer = KF_DONE, done;
+    if (s->mode != KF_STEPPING) {
+        return kf_answered(instance, KF_ERROR, "doStep before the end of initialization, or after terminate");
+    }
+    if (!(isfinite(time) && isfinite(step) && step >= 0.0)) {
+        return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time,
+                      step);
+    }
+    if (s->stray && !s->stray_told) {
+        s->stray_told = true;
+        answer = kf_answered(instance, KF_WARN,
+                        "inputs were set, but driven_by_time is true: the law drives, they have no effect");
+    }
+    done = s->driven_by_time ? step_by_time(instance, time, step) : step_by_inputs(instance, time, step);
+    if (done == KF_DONE) {
+        s->failed = s->terminated = false;
+        s->last_time = time + step;
+        return answer;
+    }
+    return done;
+}
+
+/* Modes */
+
+kf_answer kf_enter_initialization(kf_instance *instance, double start_time)
+{
+    kf_state *const s = &instance->now;
+    if (s->mode != KF_INSTANTIATED) {
+        return kf_answered(instance, KF_ERROR, "enterInitializationMode: the instance is initialized already; reset it first");
+    }
+    if (!isfinite(start_time)) {
+        return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", start_time);
+    }
+    s->mode = KF_INITIALIZATION;
+    s->time = s->last_time = start_time;
+    kf_forget(s);
+    return KF_DONE;
+}
+
+kf_answer kf_exit_initialization(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    if (s->mode != KF_INITIALIZATION) {
+        return kf_answered(instance, KF_ERROR, "exitInitializationMode: the instance is not in initialization mode");
+    }
+    if (s->unbound) {
+        bind(instance);
+    }
+    if (s->stuck) {
+        return kf_answered(instance, KF_ERROR, "initialization fails: %s", s->solver.message);
+    }
+    s->mode = s->model_exchange ? KF_EVENTS : KF_STEPPING;
+    return KF_DONE;
+}
+
+kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function)
+{
+    kf_state *const s = &instance->now;
+    const bool running = s->mode == KF_EVENTS || s->mode == KF_CONTINUOUS;
+    if (mode == KF_TERMINATED ? !(running || s->mode == KF_STEPPING) : !running) {
+        return kf_answered(instance, KF_ERROR, "%s: not possible now", function);
+    }
+    s->mode = mode;
+    return KF_DONE;
+}
+
+kf_answer kf_set_time(kf_instance *instance, double time)
+{
+    kf_state *const s = &instance->now;
+    if (!isfinite(time)) {
+        return kf_answered(instance, KF_ERROR, "setTime: %g s is not a finite number", time);
+    }
+    if (time != s->time) {
+        s->time = time;
+        if (s->driven_by_time) {
+            kf_forget(s);
+        }
+    }
+    return KF_DONE;
+}
+
+kf_answer kf_complete_integrator_step(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    if (s->mode != KF_CONTINUOUS && s->mode != KF_EVENTS) {
+        return kf_answered(instance, KF_ERROR, "completedIntegratorStep: the instance is not in continuous-time mode");
+    }
+    if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: it is too late for a smaller one */
+        return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
+    }
+    commit(s, s->time);
+    return KF_DONE;
+}

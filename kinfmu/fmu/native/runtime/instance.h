@@ -1,0 +1,141 @@
+/* An FMU instance of a mechanism: what FMI 2.0 and FMI 3.0 have in common. fmi2.c and fmi3.c are thin layers over it.
+ *
+ * The protocol is that of the python flavour (kinfmu/fmu/slave.py): a set marks; a get solves from the *committed* pose
+ * and caches; a step (in model exchange: a completed integrator step) commits the pose. Trial values never influence a
+ * result, so a host may go back.
+ */
+#ifndef KF_INSTANCE_H
+#define KF_INSTANCE_H
+
+#include "interface.h"
+#include "solver.h"
+
+#define KF_SAMPLES 4      /* committed ones: two for rates estimated with the current one, one more for their errors */
+#define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
+
+/* Numbered as fmi2Status and fmi3Status are. */
+typedef enum { KF_DONE, KF_WARN, KF_DISCARD, KF_ERROR } kf_answer;
+
+typedef enum {
+    KF_INSTANTIATED,
+    KF_INITIALIZATION,
+    KF_STEPPING,
+    KF_EVENTS,
+    KF_CONTINUOUS,
+    KF_TERMINATED
+} kf_mode;
+
+/* A communication point and the driver values there. */
+typedef struct {
+    double t;
+    double u[KF_DRIVERS];
+} kf_sample;
+
+/* Everything that a result depends on, and what is known of it: plain data, so that the state of an FMU is a copy of it.
+ *
+ * Real variables stand in `real` by their value references; a bit of `known` says that those of a part are up to date.
+ */
+typedef struct {
+    kf_pose poses[3];
+    int committed, asked; /* which of the poses; the same one if what is asked for is what was committed */
+    bool solved;          /* poses[asked] is what is asked for */
+    kf_status status, committed_status;
+    char message[KF_MESSAGE]; /* why the pose asked for cannot be had */
+    unsigned known;
+    bool drive_known;
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS]; /* what drives what is shown */
+    double real[KF_REALS];
+    kf_mode mode;
+    bool model_exchange, driven_by_time;
+    bool unbound; /* parameters were set and not yet bound */
+    bool stuck;   /* they cannot be had */
+    double time;  /* the communication point, or the point that a failed step asked for */
+    bool touched; /* something was set since the last commit */
+    bool ahead;   /* what is asked for is the end of a step that failed, not what was set */
+    bool stray, stray_told; /* an input was set although time drives */
+    bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
+    bool moving;                /* derivatives of inputs were given for the next step */
+    double input_rates[3 * KF_DRIVERS][KF_INPUT_ORDERS];
+    double committed_u[KF_DRIVERS], committed_inputs[3 * KF_DRIVERS];
+    int samples;
+    kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
+    bool failed, terminated;
+    double failed_time, failed_step, last_time;
+    kf_solver solver; /* the last: what it needs for a call only is not copied */
+} kf_state;
+
+#define KF_STATE_SIZE (offsetof(kf_state, solver) + KF_SOLVER_STATE)
+
+typedef void (*kf_tell)(const void *host, kf_answer answer, const char *category, const char *message);
+
+typedef struct {
+    kf_state now;
+    kf_tell tell;     /* hands messages to the host; `host` is what it is handed */
+    const void *host;
+    bool silent;
+    unsigned muted; /* a bit a category */
+    double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
+} kf_instance;
+
+/* Messages: `kf_answered` formats one, hands it to the host and returns `answer`. */
+extern const char *const kf_categories[3];
+kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...);
+kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories);
+
+/* Life. kf_start: as freshly instantiated. */
+bool kf_token_fits(const char *token);
+void kf_start(kf_instance *instance, bool model_exchange);
+kf_answer kf_enter_initialization(kf_instance *instance, double start_time);
+kf_answer kf_exit_initialization(kf_instance *instance);
+kf_answer kf_step(kf_instance *instance, double time, double step);
+kf_answer kf_set_time(kf_instance *instance, double time);
+kf_answer kf_complete_integrator_step(kf_instance *instance);
+kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
+
+/* Variables, by value references. */
+kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values);
+kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values);
+kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value);
+kf_answer kf_get_boolean(kf_instance *instance, unsigned reference, bool *value);
+kf_answer kf_set_boolean(kf_instance *instance, unsigned reference, bool value);
+kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **value);
+kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type);
+kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type);
+const char *kf_name_of(unsigned reference); /* NULL if there is no such variable */
+
+/* Derivatives. */
+kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
+                         size_t known_count, const double *seed, double *sensitivity);
+kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int order, double *value);
+kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int order, double value);
+
+/* States. */
+kf_answer kf_copy_state(kf_instance *instance, void **state);
+kf_answer kf_restore_state(kf_instance *instance, const void *state);
+size_t kf_serialized_size(void);
+kf_answer kf_serialize(kf_instance *instance, const void *state, unsigned char *bytes, size_t size);
+kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size_t size, void **state);
+
+/* What the files of the instance share. */
+#define KF_BIT(part) (1u << (part))
+#define KF_POSE_PARTS                                                                                                  \
+    (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
+     KF_BIT(KF_PART_WATCH))
+#define KF_GIVEN_PARTS                                                                                                 \
+    (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE))
+#define KF_REAL(state, part) ((state)->real + kf_part_first[part])
+
+void kf_forget(kf_state *state);        /* the driver values may have changed */
+void kf_forget_motion(kf_state *state); /* the rates may have changed */
+kf_status kf_ask(kf_instance *instance); /* the pose asked for, good or not */
+kf_pose *kf_shown(kf_state *state);
+kf_answer kf_read(kf_instance *instance, unsigned parts);
+void kf_find_drive(kf_state *state);
+void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
+void kf_find_errors(kf_state *state, double errors[3]);
+void kf_moment(const kf_state *state, double *t, double *u);
+void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
+void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *of_ud,
+                                  double *of_udd);
+
+#endif

@@ -1,0 +1,239 @@
+/* Variables by their value references: get and set. */
+#include "instance.h"
+
+#include <math.h>
+#include <string.h>
+
+const char *kf_name_of(unsigned reference)
+{
+    return reference < KF_VARIABLES ? kf_variable_names[reference] : NULL;
+}
+
+kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type)
+{
+    const char *const name = kf_name_of(reference);
+    if (name) {
+        return kf_answered(instance, KF_ERROR, "%s (value reference %u) is not a %s variable", name, reference, type);
+    }
+    return kf_answered(instance, KF_ERROR, "value reference %u is not a variable of this FMU", reference);
+}
+
+kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type)
+{
+    const char *const name = kf_name_of(reference);
+    if (name) {
+        return kf_answered(instance, KF_ERROR, "%s (value reference %u) is not a %s variable that can be set", name, reference,
+                      type);
+    }
+    return kf_answered(instance, KF_ERROR, "value reference %u is not a variable of this FMU", reference);
+}
+
+/* Get */
+
+/* Positions, rates and accelerations in one go, if more than one of them is wanted: what they share is computed once. */
+static void read_motion(kf_state *s, unsigned parts)
+{
+    double *const values = parts & KF_BIT(KF_PART_VALUES) ? KF_REAL(s, KF_PART_VALUES) : NULL;
+    double *const rates = parts & KF_BIT(KF_PART_RATES) ? KF_REAL(s, KF_PART_RATES) : NULL;
+    double *const accelerations = parts & KF_BIT(KF_PART_ACCELERATIONS) ? KF_REAL(s, KF_PART_ACCELERATIONS) : NULL;
+    if (rates || accelerations) {
+        kf_find_drive(s);
+    }
+    kf_motion(&s->solver, kf_shown(s), s->ud, s->udd, values, rates, accelerations);
+}
+
+/* What drives in effect: what was asked for, even where it cannot be had. */
+static void read_driven(kf_state *s)
+{
+    double *const driven = KF_REAL(s, KF_PART_DRIVEN);
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+    int k;
+    kf_asked_drive(s, u, ud, udd);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        driven[3 * k] = u[k];
+        driven[3 * k + 1] = ud[k];
+        driven[3 * k + 2] = udd[k];
+    }
+}
+
+/* Bring parts (a bit each) up to date; Discard if they belong to a pose that cannot be had: then they are the last good
+ * ones.
+ */
+kf_answer kf_read(kf_instance *instance, unsigned parts)
+{
+    const unsigned motion = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS);
+    kf_state *const s = &instance->now;
+    const unsigned missing = parts & ~s->known;
+    if (missing) {
+        kf_ask(instance);
+        if (missing & motion) {
+            read_motion(s, missing);
+        }
+        if (missing & ~motion) {
+            if (missing & KF_BIT(KF_PART_RESIDUAL)) {
+                *KF_REAL(s, KF_PART_RESIDUAL) = kf_shown(s)->found.residual;
+            }
+            if (missing & KF_BIT(KF_PART_MARGIN)) {
+                *KF_REAL(s, KF_PART_MARGIN) = kf_margin(&s->solver, kf_shown(s));
+            }
+            if (missing & KF_BIT(KF_PART_ERRORS)) {
+                kf_find_errors(s, KF_REAL(s, KF_PART_ERRORS));
+            }
+            if (missing & KF_BIT(KF_PART_WATCH)) {
+                kf_watches(&s->solver.model, &kf_shown(s)->found, KF_REAL(s, KF_PART_WATCH));
+            }
+            if (missing & KF_BIT(KF_PART_DRIVEN)) {
+                read_driven(s);
+            }
+            if (missing & KF_BIT(KF_PART_FIXED)) {
+                kf_fixed(&s->solver.model, KF_REAL(s, KF_PART_FIXED));
+            }
+        }
+        s->known |= missing;
+    }
+    if ((parts & KF_POSE_PARTS) && !KF_GOOD(s->status)) {
+        if (missing & KF_POSE_PARTS) {
+            kf_answered(instance, KF_DISCARD, "at t = %g s: %s", s->time, s->message);
+        }
+        return KF_DISCARD;
+    }
+    return KF_DONE;
+}
+
+kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
+{
+    kf_state *const s = &instance->now;
+    unsigned parts = 0;
+    kf_answer answer;
+    size_t k;
+    for (k = 0; k < count; ++k) {
+        const unsigned reference = references[k];
+        if (reference < KF_REALS) {
+            parts |= KF_BIT(kf_part_of[reference]);
+        } else if (reference != KF_TIME) {
+            return kf_not_a(instance, reference, KF_REAL_WORD);
+        }
+    }
+    answer = kf_read(instance, parts);
+    for (k = 0; k < count; ++k) {
+        values[k] = references[k] == KF_TIME ? s->time : s->real[references[k]];
+    }
+    return answer;
+}
+
+kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value)
+{
+    if (reference == KF_STATUS && strcmp(type, KF_STATUS_WORD) == 0) {
+        *value = kf_ask(instance);
+    } else if (reference == KF_ITERATIONS && strcmp(type, KF_ITERATIONS_WORD) == 0) {
+        kf_ask(instance);
+        *value = kf_shown(&instance->now)->found.iterations;
+    } else {
+        return kf_not_a(instance, reference, type);
+    }
+    return KF_DONE;
+}
+
+kf_answer kf_get_boolean(kf_instance *instance, unsigned reference, bool *value)
+{
+    if (reference != KF_DRIVEN_BY_TIME) {
+        return kf_not_a(instance, reference, "Boolean");
+    }
+    *value = instance->now.driven_by_time;
+    return KF_DONE;
+}
+
+/* The text stays valid until the next call. */
+kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **value)
+{
+    if (reference != KF_MESSAGE_TEXT) {
+        return kf_not_a(instance, reference, "String");
+    }
+    kf_ask(instance);
+    *value = instance->now.message;
+    return KF_DONE;
+}
+
+/* Set */
+
+static kf_answer set_other(kf_instance *instance, unsigned reference, double value)
+{
+    kf_state *const s = &instance->now;
+    const int part = reference < KF_REALS ? kf_part_of[reference] : KF_PARTS;
+    const char *const name = kf_name_of(reference);
+    if (part != KF_PART_INPUTS && part != KF_PART_CONSTANTS && part != KF_PART_PARAMETERS && part != KF_PART_TOLERANCE) {
+        return kf_not_settable(instance, reference, KF_REAL_WORD);
+    }
+    if (!isfinite(value)) {
+        return kf_answered(instance, KF_ERROR, "%s = %g is not a finite number; %.17g stays", name, value, s->real[reference]);
+    }
+    if (kf_real_is_positive[reference] && !(value > 0.0)) {
+        return kf_answered(instance, KF_ERROR, "%s = %.17g must be positive; %.17g stays", name, value, s->real[reference]);
+    }
+    if (part == KF_PART_PARAMETERS) {
+        if (s->mode > KF_INITIALIZATION) {
+            return kf_answered(instance, KF_ERROR, "%s = %.17g comes too late: it is fixed once the FMU is initialized", name,
+                          value);
+        }
+        s->unbound = true;
+    }
+    s->real[reference] = value;
+    s->touched = true;
+    kf_forget(s);
+    return KF_DONE;
+}
+
+kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values)
+{
+    kf_state *const s = &instance->now;
+    size_t k;
+    if (s->mode == KF_TERMINATED) {
+        return kf_answered(instance, KF_ERROR, "nothing can be set after terminate");
+    }
+    if (s->ahead) {
+        kf_forget(s);
+    }
+    for (k = 0; k < count; ++k) {
+        const unsigned reference = references[k];
+        const double value = values[k];
+        if (reference >= 3 * KF_DRIVERS || !isfinite(value)) {
+            const kf_answer answer = set_other(instance, reference, value);
+            if (answer != KF_DONE) {
+                return answer;
+            }
+            continue;
+        }
+        if (value != s->real[reference]) {
+            s->real[reference] = value;
+            s->stray = s->stray || s->driven_by_time;
+            if (reference % 3 == 0) {
+                kf_forget(s);
+            } else {
+                s->wired[reference] = s->wired[reference] || value != 0.0;
+                kf_forget_motion(s);
+            }
+        }
+        if (!s->touched) { /* from now on the rates are those at the current time, not at the commit */
+            s->touched = true;
+            kf_forget_motion(s);
+        }
+    }
+    return KF_DONE;
+}
+
+kf_answer kf_set_boolean(kf_instance *instance, unsigned reference, bool value)
+{
+    kf_state *const s = &instance->now;
+    if (reference != KF_DRIVEN_BY_TIME) {
+        return kf_not_settable(instance, reference, "Boolean");
+    }
+    if (value != s->driven_by_time) {
+        if (s->mode > KF_INITIALIZATION) {
+            return kf_answered(instance, KF_ERROR, "driven_by_time = %s comes too late: it is fixed once the FMU is initialized",
+                          value ? "true" : "false");
+        }
+        s->driven_by_time = value;
+        kf_forget(s);
+    }
+    return KF_DONE;
+}

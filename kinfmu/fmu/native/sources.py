@@ -1,0 +1,113 @@
+"""The C sources of a native FMU: the model, the solver, the instance, and the tables of this FMU's variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.resources import files
+from itertools import accumulate
+from pathlib import Path
+
+from kinfmu.backends.c import compiler, emit
+from kinfmu.backends.c.text import array, booleans, string
+from kinfmu.errors import MissingPackageError
+from kinfmu.fmu.interface import Interface
+from kinfmu.plan import SolvePlan
+
+RUNTIME = Path(__file__).with_name("runtime")
+NOT_REAL = ("counts", "drive", "message", "time")  # parts that follow those of Real variables
+HEADERS = {
+    "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
+    "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
+}
+_WORDS = {"2.0": ("Real", "Integer", "Integer"), "3.0": ("Float64", "Int64", "Int32")}
+_OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
+
+
+def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> dict[str, str]:
+    """Texts of all C files and headers of the FMU by name, but for those of FMI itself."""
+    instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
+    del instance[_OTHER_VERSION[version]]
+    tables = {"interface.h": _header(variables, version, token), "interface.c": _tables(variables)}
+    return dict(sorted((emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables).items()))
+
+
+def headers(version: str) -> dict[str, str]:
+    """The headers of FMI by name, as fmpy carries them. They stay outside of FMUs: importers have their own."""
+    try:
+        folder = files("fmpy").joinpath("c-code")
+        return {name: folder.joinpath(name).read_text("utf-8") for name in HEADERS[version]}
+    except (ImportError, OSError):
+        raise MissingPackageError(
+            "building native FMUs needs the headers that fmpy carries; pip install fmpy"
+        ) from None
+
+
+def _header(variables: Interface, version: str, token: str) -> str:
+    """interface.h: how many variables there are of what, and where."""
+    references = variables.value_references()
+    names = [part.name for part in variables.parts if part.name not in NOT_REAL]
+    real = sum(len(variables.part(name)) for name in names)
+    words = _WORDS[version]
+    lines = [
+        f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
+        "#ifndef KF_INTERFACE_H",
+        "#define KF_INTERFACE_H",
+        "",
+        "#include <stdbool.h>",
+        "",
+        f"#define KF_TOKEN {string(token)}",
+        f"#define KF_VARIABLES {len(references)}",
+        f"#define KF_REALS {real} /* they come first; the place of a variable is its value reference */",
+        "",
+        "/* Variables that are computed together, and stand together. */",
+        "enum {",
+        *(f"    KF_PART_{name.upper()}," for name in names),
+        "    KF_PARTS",
+        "};",
+        "",
+        f"#define KF_STATUS {references['solver.status']}",
+        f"#define KF_ITERATIONS {references['solver.iterations']}",
+        f"#define KF_DRIVEN_BY_TIME {references['driven_by_time']}",
+        f"#define KF_MESSAGE_TEXT {references['solver.message']}",
+        f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
+        f'#define KF_REAL_WORD "{words[0]}"',
+        f'#define KF_STATUS_WORD "{words[1]}"',
+        f'#define KF_ITERATIONS_WORD "{words[2]}"',
+        "",
+        "extern const char *const kf_variable_names[KF_VARIABLES];",
+        "extern const int kf_part_first[KF_PARTS + 1];",
+        "extern const unsigned char kf_part_of[KF_REALS];",
+        "extern const double kf_real_starts[KF_REALS];",
+        "extern const bool kf_real_is_positive[KF_REALS];",
+        "extern const bool kf_driven_by_time_start;",
+        "extern const double kf_start_time;",
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _tables(variables: Interface) -> str:
+    """interface.c: names, starts and limits of the variables."""
+    parts = [part for part in variables.parts if part.name not in NOT_REAL]
+    real = [variable for part in parts for variable in part.variables]
+    (drive,) = variables.part("drive")
+    positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
+    lines = [
+        f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
+        '#include "interface.h"',
+        "",
+        *array("char *const kf_variable_names", [string(variable.name) for variable in variables]),
+        *array("int kf_part_first", [0, *accumulate(len(part.variables) for part in parts)]),
+        *array("unsigned char kf_part_of", _numbers(len(part.variables) for part in parts)),
+        *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
+        *array("bool kf_real_is_positive", booleans(positive)),
+        f"const bool kf_driven_by_time_start = {'true' if drive.start else 'false'};",
+        f"const double kf_start_time = {float(variables.experiment.start)!r};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(counts: Iterable[int]) -> list[int]:
+    """0 as often as the first count says, 1 as often as the second, ..."""
+    return [number for number, count in enumerate(counts) for _ in range(count)]

@@ -1,0 +1,207 @@
+"""Slaves of our FMUs through fmpy's low-level calls, with the same methods for both versions of FMI."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from kinfmu.errors import FmuError, MissingPackageError
+from kinfmu.fmu.description import Description
+
+DISCARD = 2  # fmi2Discard and fmi3Discard
+Log = Callable[[int, str], None]  # status and text of a message
+
+
+class Slave(ABC):
+    """One slave; `fmpy` is fmpy's, for what is not wrapped here."""
+
+    fmpy: Any
+
+    def __init__(self, about: Description) -> None:
+        self.references = about.interface.value_references()
+        self._counts = self.references["solver.status"], self.references["solver.iterations"]
+        self._message = [self.references["solver.message"]]
+
+    def free(self) -> None:
+        self.fmpy.freeInstance()
+
+    @abstractmethod
+    def initialize(self, start: float) -> None:
+        """Go through initialization mode."""
+
+    @abstractmethod
+    def get(self, references: Sequence[int]) -> list[float]:
+        """Numbers by their value references."""
+
+    @abstractmethod
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None: ...
+
+    def set_boolean(self, reference: int, value: bool) -> None:
+        self.fmpy.setBoolean([reference], [value])
+
+    @abstractmethod
+    def counts(self) -> tuple[int, int]:
+        """solver.status and solver.iterations."""
+
+    @abstractmethod
+    def message(self) -> str:
+        """solver.message."""
+
+    def step(self, time: float, step: float) -> bool:
+        """DoStep; False if it is Discard. Every other failure is an FmuError."""
+        from fmpy.fmi1 import FMICallException
+
+        try:
+            self.fmpy.doStep(time, step)
+        except FMICallException as failure:
+            if failure.status != DISCARD:
+                raise FmuError(f"at t = {time:g} s: {failure}") from None
+            return False
+        return True
+
+
+class Slave2(Slave):
+    """A slave of FMI 2.0, of the FMU that was unpacked into a folder; raises what fmpy raises."""
+
+    def __init__(self, about: Description, folder: Path, log: Log) -> None:
+        from fmpy.fmi2 import FMU2Slave
+
+        super().__init__(about)
+        self.fmpy = FMU2Slave(
+            instanceName=about.interface.name,
+            guid=about.token,
+            modelIdentifier=about.model_identifier,
+            unzipDirectory=str(folder),
+        )
+        self._instantiate(folder, fmi2_callbacks(log))
+
+    def _instantiate(self, folder: Path, callbacks: Any) -> None:
+        """What fmpy's `instantiate` does, with the resources' address unquoted.
+
+        pythonfmu's binary turns back no quoted sign but a blank, and takes the process down when it finds no folder
+        there.
+        """
+        from ctypes import byref
+
+        from fmpy.fmi2 import fmi2CoSimulation
+
+        path = (folder / "resources").absolute().as_posix()
+        address = f"file://{path}" if path.startswith("/") else f"file:///{path}"
+        slave = self.fmpy
+        slave.callbacks = callbacks  # the binary keeps a pointer to it
+        slave.component = slave.fmi2Instantiate(
+            slave.instanceName.encode(), fmi2CoSimulation, slave.guid.encode(), address.encode(), byref(callbacks), 0, 1
+        )
+        if slave.component is None:
+            raise FmuError("the slave did not start")
+
+    def initialize(self, start: float) -> None:
+        self.fmpy.setupExperiment(startTime=start)
+        self.fmpy.enterInitializationMode()
+        self.fmpy.exitInitializationMode()
+
+    def get(self, references: Sequence[int]) -> list[float]:
+        return list(self.fmpy.getReal(references))
+
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
+        self.fmpy.setReal(references, values)
+
+    def counts(self) -> tuple[int, int]:
+        status, iterations = self.fmpy.getInteger(self._counts)
+        return status, iterations
+
+    def message(self) -> str:
+        return str(self.fmpy.getString(self._message)[0].decode())
+
+
+class Slave3(Slave):
+    """A slave of FMI 3.0, alike."""
+
+    def __init__(self, about: Description, folder: Path, log: Log) -> None:
+        from fmpy.fmi3 import FMU3Slave
+
+        super().__init__(about)
+        self.fmpy = FMU3Slave(
+            instanceName=about.interface.name,
+            guid=about.token,
+            modelIdentifier=about.model_identifier,
+            unzipDirectory=str(folder),
+        )
+
+        def logger(_environment: object, status: int, _category: bytes, message: bytes) -> None:
+            log(status, (message or b"").decode("utf-8", errors="replace"))
+
+        self.fmpy.instantiate(loggingOn=True, logMessage=logger)
+
+    def initialize(self, start: float) -> None:
+        self.fmpy.enterInitializationMode(startTime=start)
+        self.fmpy.exitInitializationMode()
+
+    def get(self, references: Sequence[int]) -> list[float]:
+        return list(self.fmpy.getFloat64(references))
+
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
+        self.fmpy.setFloat64(references, values)
+
+    def counts(self) -> tuple[int, int]:
+        status, iterations = self._counts
+        return self.fmpy.getInt64([status])[0], self.fmpy.getInt32([iterations])[0]
+
+    def message(self) -> str:
+        return str(self.fmpy.getString(self._message)[0])
+
+
+_SLAVES: Mapping[str, type[Slave2 | Slave3]] = {"2.0": Slave2, "3.0": Slave3}
+
+
+@contextmanager
+def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
+    """A slave of the FMU unpacked into a folder; freed in the end, its traces in `sys.path` removed."""
+    try:
+        import fmpy  # noqa: F401  # is it there?
+    except ImportError:
+        raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
+    path_before = list(sys.path)
+    messages: list[str] = []
+
+    def logged(status: int, text: str) -> None:
+        messages.append(text)
+        log(status, text)
+
+    try:
+        one = _SLAVES[about.version](about, folder, logged)
+    except Exception as error:  # fmpy raises bare exceptions
+        sys.path[:] = path_before
+        raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
+    try:
+        yield one
+    finally:
+        one.free()
+        sys.path[:] = path_before  # pythonfmu puts the FMU's resources there for good
+
+
+def fmi2_callbacks(log: Log) -> Any:
+    """FMI 2.0's callbacks: messages go to `log`, nothing to the terminal.
+
+    Without fmpy's proxy for printf-like messages: it serves one logger in a process, and our FMUs send finished text.
+    """
+    from fmpy import calloc, free
+    from fmpy.fmi2 import (
+        fmi2CallbackAllocateMemoryTYPE,
+        fmi2CallbackFreeMemoryTYPE,
+        fmi2CallbackFunctions,
+        fmi2CallbackLoggerTYPE,
+    )
+
+    def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+        log(status, (message or b"").decode("utf-8", errors="replace"))
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(logger)
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    return callbacks

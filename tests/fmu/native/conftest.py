@@ -1,0 +1,75 @@
+"""Native FMUs of the gallery's mechanisms, built once, and instances of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu.backends.c import compiler
+from kinfmu.mechanism import Mechanism
+from tests.fmu.native.host import Host
+
+Build = Callable[..., Path]
+Start = Callable[..., Host]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Compiled libraries stay inside the tests, and are compiled quickly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setattr(
+            compiler, "FLAGS", [{"-O2": "-O0"}.get(flag, flag) for flag in compiler.FLAGS]
+        )  # the same numbers
+        yield
+
+
+@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
+def fmi(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+@pytest.fixture(scope="session")
+def built_native(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """`built_native(mechanism, fmi, drive)`: path of a native FMU of a mechanism or a gallery name."""
+    folder = tmp_path_factory.mktemp("native")
+    paths: dict[tuple[str, int, str], Path] = {}
+
+    def get(model: str | Mechanism, fmi: int, drive: str = "inputs") -> Path:
+        mechanism = kinfmu.load(model) if isinstance(model, str) else model
+        key = (mechanism.name, fmi, drive)
+        if key not in paths:
+            path = folder / f"{mechanism.name}_{fmi}_{drive}.fmu"
+            paths[key] = kinfmu.build(mechanism, path, flavour="native", fmi=fmi, drive=drive)  # type: ignore[arg-type]
+        return paths[key]
+
+    return get
+
+
+@pytest.fixture
+def start(built_native: Build, fmi: int, tmp_path: Path) -> Iterator[Start]:
+    """`start(name, drive)`: an instance, initialized at time 0 unless told otherwise; freed in the end."""
+    hosts: list[Host] = []
+
+    def get(
+        model: str | Mechanism = "fourbar",
+        drive: str = "inputs",
+        *,
+        initialize: bool = True,
+        model_exchange: bool = False,
+    ) -> Host:
+        path = built_native(model, fmi, drive)
+        host = Host(path, tmp_path / path.stem, model_exchange=model_exchange)
+        hosts.append(host)
+        if initialize:
+            host.initialize(0.0)
+            if model_exchange:
+                host.fmu.enterContinuousTimeMode()
+        return host
+
+    yield get
+    for host in hosts:
+        host.free()

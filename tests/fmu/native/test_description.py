@@ -1,0 +1,137 @@
+"""The rules of model descriptions that exporters get wrong, in both versions of FMI."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from fmpy.validation import validate_fmu
+
+import kinfmu
+from kinfmu.fmu import description
+from kinfmu.fmu.interface import Interface, interface
+from kinfmu.plan import compile_plan
+from tests.fmu.native.conftest import Build
+from tests.fmu.test_parameters import linkage
+
+STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*\Z", re.ASCII)
+
+
+@pytest.fixture(params=["fourbar", "double_pendulum", "settable"])
+def fmu(request: pytest.FixtureRequest, built_native: Build, fmi: int) -> Path:
+    return built_native(linkage() if request.param == "settable" else request.param, fmi, "time")
+
+
+@pytest.fixture
+def data(fmu: Path) -> bytes:
+    with zipfile.ZipFile(fmu) as zipped:
+        return zipped.read("modelDescription.xml")
+
+
+@pytest.fixture
+def root(data: bytes) -> ET.Element:
+    return ET.fromstring(data)  # noqa: S314  # our own
+
+
+def test_fmpy_finds_nothing_to_complain_of(fmu: Path) -> None:
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_description_reads_back_as_the_interface_it_was_written_from(data: bytes, fmi: int) -> None:
+    read = description.read(data, "it")
+    mechanism = linkage() if read.interface.name == "settable" else kinfmu.load(read.interface.name)
+    written = interface(compile_plan(mechanism), "time", has_time=fmi == 3)
+    place = written.value_references()
+    assert list(read.interface) == [
+        replace(v, initial_dependencies=v.initial_dependencies and tuple(sorted(v.initial_dependencies, key=place.get)))
+        for v in written
+    ]
+    assert [(part.name, part.names) for part in read.interface.parts] == [(p.name, p.names) for p in written.parts]
+    assert read.version == f"{fmi}.0"
+    assert bool(read.sources) == (fmi == 2)
+
+
+def test_both_kinds_are_there_without_an_execution_tool_and_with_all_they_can(root: ET.Element, fmi: int) -> None:
+    can = ["canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"]
+    if fmi == 3:
+        can = ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"]
+    for kind in ("CoSimulation", "ModelExchange"):
+        element = root.find(kind)
+        assert element is not None
+        assert [element.get(name) for name in can] == ["true"] * 3
+        assert element.get("needsExecutionTool") == element.get("canBeInstantiatedOnlyOncePerProcess") == "false"
+        assert re.fullmatch(r"[A-Za-z_]\w*", element.get("modelIdentifier", ""))
+    simulation = root.find("CoSimulation")
+    assert simulation is not None
+    assert simulation.get("canHandleVariableCommunicationStepSize") == "true"
+    assert simulation.get("maxOutputDerivativeOrder") == "2"
+
+
+def test_value_references_and_names_are_unique_and_names_legal(data: bytes, root: ET.Element) -> None:
+    elements = list(root.iterfind("ModelVariables/*"))
+    references = [element.get("valueReference") for element in elements]
+    names = [element.get("name", "") for element in elements]
+    assert len(set(references)) == len(references)
+    assert len(set(names)) == len(names)
+    assert all(STRUCTURED_NAME.match(name) for name in names)
+    assert b"generationDateAndTime" not in data
+
+
+def test_outputs_and_initial_unknowns_are_complete_with_as_many_kinds_as_dependencies(data: bytes) -> None:
+    about = description.read(data, "it").interface
+    for variable in about:
+        known = {v.name for v in about if v.causality in ("input", "parameter", "independent")}
+        if variable.causality == "output":
+            assert variable.dependencies is not None
+            assert {about_causality(about, name) for name in variable.dependencies} <= {"input", "independent"}
+        assert set(variable.initial_dependencies or ()) <= known
+    text = data.decode()
+    for listed, kinds in re.findall(r'dependencies="([^"]*)" dependenciesKind="([^"]*)"', text):
+        assert len(listed.split()) == len(kinds.split())
+        assert set(kinds.split()) <= {"dependent"}
+
+
+def about_causality(about: Interface, name: str) -> str:
+    return next(variable.causality for variable in about if variable.name == name)
+
+
+def test_time_is_the_one_independent_variable_of_fmi_3(data: bytes, fmi: int) -> None:
+    independent = [v for v in description.read(data, "it").interface if v.causality == "independent"]
+    assert [v.name for v in independent] == (["time"] if fmi == 3 else [])
+    assert all(v.start is None and v.initial is None for v in independent)
+
+
+def test_starts_and_limits_follow_causality(data: bytes) -> None:
+    for variable in description.read(data, "it").interface:
+        if variable.causality == "input" or variable.initial == "exact":
+            assert variable.start is not None
+        else:
+            assert variable.start is None
+        assert (variable.initial is None) == (variable.causality in ("input", "independent"))
+        low, high = variable.minimum, variable.maximum
+        if variable.type == "Real" and variable.start is not None:
+            assert low is None or low <= variable.start
+            assert high is None or variable.start <= high
+        if variable.causality == "parameter":
+            assert variable.variability != "continuous"
+
+
+def test_units_and_display_units_are_defined(root: ET.Element) -> None:
+    units = {unit.get("name"): {d.get("name") for d in unit.iterfind("DisplayUnit")} for unit in root.iter("Unit")}
+    users = [element for element in root.find("ModelVariables").iter() if element.get("unit")]  # type: ignore[union-attr]
+    assert len(users) > 20
+    for element in users:
+        assert element.get("unit") in units
+        assert element.get("displayUnit") in {None, *units[element.get("unit")]}
+
+
+def test_derivatives_lead_from_acceleration_to_velocity_to_position(data: bytes) -> None:
+    variables = {v.name: v for v in description.read(data, "it").interface}
+    some = "coupler" if "coupler.ax" in variables else "lower"
+    assert variables[f"{some}.ax"].derivative_of == f"{some}.vx"
+    assert variables[f"{some}.vx"].derivative_of == f"{some}.x"
+    assert variables[f"{some}.x"].derivative_of is None

@@ -1,0 +1,65 @@
+"""A native FMU says what the Python engine says, over the whole gallery, in fmpy's own loops and in ours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.errors import FmuError
+from kinfmu.solver.status import Status
+from tests.fmu.native.conftest import Build
+from tests.fmu.test_parameters import OTHERS, linkage
+
+NAMES = gallery.names()
+
+
+@pytest.mark.parametrize(("name", "fmi"), [(name, 2 + k % 2) for k, name in enumerate(NAMES)])
+def test_run_of_a_gallery_mechanism_is_that_of_the_python_engine(built_native: Build, name: str, fmi: int) -> None:
+    wanted = kinfmu.solve(kinfmu.load(name))
+    run = kinfmu.simulate(built_native(name, fmi, "time"))
+    assert run.outputs == wanted.outputs
+    assert run.coordinate_count == wanted.coordinate_count
+    assert run.fixed == pytest.approx(wanted.fixed, abs=1e-15)
+    np.testing.assert_allclose(run.t, wanted.t, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(run.status, wanted.status)
+    size = max(1.0, np.nanmax(np.abs(wanted.values)))
+    np.testing.assert_allclose(run.values, wanted.values, rtol=0, atol=1e-12 * size)
+    for got, exact, error in ((run.rates, wanted.rates, 1), (run.accelerations, wanted.accelerations, 2)):
+        within = run.error[:, error] + wanted.error[:, error]
+        gap = np.abs(got - exact).max(axis=1)
+        assert (gap <= np.maximum(within * size, 1e-12 * size)).all()
+    np.testing.assert_allclose(run.margin, wanted.margin, rtol=1e-6, atol=1e-9)
+
+
+def test_limit_ends_a_run_as_it_does_with_the_python_flavour(built_native: Build, fmi: int) -> None:
+    run = kinfmu.simulate(built_native("double_pendulum", fmi, "time"), stop=9.0, step=0.1)
+    assert run.status[-1] == Status.OUTSIDE
+    assert np.isnan(run.values[-1]).all()
+    assert run.t[-1] == pytest.approx(2.1)
+    assert np.degrees(run.inputs[-1, 0]) == pytest.approx(363.0)
+    assert "360 deg" in run.events[-1].text
+
+
+def test_parameters_and_inputs_reach_the_fmu(built_native: Build, fmi: int) -> None:
+    fmu = built_native(linkage(), fmi, "time")
+    run = kinfmu.simulate(fmu, parameters=OTHERS)
+    wanted = kinfmu.solve(linkage(OTHERS))
+    np.testing.assert_allclose(run.values, wanted.values, rtol=0, atol=1e-12)
+    run = kinfmu.simulate(fmu, stop=1.0, step=0.5, inputs={"time": [0.0, 1.0], "crank_angle": [1.0, 1.6]})
+    assert run["crank.phi"] == pytest.approx([1.0, 1.3, 1.6])
+    with pytest.raises(FmuError, match="coupler = 9: the mechanism does not close"):
+        kinfmu.simulate(fmu, parameters={"coupler": 9.0})
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_simulates_it(built_native: Build, fmi: int, kind: str) -> None:
+    from fmpy import simulate_fmu
+
+    names = ["coupler.x", "coupler.phi", "rocker.omega"]
+    fmu = built_native(linkage(), fmi, "time")
+    rows = simulate_fmu(str(fmu), fmi_type=kind, start_time=0.0, stop_time=3.0, output_interval=0.25, output=names)
+    run = kinfmu.solve(linkage(), rows["time"])
+    for name in names:
+        np.testing.assert_allclose(rows[name], run[name], rtol=0, atol=1e-9)

@@ -1,0 +1,542 @@
+"""What no checker of model descriptions sees: the rules of FMI that a host relies on at run time, in both versions."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.fmu.native.sources import HEADERS, headers
+from kinfmu.solver.status import Status
+from tests.fmu.native.conftest import Build, Start
+from tests.fmu.native.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
+from tests.fmu.test_parameters import OTHERS, linkage
+
+COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
+UNIT_INPUTS = ("crank_angle", "crank_speed", "crank_acceleration")
+
+
+def _drive(host: Host, steps: range) -> list[list[float]]:
+    """Rows of all outputs while the crank is turned unevenly."""
+    rows = []
+    for k in steps:
+        host.set({"crank_angle": 0.1 * k + 0.02 * math.sin(k)})
+        rows.append(host.outputs())
+        assert host.step(0.01 * k, 0.01) == OK
+        rows.append(host.outputs())
+    return rows
+
+
+def test_outputs_follow_a_set_input_at_once(start: Start) -> None:
+    host = start()
+    host.set({"crank_angle": 0.5, "crank_speed": 2.0, "crank_acceleration": 3.0})
+    c, s = math.cos(0.5), math.sin(0.5)
+    assert host.get(*COUPLER) == pytest.approx([1 + c, -2 * s, -3 * s - 4 * c], abs=1e-12)
+
+
+def test_trial_values_never_influence_a_result(start: Start) -> None:
+    direct, trying = start(), start()
+    for k in range(5):
+        for wild in (2.0, -4.0, 30.0):
+            trying.set({"crank_angle": wild})
+            trying.outputs()
+        for host in (direct, trying):
+            host.set({"crank_angle": 0.3 + 0.7 * k})
+        assert direct.outputs() == trying.outputs()
+        assert direct.step(0.1 * k, 0.1) == trying.step(0.1 * k, 0.1) == OK
+
+
+@pytest.mark.parametrize("drive", ["time", "inputs"])
+def test_one_step_reaches_the_same_pose_as_two_halves(start: Start, drive: str) -> None:
+    once, twice = start("fourbar", drive), start("fourbar", drive)
+    for host in (once, twice):
+        host.set({"crank_angle": 0.7, "crank_speed": 1.5, "crank_acceleration": -0.5} if drive == "inputs" else {})
+    assert once.step(0.0, 40.0) == OK
+    assert twice.step(0.0, 20.0) == twice.step(20.0, 20.0) == OK
+    assert once.get(*COUPLER) == pytest.approx(twice.get(*COUPLER), abs=1e-13)
+
+
+@pytest.mark.parametrize("serialized", [False, True])
+def test_restored_state_gives_the_same_bits_even_in_another_instance(start: Start, serialized: bool) -> None:
+    host, other = start(), start()
+    _drive(host, range(1, 28))
+    host.set({"crank_angle": 3.1})
+    state = host.state()
+    expected = [host.outputs(), *_drive(host, range(28, 70))]
+    target = other if serialized else host
+    restored = target.deserialize(host.serialize(state)) if serialized else state
+    target.restore(restored)
+    assert [target.outputs(), *_drive(target, range(28, 70))] == expected
+    target.free_state(restored)
+
+
+def test_freed_state_is_null(start: Start) -> None:
+    host = start()
+    state = host.state()
+    assert state.value
+    host.free_state(state)
+    assert not state.value
+
+
+def test_bytes_that_are_no_state_of_this_fmu_are_refused(start: Start) -> None:
+    host, other = start("fourbar"), start("double_pendulum")
+    before = host.outputs()
+    foreign = other.serialize(other.state())
+    own = host.serialize(host.state())
+    for data in (foreign, b"no state", own[:-1], own[::-1]):
+        assert answer(host.deserialize, data) == ERROR
+        assert "not a state of this FMU" in host.messages[-1][1]
+    assert host.outputs() == before
+
+
+def test_reset_instance_is_as_fresh(start: Start) -> None:
+    host, fresh = start(), start()
+    _drive(host, range(1, 9))
+    host.fmu.reset()
+    host.initialize(0.0)
+    assert host.outputs() == fresh.outputs()
+    assert _drive(host, range(1, 9)) == _drive(fresh, range(1, 9))
+
+
+# Derivatives
+
+
+def _differences(host: Host, names: list[str], at: dict[str, float], way: dict[str, float], h: float) -> Any:
+    """Central differences of sixth order, from set and get."""
+    total = np.zeros(len(names))
+    for j, weight in ((1, 45.0), (2, -9.0), (3, 1.0)):
+        for sign in (-1, 1):
+            host.set({name: at[name] + sign * j * h * slope for name, slope in way.items()})
+            total += sign * weight / (60.0 * h) * np.array(host.get(*names))
+    host.set({name: at[name] for name in way})
+    return total
+
+
+@pytest.mark.parametrize("known", UNIT_INPUTS)
+def test_directional_derivative_with_respect_to_an_input_is_the_finite_difference(start: Start, known: str) -> None:
+    host = start("stephenson_six_bar" if known == "crank_angle" else "fourbar")
+    inputs = [variable.name for variable in host.about.interface.part("inputs")]
+    at = dict(zip(inputs, (host.get(inputs[0])[0] + 0.4, 1.7, -0.6), strict=True))
+    host.set(at)
+    moved = inputs[UNIT_INPUTS.index(known)]
+    outputs = [v.name for part in ("values", "rates", "accelerations") for v in host.about.interface.part(part)]
+    exact = np.array(host.slopes(outputs, [moved], [1.0]))
+    found = _differences(host, outputs, at, {moved: 1.0}, 2e-3)
+    np.testing.assert_allclose(exact, found, rtol=0, atol=2e-10 * max(1.0, np.abs(found).max()))
+    np.testing.assert_allclose(host.slopes(outputs, [moved], [-2.5]), -2.5 * exact, rtol=1e-9, atol=1e-11)
+
+
+def test_directional_derivatives_of_the_parallelogram_are_those_of_its_formulas(start: Start) -> None:
+    host = start()
+    u, v, a = 0.6, 1.3, -0.4
+    host.set(dict(zip(UNIT_INPUTS, (u, v, a), strict=True)))
+    c, s = math.cos(u), math.sin(u)  # x = 1 + cos u, vx = -v sin u, ax = -a sin u - v^2 cos u
+    wanted = {
+        "crank_angle": (-s, -v * c, -a * c + v * v * s),
+        "crank_speed": (0.0, -s, -2.0 * v * c),
+        "crank_acceleration": (0.0, 0.0, -s),
+    }
+    for known, slopes in wanted.items():
+        assert host.slopes(COUPLER, [known], [1.0]) == pytest.approx(slopes, abs=1e-11)
+    mixed = [2.0 * x - 3.0 * y for x, y in zip(wanted["crank_angle"], wanted["crank_speed"], strict=True)]
+    assert host.slopes(COUPLER, ["crank_angle", "crank_speed"], [2.0, -3.0]) == pytest.approx(mixed, abs=1e-10)
+
+
+def test_every_real_output_has_directional_derivatives_and_asking_changes_nothing(start: Start) -> None:
+    host, untouched = start(), start()
+    for one in (host, untouched):
+        _drive(one, range(1, 6))
+        one.set({"crank_angle": 0.65})
+    names = host.real_outputs()
+    assert all(map(math.isfinite, host.slopes([n for n in names if "error" not in n], ["crank_angle"], [1.0])))
+    assert host.outputs() == untouched.outputs()
+    assert _drive(host, range(7, 12)) == _drive(untouched, range(7, 12))
+
+
+@pytest.mark.parametrize("parameter", ["ground", "coupler"])
+def test_directional_derivative_with_respect_to_a_parameter_is_the_finite_difference(
+    start: Start, parameter: str
+) -> None:
+    host = start(linkage(), initialize=False)
+    host.enter(0.0)
+    host.set({"crank_angle": 1.2, "crank_speed": 1.1, "crank_acceleration": 0.3})
+    at = {parameter: host.get(parameter)[0]}
+    outputs = [v.name for part in ("values", "rates", "accelerations") for v in host.about.interface.part(part)]
+    outputs += [v.name for v in host.about.interface.part("fixed") if v.causality == "calculatedParameter"]
+    slopes = host.slopes(outputs, [parameter], [1.0])
+    found = _differences(host, outputs, at, {parameter: 1.0}, 4e-3)
+    np.testing.assert_allclose(slopes, found, rtol=0, atol=1e-9)
+    assert np.abs(found).max() > 0.1
+
+
+def test_directional_derivative_with_respect_to_a_law_s_constant(start: Start) -> None:
+    host = start("fourbar", "time", initialize=False)
+    host.enter(2.0)
+    (speed,) = host.get("crank.speed")
+    u = 2.0 * speed
+    slopes = host.slopes(["coupler.x", "coupler.vx"], ["crank.speed"], [1.0])
+    assert slopes == pytest.approx([-2.0 * math.sin(u), -math.sin(u) - 2.0 * speed * math.cos(u)], abs=1e-11)
+    host.fmu.exitInitializationMode()
+    assert answer(host.slopes, ["coupler.x"], ["crank.speed"], [1.0]) == ERROR
+
+
+def test_what_has_no_directional_derivative_is_refused_by_name(start: Start) -> None:
+    host = start()
+    assert answer(host.slopes, ["crank_angle"], ["crank_angle"], [1.0]) == ERROR
+    assert "crank_angle (value reference 0) has no directional derivative" in host.messages[-1][1]
+    assert answer(host.slopes, ["coupler.x"], ["coupler.y"], [1.0]) == ERROR
+    assert "no directional derivative along coupler.y" in host.messages[-1][1]
+
+
+def test_output_derivatives_are_the_velocity_and_acceleration_outputs(start: Start) -> None:
+    host = start()
+    host.set({"crank_angle": 0.5, "crank_speed": 2.0, "crank_acceleration": 3.0})
+    derivative = host.fmu.getRealOutputDerivatives if host.fmi == 2 else host.fmu.getOutputDerivatives
+    found = derivative(host.of("coupler.x", "coupler.x", "coupler.vx"), [1, 2, 1])
+    assert list(found) == [*host.get("coupler.vx", "coupler.ax"), *host.get("coupler.ax")]
+    assert answer(derivative, host.of("coupler.ax"), [1]) == ERROR
+    assert "coupler.ax (value reference" in host.messages[-1][1]
+    assert answer(derivative, host.of("coupler.x"), [3]) == ERROR
+
+
+def test_inputs_follow_their_derivatives_through_a_step(start: Start, fmi: int) -> None:
+    if fmi == 3:
+        pytest.skip("FMI 3.0 has no input derivatives")
+    host = start()
+    host.set({"crank_angle": 0.3})
+    host.fmu.setRealInputDerivatives(host.of("crank_angle", "crank_angle"), [1, 2], [2.0, 4.0])
+    assert host.step(0.0, 0.1) == OK
+    assert host.get("crank.phi", "coupler.x") == pytest.approx([0.52, 1 + math.cos(0.52)], abs=1e-14)
+    assert host.step(0.1, 0.1) == OK  # they held for one step
+    assert host.get("crank.phi") == pytest.approx([0.52], abs=1e-14)
+    assert answer(host.fmu.setRealInputDerivatives, host.of("crank_angle"), [4], [1.0]) == ERROR
+    assert answer(host.fmu.setRealInputDerivatives, host.of("coupler.x"), [1], [1.0]) == ERROR
+
+
+# What is refused
+
+
+@pytest.mark.parametrize("name", ["coupler.x", "crank.x", "solver.residual"])
+def test_setting_what_is_not_settable_is_an_error_that_names_it(start: Start, name: str) -> None:
+    host = start()
+    before = host.outputs()
+    assert answer(host.set, {name: 7.0}) == ERROR
+    assert host.messages[-1][0] == ERROR
+    assert name in host.messages[-1][1]
+    assert host.outputs() == before
+    assert host.step(0.0, 0.1) == OK
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_input_that_is_no_number_is_refused_and_the_last_one_stays(start: Start, value: float) -> None:
+    host = start()
+    host.set({"crank_angle": 0.5})
+    before = host.outputs()
+    assert answer(host.set, {"crank_angle": value}) == ERROR
+    assert re.match(r"crank_angle = -?(nan|inf) is not a finite number; 0\.5 stays", host.messages[-1][1])
+    assert host.outputs() == before
+    assert host.get("crank_angle") == [0.5]
+
+
+def test_fixed_parameters_and_the_drive_are_fixed_once_initialized(start: Start) -> None:
+    host = start(linkage())
+    assert answer(host.set, {"coupler": 3.0}) == ERROR
+    assert "coupler = 3 comes too late: it is fixed once the FMU is initialized" in host.messages[-1][1]
+    assert answer(host.set, {"driven_by_time": True}) == ERROR
+    assert host.get("coupler") == [3.5]
+
+
+def test_constants_that_must_be_positive_are_refused_otherwise(start: Start) -> None:
+    host = start()
+    assert answer(host.set, {"solver.tolerance": -1.0}) == ERROR
+    assert "solver.tolerance = -1 must be positive; 1.0000000000000001e-09 stays" in host.messages[-1][1]
+    host.set({"solver.tolerance": 1e-6})
+    assert host.get("solver.tolerance") == [1e-6]
+
+
+def test_value_reference_that_does_not_exist_is_an_error(start: Start) -> None:
+    host = start()
+    get = host.fmu.getReal if host.fmi == 2 else host.fmu.getFloat64
+    assert answer(get, [9999]) == ERROR
+    assert host.messages[-1] == (ERROR, "value reference 9999 is not a variable of this FMU")
+    assert answer(get, host.of("solver.status")) == ERROR
+    assert "solver.status" in host.messages[-1][1]
+
+
+def test_steps_out_of_turn_or_of_no_length_are_errors(start: Start) -> None:
+    host = start(initialize=False)
+    assert host.step(0.0, 0.1) == ERROR
+    host.initialize(0.0)
+    for t, h in ((0.0, -0.1), (0.0, math.nan), (math.inf, 0.1)):
+        assert host.step(t, h) == ERROR
+    assert host.step(0.0, 0.1) == OK
+
+
+# Poses and parameters that cannot be had
+
+
+@pytest.mark.parametrize("angle", [6.5, 2.0])
+def test_unreachable_pose_is_discard_with_driver_value_and_limit_and_the_host_may_go_back(
+    start: Start, angle: float
+) -> None:
+    host = start("double_pendulum")
+    host.set({"crank_angle": 5.0})
+    assert host.step(0.0, 0.1) == OK
+    names = ("upper.phi", "lower.x", "lower.phi")
+    host.set({"crank_angle": angle})
+    assert host.status() == Status.OUTSIDE
+    assert answer(host.get, *names) == DISCARD
+    assert host.get("driven.crank_angle") == [angle]
+    assert host.step(0.1, 0.1) == DISCARD
+    status, text = host.messages[-1]
+    assert status == DISCARD
+    limit = math.pi if angle < math.pi else 2 * math.pi
+    assert f"crank = {angle:g} rad" in text
+    assert f"{limit:.5f}"[:6] in text
+    assert host.message() in text
+    host.set({"crank_angle": 5.1})
+    assert host.status() == Status.OK
+    assert host.step(0.1, 0.1) == OK
+    assert host.get("upper.phi", "upper.x") == pytest.approx([5.1, math.cos(5.1)])
+
+
+def _terminated(host: Host, t: float, h: float) -> tuple[int, bool, float]:
+    """Status of a step, whether the FMU wants to end, and the last time that was reached."""
+    if host.fmi == 2:
+        status = host.step(t, h)
+        fmu = host.fmu
+        return status, bool(fmu.getBooleanStatus(TERMINATED)), float(fmu.getRealStatus(LAST_SUCCESSFUL_TIME))
+    flags = [ctypes.c_bool() for _ in range(3)]
+    last = ctypes.c_double()
+    call = host.fmu.dll.fmi3DoStep
+    call.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_bool, *([ctypes.c_void_p] * 4)]
+    status = call(host.fmu.component, t, h, True, *map(ctypes.byref, flags), ctypes.byref(last))
+    return status, flags[1].value, last.value
+
+
+def test_step_past_the_limit_is_discard_a_smaller_one_goes_and_the_same_again_ends_the_run(start: Start) -> None:
+    host = start("double_pendulum", "time")
+    assert _terminated(host, 0.0, 1.9) == (OK, False, 1.9)
+    assert _terminated(host, 1.9, 0.2) == (DISCARD, False, 1.9)
+    assert _terminated(host, 1.9, 0.15) == (DISCARD, False, 1.9)
+    assert _terminated(host, 1.9, 0.15) == (DISCARD, True, 1.9)
+    assert _terminated(host, 1.9, 0.05) == (OK, False, pytest.approx(1.95))
+    assert host.get("upper.phi") == pytest.approx([math.radians(300 + 30 * 1.95)])
+
+
+def test_other_parameters_are_reached_before_initialization_ends(start: Start) -> None:
+    host = start(linkage(), initialize=False)
+    host.set(OTHERS)
+    host.enter(0.0)
+    host.fmu.exitInitializationMode()
+    wanted = kinfmu.solve(linkage(OTHERS), crank_angle=np.array([0.8]))
+    host.set({"crank_angle": 0.8, "crank_speed": 1.0})
+    assert host.get(*wanted.outputs) == pytest.approx(wanted.values[0].tolist(), abs=1e-12)
+
+
+def test_impossible_parameters_are_an_error_with_the_reason(start: Start) -> None:
+    host = start(linkage(), initialize=False)
+    host.set({"coupler": 9.0})
+    host.enter(0.0)
+    assert answer(host.fmu.exitInitializationMode) == ERROR
+    assert "coupler = 9" in host.messages[-1][1]
+    assert "Q.x, Q.y stay open by" in host.messages[-1][1]
+    host.fmu.reset()
+    host.initialize(0.0)
+    assert host.status() == Status.OK
+
+
+def test_inputs_set_while_time_drives_are_warned_about_once(start: Start) -> None:
+    host = start("fourbar", "time")
+    host.set({"crank_angle": 0.0})
+    assert host.step(0.0, 1.0) == OK
+    assert host.messages == []
+    for k in range(1, 4):
+        host.set({"crank_angle": 0.1 * k})
+        assert host.step(float(k), 1.0) == OK
+    assert [status for status, _ in host.messages] == [WARNING]
+    assert "driven_by_time is true" in host.messages[0][1]
+    assert host.get("crank.phi") == pytest.approx([math.radians(4.0)])
+
+
+def test_rates_are_estimated_until_they_are_wired(start: Start) -> None:
+    host = start()
+    for k in range(6):
+        host.set({"crank_angle": 0.3 + 0.1 * k + 0.02 * k * k})
+        host.outputs()
+        assert host.step(0.1 * k, 0.1) == OK
+    assert host.get("crank.omega", "crank.alpha") == pytest.approx([3.0, 4.0], abs=1e-9)
+    host.set({"crank_speed": 0.5})
+    assert host.get("crank.omega") == [0.5]
+
+
+# Model exchange
+
+
+def test_model_exchange_follows_inputs_and_time_without_estimates(start: Start) -> None:
+    host = start(model_exchange=True)
+    for k in range(5):
+        host.fmu.setTime(0.1 * k)
+        host.set({"crank_angle": 0.2 * k})
+        assert host.get(*COUPLER) == pytest.approx([1 + math.cos(0.2 * k), 0.0, 0.0], abs=1e-13)
+        assert host.fmu.completedIntegratorStep() in ((False, False), (0, 0))
+    clock = start("fourbar", "time", model_exchange=True)
+    clock.fmu.setTime(30.0)
+    assert clock.get("crank.phi") == pytest.approx([math.radians(30.0)])
+    clock.fmu.setTime(20.0)
+    assert clock.get("crank.phi") == pytest.approx([math.radians(20.0)])
+
+
+def test_model_exchange_gives_discard_for_a_trial_and_error_for_an_accepted_step(start: Start) -> None:
+    host = start("double_pendulum", "time", model_exchange=True)
+    host.fmu.setTime(1.5)
+    assert answer(host.fmu.completedIntegratorStep) == OK
+    host.fmu.setTime(2.5)
+    assert answer(host.get, "upper.phi") == DISCARD
+    assert answer(host.fmu.completedIntegratorStep) == ERROR
+    host.fmu.setTime(1.6)
+    assert host.get("upper.phi") == pytest.approx([math.radians(300 + 30 * 1.6)])
+
+
+# Hosts that are careless or strange
+
+
+@pytest.fixture
+def library(start: Start) -> Any:
+    """The FMU's library itself, and a host of it."""
+    host = start()
+    return ctypes.CDLL(host.fmu.dll._name), host
+
+
+def _instantiate(
+    library: Any, host: Host, token: bytes | None, callbacks: Any = None, name: bytes | None = b"x"
+) -> Any:
+    if host.fmi == 2:
+        library.fmi2Instantiate.restype = ctypes.c_void_p
+        return library.fmi2Instantiate(name, 1, token, None, callbacks, 0, 0)
+    library.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
+    library.fmi3InstantiateCoSimulation.argtypes = [
+        *([ctypes.c_char_p] * 3), *([ctypes.c_bool] * 4), ctypes.c_void_p, ctypes.c_size_t, *([ctypes.c_void_p] * 3)
+    ]  # fmt: skip
+    return library.fmi3InstantiateCoSimulation(name, token, None, 0, 0, 0, 0, None, 0, None, callbacks, None)
+
+
+@pytest.mark.parametrize("token", [b"{other}", b"", None])
+def test_wrong_token_gives_null_and_a_message(library: Any, token: bytes | None) -> None:
+    from fmpy.fmi3 import fmi3LogMessageCallback
+
+    from kinfmu.fmu.slaves import fmi2_callbacks
+
+    dll, host = library
+    said: list[tuple[int, str]] = []
+    if host.fmi == 2:
+        callbacks = fmi2_callbacks(lambda *message: said.append(message))
+        given = ctypes.byref(callbacks)
+    else:
+        callbacks = fmi3LogMessageCallback(lambda _host, status, _category, text: said.append((status, text.decode())))
+        given = ctypes.cast(callbacks, ctypes.c_void_p)
+    assert _instantiate(dll, host, token, given) is None
+    assert said[0][0] == ERROR
+    assert host.about.token in said[0][1]
+    assert _instantiate(dll, host, token) is None  # and nobody to tell
+
+
+@pytest.mark.parametrize("name", [b"x", None])
+def test_null_callbacks_do_no_harm(library: Any, name: bytes | None) -> None:
+    dll, host = library
+    instance = ctypes.c_void_p(_instantiate(dll, host, host.about.token.encode(), name=name))
+    assert instance.value
+    prefix = f"fmi{host.fmi}"
+    wrong = (ctypes.c_uint * 1)(9999)
+    value = (ctypes.c_double * 1)()
+    more = () if host.fmi == 2 else (ctypes.c_size_t(1),)
+    get = getattr(dll, f"{prefix}GetReal" if host.fmi == 2 else f"{prefix}GetFloat64")
+    assert get(instance, wrong, ctypes.c_size_t(1), value, *more) == ERROR  # a message for nobody
+    getattr(dll, f"{prefix}FreeInstance").restype = None
+    getattr(dll, f"{prefix}FreeInstance")(instance)
+    getattr(dll, f"{prefix}FreeInstance")(None)
+
+
+def test_logging_can_be_turned_off_and_categories_are_checked(start: Start) -> None:
+    host = start()
+    log = host.fmu.dll[f"fmi{host.fmi}SetDebugLogging"]
+    switch = ctypes.c_int if host.fmi == 2 else ctypes.c_bool
+
+    def turn(on: bool, *names: str) -> int:
+        given = (ctypes.c_char_p * max(len(names), 1))(*[name.encode() for name in names])
+        return int(log(ctypes.c_void_p(component), switch(on), ctypes.c_size_t(len(names)), given))
+
+    component = getattr(host.fmu.component, "value", host.fmu.component)
+    assert turn(False) == OK
+    assert answer(host.set, {"crank_angle": math.nan}) == ERROR
+    assert host.messages == []
+    assert turn(True, "logStatusError") == OK
+    assert answer(host.set, {"crank_angle": math.nan}) == ERROR
+    assert len(host.messages) == 1
+    assert turn(True) == OK
+    assert turn(True, "logEvents") == WARNING
+    assert "log category 'logEvents' is not known; categories: logStatusWarning" in host.messages[-1][1]
+
+
+def test_paths_with_blanks_and_foreign_letters_are_fine(built_native: Build, fmi: int, tmp_path: Path) -> None:
+    host = Host(built_native("fourbar", fmi), tmp_path / "ä ö %20 +机构 b")
+    host.initialize(0.0)
+    assert host.get("crank.phi") == [0.0]
+    host.free()
+
+
+def test_every_function_of_the_standard_is_there_and_none_crashes_without_an_instance(library: Any, fmi: int) -> None:
+    dll, _ = library
+    text = headers("2.0" if fmi == 2 else "3.0")[HEADERS["2.0" if fmi == 2 else "3.0"][-1]]
+    names = re.findall(rf"FMI{fmi}_Export fmi{fmi}\w+\s+(fmi{fmi}\w+);", text)
+    assert len(names) > 40
+    for name in names:
+        function = getattr(dll, name)
+        if not re.search("Instantiate|GetVersion|GetTypesPlatform|Free", name):
+            assert function(*[None] * 8) == ERROR, name
+
+
+def test_nothing_else_is_exported(library: Any) -> None:
+    dll, _ = library
+    with pytest.raises(AttributeError):
+        dll.kf_solve  # noqa: B018  # it is not there
+
+
+def test_a_thousand_instances_live_side_by_side_and_share_nothing(library: Any) -> None:
+    dll, host = library
+    token = host.about.token.encode()
+    instances = [ctypes.c_void_p(_instantiate(dll, host, token)) for _ in range(1000)]
+    reference = (ctypes.c_uint * 1)(0)
+    one = ctypes.c_size_t(1)
+    more = () if host.fmi == 2 else (one,)
+    kind = "Real" if host.fmi == 2 else "Float64"
+    set_one, get_one = (getattr(dll, f"fmi{host.fmi}{word}{kind}") for word in ("Set", "Get"))
+    phi = (ctypes.c_uint * 1)(host.references["crank.phi"])
+    for k, instance in enumerate(instances):
+        assert set_one(instance, reference, one, (ctypes.c_double * 1)(0.001 * k), *more) == OK
+    value = (ctypes.c_double * 1)()
+    for k, instance in enumerate(instances):
+        assert get_one(instance, phi, one, value, *more) == OK
+        assert value[0] == 0.001 * k
+        getattr(dll, f"fmi{host.fmi}FreeInstance")(instance)
+
+
+def test_ten_thousand_instances_one_after_another_leave_no_memory_behind(library: Any) -> None:
+    resource = pytest.importorskip("resource")
+    dll, host = library
+    token = host.about.token.encode()
+    free = getattr(dll, f"fmi{host.fmi}FreeInstance")
+
+    def churn(count: int) -> int:
+        for _ in range(count):
+            free(ctypes.c_void_p(_instantiate(dll, host, token)))
+        return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+
+    before = churn(1000)
+    assert churn(10_000) - before < 2000  # kB; one instance alone takes tens of them
