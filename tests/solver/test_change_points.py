@@ -182,7 +182,7 @@ def test_beside_a_change_point_samples_are_right_within_their_estimate_or_outsid
     by: str, grids: tuple[int, int | None]
 ) -> None:
     count, most = grids
-    for case in changed(by):
+    for case in changed(by)[OFF.index(by) % 3 :: 3] if most else changed(by):
         open_at = gaps(case)
         for seed in range(1 if most else count):
             run = case.run(grid(seed, 0.1 if most else 0.01, 30.0, turns=1, most=150 if most else None))
