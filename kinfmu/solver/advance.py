@@ -186,11 +186,12 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> Road | None:
         bridge = build(model, before, block, zero, walk)
         if bridge is None:
             room = 2.0 * HALF_WIDTH * reach
-            road = known = known.with_searched(Searched(zero - room, zero + room, block))
+            stretch = Searched(zero - room, zero + room, block)
         elif known.knows(bridge.centre, block):
-            road = known = known.with_searched(Searched(min(here, bridge.centre), max(here, bridge.centre), block))
+            stretch = Searched(min(here, bridge.centre), max(here, bridge.centre), block)
         else:
             return known.with_bridge(bridge, pose.u[0])
+        road = known = known.with_searched(stretch, len(trial.determinants))
     return road
 
 

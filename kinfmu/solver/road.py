@@ -48,9 +48,9 @@ class Road(NamedTuple):
         others = [known for known in self.bridges if known.span is not bridge.span]
         return Road((*others, bridge)[-_KEPT:], self.searched).around(u)
 
-    def with_searched(self, stretch: Searched) -> Road:
-        """The road with one more searched stretch."""
-        return self._replace(searched=(*self.searched, stretch)[-_KEPT:])
+    def with_searched(self, stretch: Searched, blocks: int) -> Road:
+        """The road with one more searched stretch; of one place there may be as many as the model has blocks."""
+        return self._replace(searched=(*self.searched, stretch)[-_KEPT - blocks :])
 
     def knows(self, u: float, block: int) -> bool:
         """True if a block's zero near a driver value need not be sought.

@@ -5,9 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from kinfmu import Point
+from kinfmu.backends.python import load_model
+from kinfmu.chains import fourbar_chain
+from kinfmu.plan import compile_plan
 from kinfmu.solver import Pose, Solver, Status
 from kinfmu.solver import bridge as bridging
 from kinfmu.solver.turns import TURN, turned, whole_turns
@@ -75,3 +80,18 @@ def test_dumped_pose_is_restored_to_the_bit_in_and_out_of_windows(fourbar: Solve
         a, b = fourbar.solve(pose, (target,)), fourbar.solve(again, (target,))
         assert (a.z, a.status) == (b.z, b.status)
         assert fourbar.accelerations(a, (1.0,), (0.0,)) == fourbar.accelerations(b, (1.0,), (0.0,))
+
+
+def test_many_loops_that_all_but_cross_at_once_are_each_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More of them than a road keeps places: each search must be remembered until all are done."""
+    searched: list[int] = []
+    monkeypatch.setattr("kinfmu.solver.advance.build", lambda *args: searched.append(args[2]))
+    written = fourbar_chain(40)
+    longer = [
+        replace(body, points={**body.points, "Q": Point(1.0 + 1e-6, 0.0)}) if body.name[:7] == "coupler" else body
+        for body in written.bodies
+    ]
+    solver = Solver(load_model(compile_plan(replace(written, bodies=tuple(longer)))))
+    pose = solver.solve(solver.anchor, (math.pi - 0.04,))
+    assert pose.good
+    assert sorted(searched) == list(range(40))

@@ -116,9 +116,9 @@ int kf_with_searched(kf_solver *solver, int road, kf_searched stretch)
 {
     const int number = copied(solver, road);
     kf_road *const made = &solver->roads[number];
-    if (made->stretches == KF_KEPT) {
+    if (made->stretches == KF_SEARCHED) {
         --made->stretches;
-        memmove(made->searched, made->searched + 1, (KF_KEPT - 1) * sizeof made->searched[0]);
+        memmove(made->searched, made->searched + 1, (KF_SEARCHED - 1) * sizeof made->searched[0]);
     }
     made->searched[made->stretches++] = stretch;
     return number;

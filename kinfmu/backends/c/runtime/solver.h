@@ -86,10 +86,11 @@ typedef struct {
 
 /* What is known of the singular points on the way of a single driver: see kinfmu/solver/road.py. */
 #define KF_KEPT 32 /* of each kind, the latest */
+#define KF_SEARCHED (KF_DRIVERS == 1 ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
 typedef struct {
     int bridges, stretches;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
-    kf_searched searched[KF_KEPT];
+    kf_searched searched[KF_SEARCHED];
 } kf_road;
 
 /* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
