@@ -287,7 +287,7 @@ def _residual(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
 
 
 def _margin(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
-    text = "1 / condition, smallest over the blocks: 0 at a singular point"
+    text = "1 / condition or relative determinant, smallest over the blocks: 0 at a singular point"
     return _solver_output(plan, every, "solver.margin", text, minimum=0.0)
 
 

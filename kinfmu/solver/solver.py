@@ -127,12 +127,13 @@ class Solver:
     def margin(self, pose: Pose) -> float:
         """The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point.
 
-        For one unknown, where that says nothing, |determinant| over the largest that it can be.
+        Or of |determinant| over the largest that it can be: where a row vanishes, as for a piston that drives at its
+        dead centre, equilibrating hides it.
         """
-        margin = 1.0
-        for matrix, determinant in zip(self.model.jacobians(pose.values), pose.determinants, strict=True):
-            small = abs(determinant) if len(matrix) == 1 else reciprocal_condition(matrix)
-            margin = min(margin, small)
+        margin = min(1.0, pose.margin)
+        for matrix in self.model.jacobians(pose.values):
+            if len(matrix) > 1:
+                margin = min(margin, reciprocal_condition(matrix))
         return margin
 
     def errors(

@@ -169,16 +169,14 @@ void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const d
 
 double kf_margin(const kf_solver *solver, const kf_pose *pose)
 {
-    double matrix[KF_ROOM(KF_LARGEST_BLOCK)], margin = 1.0;
+    double matrix[KF_ROOM(KF_LARGEST_BLOCK)], margin = fmin(1.0, pose->found.margin);
     int block, first = 0;
     for (block = 0; block < KF_BLOCKS; ++block) {
         const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
-        double small = fabs(pose->found.determinants[block]);
         if (rows > 1) {
             kf_jacobian(&solver->model, &pose->found, block, matrix);
-            small = kf_reciprocal_condition(rows, columns, matrix);
+            margin = fmin(margin, kf_reciprocal_condition(rows, columns, matrix));
         }
-        margin = fmin(margin, small);
         first = kf_block_ends[block];
     }
     return margin;
