@@ -130,7 +130,7 @@ class Solver:
         Or of |determinant| over the largest that it can be: where a row vanishes, as for a piston that drives at its
         dead centre, equilibrating hides it.
         """
-        margin = min(1.0, pose.margin)
+        margin: float = min(1.0, pose.margin)
         for matrix in self.model.jacobians(pose.values):
             if len(matrix) > 1:
                 margin = min(margin, reciprocal_condition(matrix))
