@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import signal
 import sys
 import time
 
@@ -45,19 +46,27 @@ def _one(seed: int, family: str | None) -> int:
     return 1 if verdict.faults else 0
 
 
+def _leave_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _many(seeds: range, family: str | None, jobs: int) -> int:
     begun = told = time.monotonic()
     report = Report()
     tasks = [(seed, family) for seed in seeds]
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        for done, verdict in enumerate(pool.imap(judged, tasks, CHUNK), start=1):
-            report.take(verdict)
-            if time.monotonic() - told > TOLD:
-                told = time.monotonic()
-                print(f"{done} of {len(tasks)}, {told - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
+    with multiprocessing.get_context("spawn").Pool(jobs, _leave_interrupts) as pool:
+        try:
+            for verdict in pool.imap_unordered(judged, tasks, CHUNK):
+                report.take(verdict)
+                if time.monotonic() - told > TOLD:
+                    told = time.monotonic()
+                    done = report.mechanisms.total()
+                    print(f"{done} of {len(tasks)}, {told - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            print("interrupted: what was found so far\n")
     command = "scripts/stress" + (f" --family '{family}'" if family else "")
     print("\n".join(report.lines(command)))
-    print(f"\n{len(tasks)} mechanisms in {time.monotonic() - begun:.0f} s on {jobs} processes", end="; ")
+    print(f"\n{report.mechanisms.total()} mechanisms in {time.monotonic() - begun:.0f} s on {jobs} processes", end="; ")
     print("nothing is wrong" if report.is_right else f"{report.faulty.total()} are at fault")
     return 0 if report.is_right else 1
 

@@ -21,6 +21,7 @@ INSIDE, OUTSIDE, EDGE = 0, 1, 2  # of the range; EDGE: so close to its end that 
 
 FINE = 1440  # places to the period of an angle, or to the reach of a length
 SHORT = 0.02  # [rad, lengths]; between places of a way of several drivers
+COARSE = 600  # places of a stretch that does not go round
 DEPTHS = np.concatenate([[0.0], 10.0 ** np.arange(-13.0, -1.0, 0.2)])  # beside a mark, where things change quickly
 DIP = 0.05  # what must stay positive is looked at closely where it falls below
 FLAT = 1.001  # places that differ by less have nothing between them
@@ -100,7 +101,8 @@ class Interval:
     @property
     def is_free(self) -> bool:
         """True for an angle that goes round."""
-        return not (self.low_is_limit or self.high_is_limit) and self.drawn.sketch.kinds == ("angle",)
+        sketch = self.drawn.sketch
+        return not (self.low_is_limit or self.high_is_limit) and sketch.kinds == ("angle",) and sketch.period > 0
 
     def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:  # noqa: ARG002  as a Walk needs it
         """For samples (n, 1); which of them are good makes no difference here."""
@@ -141,7 +143,10 @@ def interval(drawn: Drawn) -> Interval:
     sketch, start = drawn.sketch, drawn.start[0]
     is_angle = sketch.kinds == ("angle",)
     scale = 1.0 if is_angle else float(drawn.frame.scale)
-    if is_angle:
+    if is_angle and not sketch.period:
+        ends = sketch.reach[0] + drawn.frame.angle, sketch.reach[1] + drawn.frame.angle
+        marks = []
+    elif is_angle:
         period = TURN * sketch.period
         ends = start - period, start + period
         marks = _marks(drawn, *ends)
@@ -149,7 +154,7 @@ def interval(drawn: Drawn) -> Interval:
         ends = sketch.reach[0] * scale, sketch.reach[1] * scale
         marks = [mark * scale for mark in sketch.marks]
     beside = [mark + side * depth * scale for mark in marks for depth in DEPTHS for side in (1, -1)]
-    count = 2 * FINE + 1
+    count = 2 * FINE + 1 if sketch.period else COARSE
     u = np.unique(np.concatenate([np.linspace(*ends, count), beside, [start]]))
     u = u[(u >= ends[0]) & (u <= ends[1])]
     with np.errstate(all="ignore"):
@@ -163,7 +168,7 @@ def interval(drawn: Drawn) -> Interval:
         before = _first_bad(lowest[middle::-1])
         high = u[-1] if after is None else _end(drawn, u[middle + after - 1], u[middle + after], dips)
         low = u[0] if before is None else _end(drawn, u[middle - before + 1], u[middle - before], dips)
-    is_free = is_angle and after is None and before is None
+    is_free = is_angle and sketch.period > 0 and after is None and before is None
     inside = (u >= (start if is_free else low)) & (u <= high)
     u, lowest = u[inside], np.asarray(lowest[inside], dtype=float)
     columns = {name: _taken(column, inside) for name, column in exact.columns.items()}

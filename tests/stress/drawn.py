@@ -59,7 +59,7 @@ class Sketch:
     Bodies that share a name of a point share a pin. poses: (numbers, driver values, closing) -> pose of each moving
     body. kinds: of the drivers, 'angle' or 'length'. joints: beside the pins, drivers: at start values, both in a
     frame. marks: driver values where loops may be singular, of a turn if it is an angle. period: of the closed form,
-    in turns; reach: values of a length to draw the start from.
+    in turns, 0 if it does not go round; reach: values to draw the start from.
     """
 
     points: Mapping[str, Mapping[str, tuple[Exact, Exact]]]

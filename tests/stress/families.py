@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from random import Random
 
@@ -20,6 +21,7 @@ from kinfmu import (
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
 from tests.stress.drawn import Frame, Pose, Sketch, framed, standing, world
+from tests.stress.inverse import driven_at
 from tests.stress.jets import Exact, Jet, Numbers, Vector, turned
 from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_slide
 
@@ -289,9 +291,13 @@ def _any_bars(rng: Draw) -> tuple[Fraction, ...]:
 
 def watt_six_bars(rng: Draw) -> Sketch:
     """Watt I: a four-bar with two more bars, from a third pin of its coupler and of its rocker."""
+    return _watt(rng, _driven(rng))
+
+
+def _watt(rng: Draw, driven: str) -> Sketch:
     bars, side = _any_bars(rng), _side(rng)
     r, s, t = _place(rng, 2.0), _place(rng, 2.0), (drawn_length(rng, 0.5, 4.0), drawn_length(rng, 0.5, 4.0))
-    base, second = fourbar(bars, "crank", side), _side(rng)
+    base, second = fourbar(bars, driven, side), _side(rng)
 
     def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
         moving = base.poses(numbers, u, closing)
@@ -303,14 +309,18 @@ def watt_six_bars(rng: Draw) -> Sketch:
     points["coupler"]["R"], points["rocker"]["S"] = r, s
     points["left"] = {"R": ORIGIN, "T": (t[0], 0)}
     points["right"] = {"S": ORIGIN, "T": (t[1], 0)}
-    return Sketch(points, poses, _turns("crank"), marks=ENDS)
+    return Sketch(points, poses, _turns(driven), marks=ENDS)
 
 
 def stephenson_six_bars(rng: Draw) -> Sketch:
     """Stephenson III: a four-bar with a link from a third pin of its coupler to an output on a third ground pivot."""
+    return _stephenson(rng, _driven(rng))
+
+
+def _stephenson(rng: Draw, driven: str) -> Sketch:
     bars, side = _any_bars(rng), _side(rng)
     r, d, t = _place(rng, 2.0), _place(rng, 3.0), (drawn_length(rng, 0.5, 4.0), drawn_length(rng, 0.5, 4.0))
-    base, second = fourbar(bars, "crank", side), _side(rng)
+    base, second = fourbar(bars, driven, side), _side(rng)
 
     def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
         moving = base.poses(numbers, u, closing)
@@ -322,7 +332,19 @@ def stephenson_six_bars(rng: Draw) -> Sketch:
     points["ground"]["D"], points["coupler"]["R"] = d, r
     points["link"] = {"R": ORIGIN, "T": (t[0], 0)}
     points["output"] = {"D": ORIGIN, "T": (t[1], 0)}
-    return Sketch(points, poses, _turns("crank"), marks=ENDS)
+    return Sketch(points, poses, _turns(driven), marks=ENDS)
+
+
+def six_bars_driven_at_the_end(rng: Draw) -> Sketch:
+    """Watt's and Stephenson's driven at their last bar: no loop of them closes alone."""
+    if rng.random() < 0.5:
+        sketch, body = _watt(rng, "crank"), rng.choice(("left", "right"))
+    else:
+        sketch, body = _stephenson(rng, "crank"), rng.choice(("link", "output"))
+    driven = driven_at(sketch, body, rng.random())
+    if driven is None:
+        raise RedrawError
+    return replace(driven, drivers=_turns(body))
 
 
 # ------------------------------------------------------------------------------------------------- several loops
@@ -522,6 +544,7 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "pins in slots": (pins_in_slots, 7),
     "watt six-bars": (watt_six_bars, 7),
     "stephenson six-bars": (stephenson_six_bars, 7),
+    "six-bars driven at the end": (six_bars_driven_at_the_end, 4),
     "chains": (chains, 6),
     "geared five-bars": (geared_five_bars, 4),
     "redundant parallelograms": (redundant_parallelograms, 5),

@@ -81,7 +81,7 @@ class Report:
     def lines(self, command: str) -> list[str]:
         """The report; `command` is what one mechanism is tried by, but for its seed."""
         said = [_row("family", "mechanisms", "at fault", "samples", *STATUSES)]
-        for family in self.mechanisms:
+        for family in sorted(self.mechanisms):
             counts = [self.statuses[family, k] for k in range(len(STATUSES))]
             said.append(_row(family, self.mechanisms[family], self.faulty[family], self.samples[family], *counts))
         totals = [sum(self.statuses[family, k] for family in self.mechanisms) for k in range(len(STATUSES))]
@@ -109,9 +109,10 @@ class Report:
         said.append(
             f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"
         )
-        for kind, found in self.faults.items():
+        for kind, found in sorted(self.faults.items()):
             said.append("")
             said.append(f"{kind}: {len(found)} mechanisms")
+            found = sorted(found, key=lambda one: one[0].seed)
             said += [f"  {command} --seed {v.seed}   # {v.family}; {text}" for v, text in found[:SHOWN]]
             if len(found) > SHOWN:
                 said.append(f"  and {len(found) - SHOWN} more")

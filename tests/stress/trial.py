@@ -227,6 +227,8 @@ def _drawn(rng: Draw, family: str) -> Drawn:
     low, high = sketch.reach
     units = [1.0 if kind == "angle" else float(scale) for kind in sketch.kinds]
     candidates = np.array([[round(rng.uniform(low, high), 2) for _ in units] for _ in range(STARTS)]) * units
+    if not sketch.period:
+        candidates = candidates + frame.angle
     drawn = Drawn(sketch, frame, tuple(candidates[0]))
     with np.errstate(all="ignore"):
         closing = drawn.positions(candidates).closing
