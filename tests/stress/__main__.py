@@ -46,15 +46,11 @@ def _one(seed: int, family: str | None) -> int:
     return 1 if verdict.faults else 0
 
 
-def _leave_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def _many(seeds: range, family: str | None, jobs: int) -> int:
     begun = told = time.monotonic()
     report = Report()
     tasks = [(seed, family) for seed in seeds]
-    with multiprocessing.get_context("spawn").Pool(jobs, _leave_interrupts) as pool:
+    with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         try:
             for verdict in pool.imap_unordered(judged, tasks, CHUNK):
                 report.take(verdict)

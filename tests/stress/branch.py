@@ -27,7 +27,7 @@ DIP = 0.05  # what must stay positive is looked at closely where it falls below
 FLAT = 1.001  # places that differ by less have nothing between them
 LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
 REGULAR = 0.02  # magnitudes are taken where what must stay positive is above
-STILL, LEAST = 1e-9, 1e-3  # of the largest of its kind: below, a column stands still; it counts with no less
+STILL = 1e-3  # of the largest of its kind: below, a column hardly moves
 PASSES, PIECES = 14, 32
 
 Floats = NDArray[np.float64]
@@ -60,10 +60,7 @@ def _lowest(limits: list[Array], count: int) -> Any:
 def _magnitudes(
     drawn: Drawn, columns: Mapping[str, Any], angles: Mapping[str, Floats], regular: NDArray[np.bool_]
 ) -> Magnitudes:
-    """Of columns; at least a thousandth of their kind's largest, and that itself for those that stand still.
-
-    Where a kind does less than the driver alone, it counts with that.
-    """
+    """Of columns; one that hardly moves counts with the largest of its kind, a kind with at least the driver's own."""
     scale = float(drawn.frame.scale)
     per = 1.0 if "angle" in drawn.sketch.kinds else scale
     tables: list[dict[str, float]] = []
@@ -77,7 +74,7 @@ def _magnitudes(
             natural = (1.0 if is_angle else scale) / per**order
             largest = max([natural, *(table[name] for table in [*tables[1:], found] for name in kind)])
             for name in kind:
-                found[name] = largest if found[name] < STILL * largest else max(found[name], LEAST * largest)
+                found[name] = largest if found[name] < STILL * largest else found[name]
         tables.append(found)
     return Magnitudes(*tables)
 
@@ -259,6 +256,7 @@ class Walk:
 
     drawn: Drawn
     magnitudes: Magnitudes
+    marks: tuple[float, ...] = ()  # none are known
 
     def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:
         """For samples (n, d): each way begins at the sample before that can be reached; good: where kinfmu has numbers,

@@ -544,7 +544,7 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "pins in slots": (pins_in_slots, 7),
     "watt six-bars": (watt_six_bars, 7),
     "stephenson six-bars": (stephenson_six_bars, 7),
-    "six-bars driven at the end": (six_bars_driven_at_the_end, 4),
+    "six-bars driven at the end": (six_bars_driven_at_the_end, 2),
     "chains": (chains, 6),
     "geared five-bars": (geared_five_bars, 4),
     "redundant parallelograms": (redundant_parallelograms, 5),

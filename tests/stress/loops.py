@@ -12,6 +12,7 @@ its sign there, and so goes on smoothly. If not, it is the positive root, and wh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -23,11 +24,13 @@ class Closing:
     """What tells how well the loops close, a number each for every sample.
 
     limits: must be positive, about 1 where regular; one is 0 at a dead centre and falls linearly. sines: of the angle
-    under which two bars meet; 0 at every singular point.
+    under which two bars meet; 0 at every singular point. widths: [rad], one a loop with an arm: within so much of a
+    change point the motion turns its direction, as the arm's end passes so close to the pivot.
     """
 
     limits: list[Array] = field(default_factory=list)
     sines: list[Array] = field(default_factory=list)
+    widths: list[float] = field(default_factory=list)
 
     def root(self, squared: Jet, scale: object) -> Jet:
         """The root of what must be positive; `scale` is its magnitude where regular."""
@@ -67,6 +70,8 @@ def on_arm(closing: Closing, lengths: tuple[Exact, Exact, Exact, Exact], side: i
     else:
         high = closing.root(co * co * whole + value((b + c) ** 2 - (g + a) ** 2), scale)
     closing.sines.append(low.d0 * high.d0 * 2 / scale)
+    if g != a:
+        closing.widths.append(float(abs(g - a)) / math.sqrt(g * a))
     d = Vector(s * s * value(2 * a) + value(g - a), s * co * value(-2 * a))
     if g == a and b == c:  # d itself vanishes on the way, and its direction goes on
         direction = Vector(s, -co)
@@ -135,6 +140,7 @@ def in_slot(closing: Closing, g: Exact, a: Exact, e: Exact, side: int, theta: Je
     s = s * value(side)
     if g == a and e == 0:
         return Vector(sine, -co).times(value(-side))
+    closing.widths.append(float(max(abs(g - a), e)) / math.sqrt(g * a))
     w = Vector(sine * sine * value(-2 * a) + value(a - g), sine * co * value(2 * a))
     squared = sine * sine * whole + value((g - a) ** 2)
     return Vector((w.x * s + w.y * value(e)) / squared, (w.y * s - w.x * value(e)) / squared)

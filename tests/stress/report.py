@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.stress.branch import EDGE, OUTSIDE
-from tests.stress.trial import ORDERS, Verdict
+from tests.stress.trial import NARROW, ORDERS, TIGHT, Verdict
 
 STATUSES = ("ok", "near_singular", "bridged", "outside", "inconsistent", "not_converged")
 EPS = float(np.finfo(float).eps)
@@ -45,6 +45,7 @@ class Report:
     gap: float = 0.0
     edge: int = 0
     spared: int = 0
+    narrow: int = 0
     refused: int = 0  # samples past a limit, told so
 
     def take(self, verdict: Verdict) -> None:
@@ -56,6 +57,7 @@ class Report:
         self.digits += verdict.digits
         self.gap = max(self.gap, verdict.gap)
         self.spared += verdict.spared
+        self.narrow += verdict.narrow
         self.edge += int((verdict.side == EDGE).sum())
         self.refused += int(((verdict.side == OUTSIDE) & (verdict.statuses == 3)).sum())
         self.faulty[verdict.family] += bool(verdict.faults)
@@ -104,7 +106,8 @@ class Report:
         said.append("")
         said.append(
             f"{self.refused} samples past a limit were told so; {self.edge} lay within 1e-10 of one; "
-            f"{self.spared} behind a place tighter than 2e-6 were told outside"
+            f"told outside though the branch goes on: {self.spared} behind a place tighter than {TIGHT:g}, "
+            f"{self.narrow} behind a change point narrower than {NARROW:g} rad"
         )
         said.append(
             f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"

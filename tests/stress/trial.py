@@ -23,7 +23,8 @@ from tests.stress.jets import DIGITS, SCREENING, Numbers
 from tests.stress.patterns import drawn_steps
 
 WRONG = 1e-9  # of the column's largest magnitude
-TIGHT = 2e-6  # where what must stay positive falls below on the way, `outside` is an answer too
+TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
+NARROW = 0.015  # [rad]; change points that turn in less have no room for a bridge: `outside` is an answer too
 BEYOND = 10.0  # times its own estimate: a flagged sample may not be wronger
 SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
 AGREED = 0.1  # the two oracles may differ by this part of the error, or of what counts as wrong
@@ -55,6 +56,7 @@ class Verdict:
     absolute: Floats  # (n, 3) the same relative to the size for lengths, in radians for angles: as estimates are
     estimate: Floats  # (n, 3)
     spared: int  # samples that were told unreachable behind a place too tight
+    narrow: int  # the same behind a change point too narrow
     digits: int  # samples that were judged by 50 digits
     gap: float  # largest difference of the two oracles, as a part of what is judged
     faults: list[Fault] = field(default_factory=list)
@@ -83,7 +85,7 @@ class Trial:
         n = len(self.inputs[0])
         nothing = np.full((n, 3), np.nan)
         none = np.full(n, -1)
-        verdict = Verdict(self.seed, self.family, self.patterns, none, none, nothing, nothing, nothing, 0, 0, 0.0)
+        verdict = Verdict(self.seed, self.family, self.patterns, none, none, nothing, nothing, nothing, 0, 0, 0, 0.0)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
@@ -106,6 +108,8 @@ class Trial:
         return verdict
 
     def _judge_status(self, run: Run, expected: Expected, verdict: Verdict) -> None:
+        start = self.drawn.positions(np.array([self.drawn.start]))
+        is_narrow = bool(self.branch.marks) and min(start.closing.widths, default=np.inf) < NARROW
         holes = np.isnan(run.values) | np.isnan(run.rates) | np.isnan(run.accelerations)
         for k, status in enumerate(run.status):
             if run.good[k] and holes[k].any():
@@ -117,6 +121,8 @@ class Trial:
             if not run.good[k] and expected.side[k] == INSIDE:
                 if expected.tightest[k] < TIGHT:
                     verdict.spared += 1
+                elif is_narrow:
+                    verdict.narrow += 1
                 else:
                     verdict.faults.append(Fault("told unreachable", k, f"status {status}"))
             if not run.good[k] and status != 3:

@@ -14,7 +14,7 @@
 #define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see advance.py, as all that follows */
 #define KF_TRUST 10.0
 #define KF_FALL 0.3
-#define KF_NEAR 5e-3         /* determinant below which a pose is near-singular */
+#define KF_NEAR 0.0125       /* determinant below which a pose is near-singular */
 #define KF_CLOSE 0.1
 #define KF_MOST_STEPS 1000000
 
