@@ -23,7 +23,7 @@ from tests.stress.report import Report
 from tests.stress.trial import Trial, trial
 
 ROOT = Path(__file__).parents[2]
-MECHANISMS = 7  # of each family
+MECHANISMS = 4  # of each family
 
 
 @pytest.mark.parametrize("family", FAMILIES)
