@@ -92,7 +92,7 @@ class Library:
     def drive(
         self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, d) driver values, speeds and accelerations at times, by the laws; parameters: those of the plan if none."""
+        """(n, d) driver values, speeds and accelerations at times; parameters: those of the plan if none."""
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
         values = parameters or [parameter.value for parameter in self.plan.parameters]
         given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
