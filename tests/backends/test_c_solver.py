@@ -137,6 +137,16 @@ def test_c_and_python_are_the_same_about_singular_points_and_limits(name: str) -
     assert expected <= set(statuses)
 
 
+def test_c_and_python_are_the_same_for_several_drivers_within_and_beyond_reach() -> None:
+    plan = compile_plan(kinfmu.load("five_bar"))
+    rng = random.Random(13)  # noqa: S311  # samples, not secrets
+    u, samples = load_model(plan).ANCHOR[0], []
+    for _ in range(200):
+        u = tuple(value + rng.choice((0.02, 0.2, 2.0)) * rng.uniform(-1.0, 1.0) for value in u)
+        samples.append(u)
+    assert {Status.OK, Status.OUTSIDE} <= set(assert_same(plan, samples))
+
+
 CHANGES: dict[Callable[[], Mechanism], list[dict[str, float]]] = {
     linkage: [
         {},

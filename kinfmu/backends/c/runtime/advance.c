@@ -1,18 +1,18 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/advance.py. */
 #include "way.h"
 
-#define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near and its place is extrapolated */
+#define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
 #define BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
 #define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
-#define UNDECIDED 1e-6     /* determinant below which a way ends: as small where lengths make a change point within 1e-12 */
-#define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part of it: more is another branch */
-#define STEEP 100.0        /* slope of an unknown over the driver, in radians or sizes; before a dead centre it is more */
+#define UNDECIDED 1e-6     /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
+#define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part: more is another branch */
 #define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
 #define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
 
 /* One step of predict and correct; false if it cannot be trusted to stay on the branch. */
-bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u, kf_pose *trial)
+bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
+                     kf_pose *trial)
 {
     const kf_model *const model = &solver->model;
     const double *x1 = pose->x1, *x2 = pose->x2;
@@ -52,9 +52,9 @@ bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, 
 
 /* False if the tangent of a way jumps in a step along it, as it does from one branch to a crossing one.
  *
- * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign; their
- * tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either that both
- * branches are the same in doubles, no step leads on.
+ * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
+ * their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either
+ * that both branches are the same in doubles, no step leads on.
  */
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
 {
@@ -80,8 +80,8 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
     return jump <= SMOOTH * largest;
 }
 
-/* From a pose to a value of the only driver by trusted steps, without bridges; or NULL. What it finds lasts until the next
- * walk, which may start there.
+/* From a pose to a value of the only driver by trusted steps, without bridges; or NULL. What it finds lasts until the
+ * next walk, which may start there.
  */
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u)
 {
@@ -121,58 +121,6 @@ static double course(const double *start, const double *target, double *directio
         direction[k] = (target[k] - start[k]) / length;
     }
     return length;
-}
-
-/* Where the way ends, just beyond a pose that steps cannot leave.
- *
- * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule on
- * the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
- */
-static void limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
-{
-    const double *const determinants = pose->found.determinants;
-    double near, far, beyond = 0.0, steepest = 0.0;
-    int k;
-    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
-    limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
-    if (KF_BLOCKS == 0) {
-        return;
-    }
-    for (k = 1; k < KF_BLOCKS; ++k) {
-        limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
-    }
-    if (KF_DRIVERS == 1) {
-        kf_tangent(&solver->model, pose);
-    } else {
-        kf_velocity(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
-    }
-    for (k = limit->block > 0 ? kf_block_ends[limit->block - 1] : 0; k < kf_block_ends[limit->block]; ++k) {
-        steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
-    }
-    limit->crosses = steepest * (KF_DRIVERS == 1 ? kf_reach[0] : 1.0) < STEEP;
-    near = fabs(determinants[limit->block]);
-    far = fabs(before->found.determinants[limit->block]);
-    if (!limit->crosses) {
-        near *= near;
-        far *= far;
-    }
-    if (far > near) {
-        beyond = near / (far - near);
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * beyond;
-        }
-    }
-}
-
-/* True if the target lies past the limit on the way that s goes. */
-static bool is_beyond(const double *target, const double *limit, const double *direction, double s)
-{
-    double sum = 0.0;
-    int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        sum += (target[k] - limit[k]) * direction[k] * s;
-    }
-    return sum > 0.0;
 }
 
 /* The pose at the end of a way, with the iterations of the whole way.
@@ -222,8 +170,8 @@ static kf_pose *on_road(kf_solver *solver, const kf_pose *pose, int road, kf_pos
 /* The pose at `target`, in the solver's scratch, or NULL and the limit on the way to it.
  *
  * Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
- * residual, and is trusted if the correction is small against the determinant and no determinant changes its sign. With
- * one driver, singular points on the way are bridged.
+ * residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
+ * With one driver, singular points on the way are bridged.
  */
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit)
 {
@@ -276,7 +224,8 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
         }
         if (kf_trusted_step(solver, pose, direction, s, u, trial)) {
             iterations += trial->found.iterations;
-            if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR) || kf_keeps_branch(solver, pose, trial, direction, s)) {
+            if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR)
+                || kf_keeps_branch(solver, pose, trial, direction, s)) {
                 if (trial->found.margin < KF_REGULAR && one) {
                     const int road = kf_surveyed(solver, pose, trial);
                     if (road != trial->road) {
@@ -300,10 +249,10 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
         step = 0.5 * fabs(s);
         if (step < SHORTEST_STEP * longest) {
             if (!is_limited) {
-                limited(solver, before, pose, direction, limit);
+                kf_limited(solver, before, pose, direction, limit);
                 is_limited = true;
             }
-            if (step < GIVE_UP * longest || is_beyond(target, limit->u, direction, s)) {
+            if (step < GIVE_UP * longest || kf_is_beyond(target, limit->u, direction, s)) {
                 return NULL;
             }
         }

@@ -1,12 +1,12 @@
-/* Bridges: across a singular point by interpolation from both sides, proved by closing. See kinfmu/solver/bridge.py. */
+/* Bridges: across singular points by interpolation from both sides, proved by closing. See kinfmu/solver/bridge.py. */
 #include "way.h"
 
 #define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would win */
 #define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
 #define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node turns away */
 #define FINE 1e-12     /* [rad, sizes]; difference of two widths from which narrower ones win nothing */
-#define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: as little where there is one */
-#define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond it lies another branch */
+#define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: less where there is one */
+#define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
 
 /* True inside the window, where the bridge is used. */
 bool kf_covers(const kf_bridge *bridge, double u)
@@ -112,8 +112,8 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
 
 /* The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats; or -1.
  *
- * It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and if
- * the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
+ * It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
+ * if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
  */
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
 {
@@ -172,14 +172,15 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
     while (fabs(step) > least) {
         const double here = KF_POSE_U(pose)[0];
         kf_pose *const ahead = kf_plainly(solver, pose, here + step);
-        double better, left, change;
+        double of_here, of_ahead, better, left, change;
         if (ahead == NULL) {
             step *= 0.5;
             whole = false;
             continue;
         }
-        if (!kf_secant_zero(here, pose->found.determinants[block], KF_POSE_U(ahead)[0], ahead->found.determinants[block],
-                            &better)) {
+        of_here = pose->found.determinants[block];
+        of_ahead = ahead->found.determinants[block];
+        if (!kf_secant_zero(here, of_here, KF_POSE_U(ahead)[0], of_ahead, &better)) {
             return false;
         }
         left = better - KF_POSE_U(ahead)[0];
@@ -204,7 +205,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
 {
     static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
     static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
-    double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* at the nodes before the zero, after it, and last */
+    double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
     kf_pose *const pose = &solver->scratch.walk[0];
     double *const last = determinants[2];
     int node, k;
@@ -263,8 +264,8 @@ static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block
 /* A bridge over the zero of a block's determinant that a regular pose has before it, or -1 if none proves itself.
  *
  * zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
- * closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge: the
- * determinant does not fall to zero straight, the far side cannot be reached.
+ * closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:
+ * the determinant does not fall to zero straight, the far side cannot be reached.
  */
 int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
 {

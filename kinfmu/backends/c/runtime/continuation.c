@@ -2,8 +2,8 @@
  *
  *     Phi(q, u, p0 + s (p1 - p0)) = 0,   s from 0 to 1
  *
- * The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a way
- * of the drivers. See kinfmu/solver/continuation.py.
+ * The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a
+ * way of the drivers. See kinfmu/solver/continuation.py.
  */
 #include "way.h"
 
@@ -94,7 +94,7 @@ static double gap_of(kf_solver *solver, const kf_model *model, int block)
     double factors[KF_LU_ROOM(1) + 3 * KF_LARGEST_BLOCK], step[KF_ROOM(KF_LARGEST_BLOCK)];
     double residuals[KF_ROOM(KF_LARGEST_BLOCK)], determinant, damping = 1e-3, left = -1.0, now;
     double *const best = solver->scratch.z, *const trial = solver->scratch.zd;
-    const int first = block > 0 ? kf_block_ends[block - 1] : 0, k = kf_block_ends[block] - first;
+    const int first = kf_first_of(block), k = kf_block_ends[block] - first;
     int turn, i;
     memcpy(best, solver->anchor.found.x, KF_UNKNOWNS * sizeof(double));
     for (turn = 0; turn < ITERATIONS; ++turn) {
@@ -163,7 +163,8 @@ static void say_opens(kf_solver *solver, const double *parameters, int block)
         kf_say_number(solver->message, "%.4g", gap * KF_SIZE);
         kf_say(solver->message, " %s", kf_length_unit);
     } else {
-        kf_say(solver->message, "lie behind a singular point, where rows %s are dependent", kf_block_row_names[block]);
+        kf_say(solver->message, "lie behind a singular point, where rows %s are dependent",
+               kf_block_row_names[block]);
     }
 }
 
@@ -194,7 +195,8 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
         }
         kf_fresh(trial, -1, -INFINITY, INFINITY);
         if (kf_bind(ahead, p, why, sizeof why)) {
-            const int failed = kf_position(ahead, kf_anchor_u, found->x, slope, kf_at_rest, there - s, NULL, &trial->found);
+            const int failed =
+                kf_position(ahead, kf_anchor_u, found->x, slope, kf_at_rest, there - s, NULL, &trial->found);
             if (failed < 0 && is_trusted(found, &trial->found)) {
                 for (k = 0; k < KF_UNKNOWNS; ++k) {
                     slope[k] = (trial->found.x[k] - found->x[k]) / (there - s);

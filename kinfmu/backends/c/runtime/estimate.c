@@ -4,31 +4,19 @@
  *
  *     |dz| = |J^-1| R (2 eps + residual + eps |z|)        R: scales of the rows, in lengths
  *
- * which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried: position,
- * velocity and acceleration are formed again at the moved pose. See kinfmu/solver/estimate.py.
+ * which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried:
+ * position, velocity and acceleration are formed again at the moved pose. See kinfmu/solver/estimate.py.
  */
 #include "way.h"
 
-#define ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
-#define MOST_SOURCES 3 /* of a mechanism with more blocks those that move farthest count for all */
-
-/* How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given. And the largest
- * of the derivatives in radians and sizes.
+/* How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given. And the
+ * largest of the derivatives in radians and sizes.
  */
 typedef struct {
     const double *ud, *udd;
     const bool *held;
     double speed, curve;
 } kf_driven;
-
-static double larger(double most, int count, const double *values, const double *scales)
-{
-    int k;
-    for (k = 0; k < count; ++k) {
-        most = fmax(most, fabs(values[k]) / scales[k]);
-    }
-    return most;
-}
 
 /* How a pose is driven; its derivatives are formed. */
 static kf_driven drive_of(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
@@ -44,108 +32,10 @@ static kf_driven drive_of(const kf_solver *solver, kf_pose *pose, const double *
         kf_velocity(&solver->model, &pose->found, ud, NULL, NULL, pose->x1);
         kf_acceleration(&solver->model, &pose->found, udd, pose->x1, NULL, NULL, pose->x2);
     }
-    drive.speed = larger(larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales), KF_DRIVERS, drive.ud, kf_reach);
-    drive.curve = larger(drive.speed * drive.speed, KF_UNKNOWNS, pose->x2, kf_unknown_scales);
-    drive.curve = larger(drive.curve, KF_DRIVERS, drive.udd, kf_reach);
+    drive.speed = kf_larger(kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales), KF_DRIVERS, drive.ud, kf_reach);
+    drive.curve = kf_larger(drive.speed * drive.speed, KF_UNKNOWNS, pose->x2, kf_unknown_scales);
+    drive.curve = kf_larger(drive.curve, KF_DRIVERS, drive.udd, kf_reach);
     return drive;
-}
-
-static int first_of(int block)
-{
-    return block > 0 ? kf_block_ends[block - 1] : 0;
-}
-
-/* J^-1 (s R) of a block, signs s chosen so that the unknown that can be moved farthest is; false if J is singular. */
-static bool soften(const kf_model *model, const kf_found *found, int block, const double *rows, double *softness)
-{
-    double matrix[KF_ROOM(KF_LARGEST_BLOCK)], columns[KF_ROOM(KF_LARGEST_BLOCK)], unit[KF_ROOM(KF_LARGEST_BLOCK)];
-    double factors[2 * KF_ROOM(KF_LARGEST_BLOCK) + KF_LU_ROOM(1)], determinant, farthest = -1.0;
-    const int m = kf_block_rows[block], first = first_of(block), k = kf_block_ends[block] - first;
-    int i, j, worst = 0;
-    kf_jacobian(model, found, block, matrix);
-    if (m == 1 && k == 1) {
-        columns[0] = rows[0] / matrix[0];
-    } else if (KF_LARGEST_BLOCK >= 4 && m == 2 && k == 2) {
-        const double det = matrix[0] * matrix[3] - matrix[1] * matrix[2];
-        columns[0] = matrix[3] * (rows[0] / det);
-        columns[1] = -matrix[2] * (rows[0] / det);
-        columns[2] = -matrix[1] * (rows[1] / det);
-        columns[3] = matrix[0] * (rows[1] / det);
-    } else {
-        if (!(m == k ? kf_lu(k, matrix, factors, &determinant) : kf_qr(m, k, matrix, factors, &determinant))) {
-            return false;
-        }
-        for (i = 0; i < m; ++i) { /* of the least-squares inverse if J is tall */
-            for (j = 0; j < m; ++j) {
-                unit[j] = i == j ? rows[i] : 0.0;
-            }
-            if (m == k) {
-                kf_lu_solve(k, factors, unit, columns + i * k);
-            } else {
-                kf_qr_solve(m, k, factors, unit, columns + i * k);
-            }
-        }
-    }
-    for (j = 0; j < k; ++j) {
-        double reach = 0.0;
-        for (i = 0; i < m; ++i) {
-            reach += fabs(columns[i * k + j]);
-        }
-        reach /= kf_unknown_scales[first + j];
-        if (reach > farthest) {
-            farthest = reach;
-            worst = j;
-        }
-        softness[j] = 0.0;
-    }
-    for (i = 0; i < m; ++i) {
-        const double sign = columns[i * k + worst] >= 0.0 ? 1.0 : -1.0;
-        for (j = 0; j < k; ++j) {
-            softness[j] += sign * columns[i * k + j];
-        }
-    }
-    return true;
-}
-
-/* What the rows of a block are known to, relative to their scales. */
-static double known_to(const kf_found *found, int block)
-{
-    const int first = first_of(block), k = kf_block_ends[block] - first;
-    return ROUNDINGS * KF_EPS + found->residual + KF_EPS * larger(0.0, k, found->x + first, kf_unknown_scales + first);
-}
-
-/* The blocks that move farthest, the worst first, and by how much the sum over them is too small; -1 if one is singular. */
-static int worst_blocks(kf_solver *solver, const kf_found *found, const bool *held, int *worst, double *weight)
-{
-    double softness[KF_ROOM(KF_LARGEST_BLOCK)], farthest[MOST_SOURCES];
-    const double *rows = kf_row_scales;
-    int block, all = 0, count = 0;
-    for (block = 0; block < KF_BLOCKS; rows += kf_block_rows[block++]) {
-        const int first = first_of(block), k = kf_block_ends[block] - first;
-        double moved;
-        int place;
-        if (held != NULL && held[block]) {
-            continue;
-        }
-        if (!soften(&solver->model, found, block, rows, softness)) {
-            return -1;
-        }
-        moved = known_to(found, block) * larger(0.0, k, softness, kf_unknown_scales + first);
-        ++all;
-        for (place = count; place > 0 && moved > farthest[place - 1]; --place) {
-            if (place < MOST_SOURCES) {
-                farthest[place] = farthest[place - 1];
-                worst[place] = worst[place - 1];
-            }
-        }
-        if (place < MOST_SOURCES) {
-            farthest[place] = moved;
-            worst[place] = block;
-            count += count < MOST_SOURCES ? 1 : 0;
-        }
-    }
-    *weight = count > 0 ? sqrt((double)all / count) : 0.0;
-    return count;
 }
 
 /* What one block adds. */
@@ -154,7 +44,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     kf_source *const source = &solver->scratch.source;
     double *const given = source->given_first, *const all_of = solver->scratch.x1; /* of the unknowns */
     const double *rows = kf_row_scales;
-    const double c = known_to(&pose->found, block);
+    const double c = kf_known_to(&pose->found, block);
     bool held[KF_ROOM(KF_BLOCKS)];
     int k;
     for (k = 0; k < KF_BLOCKS; ++k) {
@@ -164,12 +54,12 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         given[k] = 0.0;
     }
-    soften(&solver->model, &pose->found, block, rows, given + first_of(block));
+    kf_soften(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
     kf_velocity(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         source->z[k] = weight * c * all_of[k];
-        source->first[k] = weight * ROUNDINGS * KF_EPS * drive->speed * all_of[k];
-        source->second[k] = weight * ROUNDINGS * KF_EPS * drive->curve * all_of[k];
+        source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
+        source->second[k] = weight * KF_ROUNDINGS * KF_EPS * drive->curve * all_of[k];
     }
     source->is_given = false;
 }
@@ -203,7 +93,8 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
     if (!kf_evaluated(model, KF_POSE_U(pose), z, all, &there->found)) {
         return false;
     }
-    kf_velocity(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held, there->x1);
+    kf_velocity(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
+                there->x1);
     add(there->x1, pose->x1, source->first, z);
     kf_velocity(model, &there->found, drive->ud, z, all, there->x1);
     kf_acceleration(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
@@ -213,15 +104,15 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
     return true;
 }
 
-/* What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together. The larger of it
- * and what `rounding` holds stays there.
+/* What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together. The larger
+ * of it and what `rounding` holds stays there.
  */
 static bool round_node(kf_solver *solver, const kf_span *span, int place, double *rounding)
 {
     kf_pose *const node = &solver->scratch.way[1], *const there = &solver->scratch.way[2];
     double *const squares = solver->scratch.zd;
     const double half = span->half;
-    int worst[MOST_SOURCES], count, i, k;
+    int worst[KF_MOST_SOURCES], count, i, k;
     double weight;
     kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
@@ -229,7 +120,7 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
         return false;
     }
     drive = drive_of(solver, node, kf_alone, kf_at_rest);
-    count = worst_blocks(solver, &node->found, NULL, worst, &weight);
+    count = kf_worst_blocks(&solver->model, &node->found, NULL, worst, &weight);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         squares[k] = 0.0;
     }
@@ -304,9 +195,9 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
 {
     kf_pose *const there = &solver->scratch.way[0];
     double(*const rows)[3][KF_ROOM(KF_OUTPUTS)] = solver->scratch.rows;
-    int worst[MOST_SOURCES], i, order;
+    int worst[KF_MOST_SOURCES], i, order;
     double weight;
-    const int count = worst_blocks(solver, &pose->found, drive->held, worst, &weight);
+    const int count = kf_worst_blocks(&solver->model, &pose->found, drive->held, worst, &weight);
     kf_outputs_of(&solver->model, pose, ud, udd, rows[0][0], rows[0][1], rows[0][2]);
     for (i = 0; i < count + (pose->bridge >= 0 ? 1 : 0); ++i) {
         if (i < count) {
@@ -345,6 +236,6 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
         largest = kf_output_is_angle[k] ? fmax(largest, fabs(outputs[k])) : largest;
     }
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
-    errors[1] = ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
-    errors[2] = ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
+    errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
+    errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
 }

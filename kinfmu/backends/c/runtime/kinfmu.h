@@ -1,7 +1,7 @@
 /* The model and the solver of a mechanism in C99: libm only, no allocation, no global state.
  *
- * model.c is generated from the plan of a mechanism, sizes.h with it; all other files are the same for every mechanism.
- * The words are those of the Python run time (kinfmu/solver), and so are the methods, file by file.
+ * model.c is generated from the plan of a mechanism, sizes.h with it; all other files are the same for every
+ * mechanism. The words are those of the Python run time (kinfmu/solver), and so are the methods, file by file.
  */
 #ifndef KINFMU_H
 #define KINFMU_H
@@ -21,9 +21,9 @@ typedef struct {
 
 /* A pose: x holds the unknowns first, then the coordinates that are given outright, then the driver values.
  *
- * determinants: one a block, 1 far from singular; margin: the smallest of their sizes; residual: the largest length of a
- * block's residuals, relative to the size; moved: the largest correction of the prediction, in radians and sizes; watch:
- * the largest residual of the rows set aside; hold: what rates need of the position stage.
+ * determinants: one a block, 1 far from singular; margin: the smallest of their sizes; residual: the largest length of
+ * a block's residuals, relative to the size; moved: the largest correction of the prediction, in radians and sizes;
+ * watch: the largest residual of the rows set aside; hold: what rates need of the position stage.
  */
 typedef struct {
     double x[KF_COORDINATES];

@@ -196,8 +196,8 @@ static double reciprocal_condition_of_two(const double *matrix)
     return fabs(a * d - b * c) / (norm * inverse_norm);
 }
 
-/* 1 / cond of the equilibrated A (m, k) (rows, then columns, scaled to unit length), in the 1-norm; 0 if it is singular.
- * For a tall matrix that of R in A = QR. A is overwritten.
+/* 1 / cond of the equilibrated A (m, k) (rows, then columns, scaled to unit length), in the 1-norm; 0 if it is
+ * singular. For a tall matrix that of R in A = QR. A is overwritten.
  */
 double kf_reciprocal_condition(int m, int k, double *matrix)
 {

@@ -40,28 +40,3 @@ void kf_say_place(char *message, const double *u)
         }
     }
 }
-
-/* Why a target cannot be reached, in one line. */
-void kf_say_limit(char *message, const kf_limit *limit, const double *target)
-{
-    int k;
-    kf_say_place(message, target);
-    if (limit->block == KF_TOO_FAR) {
-        kf_say(message, " is too far from ");
-        kf_say_place(message, limit->u);
-        kf_say(message, ": more than %d steps on one way", KF_MOST_STEPS);
-        return;
-    }
-    kf_say(message, " cannot be reached: the limit is ");
-    kf_say_place(message, limit->u);
-    kf_say(message, limit->crosses ? ", where branches of " : ", where ");
-    if (limit->block == KF_NO_BLOCK) {
-        kf_say(message, "the joints");
-    }
-    for (k = limit->block > 0 ? kf_block_ends[limit->block - 1] : 0;
-         limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
-        const bool is_first = k == (limit->block > 0 ? kf_block_ends[limit->block - 1] : 0);
-        kf_say(message, "%s%s", is_first ? "" : ", ", kf_unknown_names[k]);
-    }
-    kf_say(message, limit->crosses ? " cross" : " would part");
-}

@@ -16,8 +16,8 @@ void kf_fresh(kf_pose *pose, int road, double low, double high)
     pose->has_base = false;
 }
 
-/* What kf_position gives for unknowns that are known: held blocks are not solved for. s = -0.0 at rest leaves z as it is,
- * to the bit.
+/* What kf_position gives for unknowns that are known: held blocks are not solved for. s = -0.0 at rest leaves z as it
+ * is, to the bit.
  */
 bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found)
 {

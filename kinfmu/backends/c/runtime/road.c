@@ -1,7 +1,7 @@
 /* Road: what is known of the singular points on the way of a single driver. See kinfmu/solver/road.py.
  *
- * Roads, bridges and spans are values in the solver's pools: never changed once a pose knows of them, overwritten when no
- * pose that still counts does. Number -1 is the road on which nothing is known.
+ * Roads, bridges and spans are values in the solver's pools: never changed once a pose knows of them, overwritten when
+ * no pose that still counts does. Number -1 is the road on which nothing is known.
  */
 #include "way.h"
 
@@ -124,8 +124,8 @@ int kf_with_searched(kf_solver *solver, int road, kf_searched stretch)
     return number;
 }
 
-/* True if a block's zero near a driver value need not be sought. Between the outermost nodes of a bridge there is no other
- * than those it spans.
+/* True if a block's zero near a driver value need not be sought. Between the outermost nodes of a bridge there is no
+ * other than those it spans.
  */
 bool kf_knows(const kf_solver *solver, int road, double u, int block)
 {

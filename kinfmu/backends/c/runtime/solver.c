@@ -123,7 +123,8 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
 
 /* Outputs, rates and accelerations from the derivatives that the pose holds.
  *
- * With one driver these are with respect to it, and the same goes for the outputs y: yd = y' ud, ydd = y'' ud^2 + y' udd.
+ * With one driver these are with respect to it, and the same goes for the outputs y: yd = y' ud, ydd = y'' ud^2 + y'
+ * udd.
  */
 void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
                    double *rates, double *accelerations)
@@ -151,8 +152,8 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
     }
 }
 
-void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs, double *rates,
-               double *accelerations)
+void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
+               double *rates, double *accelerations)
 {
     const kf_model *const model = &solver->model;
     const bool one = KF_DRIVERS == 1;

@@ -8,14 +8,16 @@
  *     kf_solve(&solver, &poses[0], next_u, &poses[1]);    and so on, in turns: what is found is not copied
  *
  * State is in the poses. A pose that is found on a trial changes nothing about another one found later from the same
- * start. What a pose knows of singular points on its way is kept in the solver, since it is large and rarely changes; the
- * pose tells its road there by number. kf_solve keeps what its start refers to, and what it finds; what any other pose
- * refers to may be overwritten. So after kf_solve(s, a, u, b) go on from a (another trial) or from b (it is accepted), and
- * from the anchor at any time; a third pose that was kept aside is to be kept together with a copy of its solver.
+ * start. What a pose knows of singular points on its way is kept in the solver, since it is large and rarely changes;
+ * the pose tells its road there by number. kf_solve keeps what its start refers to, and what it finds; what any other
+ * pose refers to may be overwritten. So after kf_solve(s, a, u, b) go on from a (another trial) or from b (it is
+ * accepted), and from the anchor at any time; a third pose that was kept aside is to be kept together with a copy of
+ * its solver.
  *
- * There are no pointers inside: copies of the solver and of the poses, byte by byte, are the whole state, and do the same
- * to the bit wherever they are copied to, in another instance too. Of the solver the first KF_SOLVER_STATE bytes are
- * enough: what follows does not outlive a call. Nothing is allocated, nothing is global: threads may run a solver each.
+ * There are no pointers inside: copies of the solver and of the poses, byte by byte, are the whole state, and do the
+ * same to the bit wherever they are copied to, in another instance too. Of the solver the first KF_SOLVER_STATE bytes
+ * are enough: what follows does not outlive a call. Nothing is allocated, nothing is global: threads may run a solver
+ * each.
  */
 #ifndef KF_SOLVER_H
 #define KF_SOLVER_H
@@ -38,10 +40,10 @@ typedef enum {
 
 /* A pose that was found. If it is not good, nothing but its status says anything.
  *
- * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low, high:
- * the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1: nothing;
- * bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on by: the next
- * way starts from its base, the last regular pose before it, to which road, low and high then belong.
+ * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
+ * high: the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1:
+ * nothing; bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on
+ * by: the next way starts from its base, the last regular pose before it, to which road, low and high then belong.
  */
 typedef struct {
     kf_found found;
@@ -120,8 +122,8 @@ typedef struct {
     int live[3]; /* roads that are needed */
 } kf_scratch;
 
-/* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor: where
- * all ways start; message: why the last pose that is not good could not be had.
+/* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor:
+ * where all ways start; message: why the last pose that is not good could not be had.
  */
 typedef struct {
     kf_model model;
@@ -140,25 +142,25 @@ typedef struct {
 /* Parameters as written, tolerance 1e-9. */
 void kf_solver_start(kf_solver *solver);
 
-/* Values of the parameters (KF_PARAMETERS), followed from what is written with the drivers at rest; the tolerance stays.
- * false: they cannot be had, the message says why, and every pose fails with it. Poses found before are void.
+/* Values of the parameters (KF_PARAMETERS), followed from what is written with the drivers at rest; the tolerance
+ * stays. false: they cannot be had, the message says why, and every pose fails with it. Poses found before are void.
  */
 bool kf_solver_bind(kf_solver *solver, const double *parameters);
 
-/* The pose at driver values u (KF_DRIVERS), followed from the good pose `start`, another one, in a straight line of the
- * driver values. The start stays what it is; derivatives that it has not been asked for yet are added to it. The status is
- * that of the pose; if it is not good, the solver's message says why, in one line.
+/* The pose at driver values u (KF_DRIVERS), followed from the good pose `start`, another one, in a straight line of
+ * the driver values. The start stays what it is; derivatives that it has not been asked for yet are added to it. The
+ * status is that of the pose; if it is not good, the solver's message says why, in one line.
  */
 kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 
-/* Outputs, their rates and accelerations (KF_OUTPUTS each) at driver speeds ud and accelerations udd (KF_DRIVERS each);
- * NULL: not wanted, and nothing is computed for it (ud and udd may be NULL where nothing needs them).
+/* Outputs, their rates and accelerations (KF_OUTPUTS each) at driver speeds ud and accelerations udd (KF_DRIVERS
+ * each); NULL: not wanted, and nothing is computed for it (ud and udd may be NULL where nothing needs them).
  */
-void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs, double *rates,
-               double *accelerations);
+void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
+               double *rates, double *accelerations);
 
-/* Estimated errors of the outputs, their rates and accelerations, the largest of each, in radians and sizes; infinite where
- * nothing is known of them. See kinfmu/solver/estimate.py.
+/* Estimated errors of the outputs, their rates and accelerations, the largest of each, in radians and sizes; infinite
+ * where nothing is known of them. See kinfmu/solver/estimate.py.
  */
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
 

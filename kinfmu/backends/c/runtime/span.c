@@ -88,7 +88,8 @@ double kf_span_apart(const kf_span *span)
 }
 
 /* z and its two derivatives with respect to the driver at x = (u - centre) / half, from four of the nodes. */
-static void read(const kf_span *span, const double *places, const int *nodes, double x, double *z, double *zd, double *zdd)
+static void read(const kf_span *span, const double *places, const int *nodes, double x, double *z, double *zd,
+                 double *zdd)
 {
     const double half = span->half, per_x = 1.0 / half;
     int i, k;

@@ -38,11 +38,12 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
     }
     before = fabs(here - KF_POSE_U(pose)[0]) > 1e-3 * reach ? pose : beside(solver, trial, block, 0.02 * reach);
     for (; before != NULL && block < KF_BLOCKS; ++block) { /* upstream first */
+        const double from = KF_POSE_U(before)[0], of_from = before->found.determinants[block];
         kf_searched searched;
         double zero;
         int bridge;
         if (!(fabs(determinants[block]) < KF_REGULAR) || kf_knows(solver, trial->road, here, block)
-            || !kf_secant_zero(KF_POSE_U(before)[0], before->found.determinants[block], here, determinants[block], &zero)
+            || !kf_secant_zero(from, of_from, here, determinants[block], &zero)
             || fabs(zero - here) > 1.05 * KF_HALF_WIDTH * reach || kf_knows(solver, road, zero, block)) {
             continue;
         }

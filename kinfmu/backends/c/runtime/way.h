@@ -69,20 +69,35 @@ int kf_spare_bridge(const kf_solver *solver);
 int kf_spare_span(const kf_solver *solver, int other);
 void kf_needed(kf_solver *solver, int start, int pose, int regular);
 
-/* advance.c */
+/* limit.c */
 typedef struct {
     double u[KF_DRIVERS];
     int block;
     bool crosses; /* the motion does not turn back there, but another branch crosses it, and no bridge holds */
 } kf_limit;
 enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
+void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
+bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
+void kf_say_limit(char *message, const kf_limit *limit, const double *target);
+
+/* advance.c */
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
-bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u, kf_pose *trial);
+bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
+                     kf_pose *trial);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
 
 /* survey.c */
 int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
+
+/* softness.c */
+#define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
+#define KF_MOST_SOURCES 3 /* of a mechanism with more blocks those that move farthest count for all */
+bool kf_soften(const kf_model *model, const kf_found *found, int block, const double *rows, double *softness);
+double kf_known_to(const kf_found *found, int block);
+int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight);
+double kf_larger(double most, int count, const double *values, const double *scales);
+int kf_first_of(int block);
 
 /* solver.c */
 void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
@@ -92,6 +107,5 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
 void kf_say(char *message, const char *format, ...);
 void kf_say_number(char *message, const char *format, double value);
 void kf_say_place(char *message, const double *u);
-void kf_say_limit(char *message, const kf_limit *limit, const double *target);
 
 #endif
