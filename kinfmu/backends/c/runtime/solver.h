@@ -164,8 +164,8 @@ void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const d
  */
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
 
-/* The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point, or of |determinant| over the
- * largest that it can be: where a row vanishes, equilibrating hides it.
+/* The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point, or of |determinant| over
+ * the largest that it can be: where a row vanishes, equilibrating hides it.
  */
 double kf_margin(const kf_solver *solver, const kf_pose *pose);
 
