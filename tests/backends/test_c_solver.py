@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 import random
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism, gallery
+from kinfmu.backends.c import compiler
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver import Solver, Status, with_parameters
@@ -26,6 +30,8 @@ from tests.backends.native import STRICT, Native
 from tests.fmu.test_parameters import geared, linkage
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, slider_crank, tight_jaw
 
+HEADERS = ("way.h", "solver.h")
+PARTS = {"advance": ("advance.c", "limit.c", "survey.c"), "estimate": ("estimate.c", "softness.c")}  # else by one name
 QUICK = (*STRICT, "-O0")  # to compile
 Samples = Sequence[tuple[float, ...]]
 
@@ -80,6 +86,26 @@ def assert_same(plan: SolvePlan, samples: Samples, flags: Sequence[str] = QUICK)
         good = pose
         c.commit()
     return statuses
+
+
+MODULES = ("advance", "bridge", "continuation", "estimate", "road", "solver", "span", "turns")
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_constants_are_the_same_in_both(module: str) -> None:
+    in_headers = {name.removeprefix("KF_"): number for name, number in defined(HEADERS).items()}
+    c = in_headers | {"NEAR_SINGULAR": in_headers["NEAR"]} | defined(PARTS.get(module, (f"{module}.c",)))
+    python = import_module(f"kinfmu.solver.{module}")
+    own = re.findall(r"^_?([A-Z_]+) = [0-9]", Path(str(python.__file__)).read_text("utf-8"), re.M)
+    assert own
+    for name in own:
+        assert c[name] == getattr(python, name, None) or c[name] == getattr(python, f"_{name}"), name
+
+
+def defined(files: Sequence[str]) -> dict[str, float]:
+    """Numbers that C files of the run time define, by name."""
+    text = "\n".join(compiler.sources([file for file in files if (compiler.RUNTIME / file).exists()]).values())
+    return {name: float(number) for name, number in re.findall(r"^#define (\w+) ([0-9][0-9.e+-]*)", text, re.M)}
 
 
 @pytest.mark.parametrize("name", gallery.names())

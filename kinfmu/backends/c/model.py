@@ -312,7 +312,8 @@ class _Model:
             "kf_watches(model, found, watches);",
             "found->watch = 0.0;",
             "for (k = 0; k < KF_WATCHES; ++k) {",
-            "    found->watch = fmax(found->watch, fabs(watches[k]));",
+            "    const double open = fabs(watches[k]);",
+            "    found->watch = open > found->watch || open != open ? open : found->watch; /* a NaN stays */",
             "}",
             "return -1;",
         ]
