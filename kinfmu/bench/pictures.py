@@ -13,7 +13,7 @@ from kinfmu.draw.chart import Look
 from kinfmu.draw.near_singular import Passage, Row, near_singular
 from kinfmu.draw.work_precision import Curve, Panel, work_precision
 from kinfmu.plan import compile_plan
-from kinfmu.shapes.palette import BODIES, GROUND
+from kinfmu.shapes.palette import BODIES, GROUND, darker
 
 WORK_PRECISION, NEAR_SINGULAR = "accuracy-work-precision", "accuracy-singular"
 ROWS = 2  # of the chart of singular points; the table has them all
@@ -31,10 +31,11 @@ NOTES = (
     "and acceleration.",
     "",
     "kinfmu is what is shipped: the last, with every",
-    "step judged, to round-off.",
+    "step judged, to round-off; native in C.",
 )
 LOOKS = {  # of the engines
     "kinfmu": Look(BODIES[4], 2.2, "D"),
+    "kinfmu native": Look(darker(BODIES[4]), 2.2, "D"),
     "generated Python": Look(BODIES[0]),
     "pylinkage": Look(GROUND, 1.4, "s"),
     "CasADi": Look(BODIES[3]),

@@ -58,22 +58,28 @@ def samples_in_turn(
 ) -> list[list[float]]:
     """Microseconds of processor time a sample of each way, (ways, rounds).
 
-    A way takes its first n samples; n is what fills a SLICE, from `fewest` to `most`.
+    A way takes its first n samples, from `fewest` to `most`, and again, so that a SLICE is filled.
     """
-    counts = []
+    slices, taken = [], []
     for way in ways:
         way(1)
         start = time.process_time()
         way(fewest)
         each_takes = max(time.process_time() - start, 1e-6) / fewest
-        counts.append(max(fewest, min(most, int(SLICE / each_takes))))
-    slices = [_slice(way, count) for way, count in zip(ways, counts, strict=True)]
+        count = max(fewest, min(most, int(SLICE / each_takes)))
+        times = max(1, int(SLICE / (each_takes * count)))  # again and again, if all samples do not fill it
+        slices.append(_slice(way, count, times))
+        taken.append(count * times)
     measured = in_turn(slices, rounds, time.process_time, each)
-    return [[value / count * 1e6 for value in seconds] for seconds, count in zip(measured, counts, strict=True)]
+    return [[value / count * 1e6 for value in seconds] for seconds, count in zip(measured, taken, strict=True)]
 
 
-def _slice(way: Callable[[int], object], count: int) -> Callable[[], object]:
-    return lambda: way(count)
+def _slice(way: Callable[[int], object], count: int, times: int) -> Callable[[], object]:
+    def take() -> None:
+        for _ in range(times):
+            way(count)
+
+    return take
 
 
 @contextmanager

@@ -25,7 +25,17 @@ _COLUMNS = 3
 _SHADES = (1.0, 0.62, 0.36)  # of a curve's colour: its engine's highest order of the predictor, and those below
 _MIDDLE = 1e-7  # error at which a curve's name stands
 _NEAR = 0.05  # decades of time between curves that a name cannot part
-_SCALE = {1.0: "1 µs", 10.0: "10 µs", 100.0: "100 µs", 1e3: "1 ms", 1e4: "10 ms", 1e5: "100 ms"}
+_SCALE = {
+    1e-3: "1 ns",
+    1e-2: "10 ns",
+    0.1: "100 ns",
+    1.0: "1 µs",
+    10.0: "10 µs",
+    100.0: "100 µs",
+    1e3: "1 ms",
+    1e4: "10 ms",
+    1e5: "100 ms",
+}
 
 
 class Curve(NamedTuple):

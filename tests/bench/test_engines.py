@@ -11,13 +11,13 @@ import pytest
 from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engines import ENGINES, Casadi, Dense, Engine, Fsolve, Generated, Pylinkage, Shipped
+from kinfmu.bench.engines import ENGINES, Casadi, Dense, Engine, Fsolve, Generated, Native, Pylinkage, Shipped
 from kinfmu.bench.exact_fourbar import exact_fourbar
 from kinfmu.bench.pictures import LOOKS
 from kinfmu.bench.setting import Setting
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.equations.reference import solve_reference
-from kinfmu.errors import MissingPackageError
+from kinfmu.errors import CompilerError, MissingPackageError
 from tests.oracle import follow, fourbar, largest_error, reference_fourbar, slider_crank
 from tests.power_series import Series, cos, sin
 
@@ -29,7 +29,7 @@ def case(request: pytest.FixtureRequest) -> Case:
     return of_gallery(request.param)
 
 
-@pytest.mark.parametrize("engine", [Shipped(), Generated(), Dense()], ids=lambda engine: engine.name)
+@pytest.mark.parametrize("engine", [Shipped(), Native(), Generated(), Dense()], ids=lambda engine: engine.name)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Case) -> None:
     way = engine.way(case, engine.usual)
     assert way is not None
@@ -68,6 +68,16 @@ def test_a_peer_that_is_not_installed_is_told_in_one_line(
     absent: dict[str, None] = {}
     assert prepared(engine, crank_rocker, engine.usual, absent) is None
     assert list(absent) == [message]
+
+
+def test_without_a_compiler_the_native_engine_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_found(_: object) -> None:
+        raise CompilerError("no C compiler is found")
+
+    monkeypatch.setattr("kinfmu.bench.engines.native.Library", none_found)
+    absent: dict[str, None] = {}
+    assert prepared(Native(), of_gallery("slider_crank"), Setting(), absent) is None
+    assert list(absent) == ["kinfmu native: no C compiler is found"]
 
 
 def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
@@ -152,10 +162,15 @@ def test_without_mpmath_it_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) 
     assert [one.point for one in near] == [point.title for point in POINTS[1:]]
 
 
+@pytest.mark.parametrize("engine", [Shipped(), Native()], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.title)
-def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(point: singular.Point) -> None:
+def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
+    point: singular.Point, engine: Engine
+) -> None:
     case = singular.case_of(point)
-    q, qd, qdd = case.errors(Shipped().way(case, Setting())(len(case.t))).max(axis=0)
+    way = engine.way(case, Setting())
+    assert way is not None
+    q, qd, qdd = case.errors(way(len(case.t))).max(axis=0)
     assert q <= 1e-13
     assert qd <= 1e-11
     assert qdd <= 1e-9

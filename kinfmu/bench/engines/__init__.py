@@ -9,10 +9,11 @@ from kinfmu.bench.engines.casadi_newton import Casadi
 from kinfmu.bench.engines.dense import Dense
 from kinfmu.bench.engines.engine import Engine, Way
 from kinfmu.bench.engines.generated import Generated
+from kinfmu.bench.engines.native import Native
 from kinfmu.bench.engines.pylinkage_dyads import Pylinkage
 from kinfmu.bench.engines.scipy_fsolve import Fsolve
 from kinfmu.bench.engines.shipped import Shipped
 
-ENGINES: tuple[Engine, ...] = (Shipped(), Generated(), Dense(), Fsolve(), Casadi(), Pylinkage())
+ENGINES: tuple[Engine, ...] = (Shipped(), Native(), Generated(), Dense(), Fsolve(), Casadi(), Pylinkage())
 
-__all__ = ["ENGINES", "Casadi", "Dense", "Engine", "Fsolve", "Generated", "Pylinkage", "Shipped", "Way"]
+__all__ = ["ENGINES", "Casadi", "Dense", "Engine", "Fsolve", "Generated", "Native", "Pylinkage", "Shipped", "Way"]
