@@ -71,7 +71,7 @@ def measure(
             errors.append(largest(case, way))
         times = samples_in_turn([quietly(way) for _, _, way in ways], rounds, len(case.t), each=partial(tell, name))
         measured += [
-            Measured(name, engine.name, setting, setting == engine.usual, spread(microseconds), error)
+            Measured(name, engine.name, setting, setting == engine.usual, per_lap(engine, microseconds), error)
             for (engine, setting, _), microseconds, error in zip(ways, times, errors, strict=True)
         ]
     return Result(tuple(measured), tuple(absent))
@@ -91,6 +91,11 @@ def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, Non
     except MissingPackageError as error:
         absent[str(error)] = None
         return None
+
+
+def per_lap(engine: Engine, microseconds: Sequence[float]) -> Spread:
+    """What a sample takes, of an engine whose ways take each several times in a call."""
+    return spread([value / engine.laps for value in microseconds])
 
 
 def quietly(way: Way) -> Way:

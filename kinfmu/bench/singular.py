@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.bench.accuracy import Tell, prepared, quietly
+from kinfmu.bench.accuracy import Tell, per_lap, prepared, quietly
 from kinfmu.bench.case import Case, along_driver
 from kinfmu.bench.engines import ENGINES, Engine, Way
-from kinfmu.bench.rounds import Spread, samples_in_turn, spread
+from kinfmu.bench.rounds import Spread, samples_in_turn
 from kinfmu.bench.singular_points import POINTS, Point
 from kinfmu.errors import MissingPackageError
 from kinfmu.plan import compile_plan
@@ -72,7 +72,7 @@ def measure(
             tell(f"{point.title}: {engine.name}")
         times = samples_in_turn([_whole(way, len(case.t)) for _, way in ways], rounds, 1, fewest=1)
         for (engine, _), error, seconds in zip(ways, errors, times, strict=True):
-            microseconds = spread([value / len(case.t) for value in seconds])
+            microseconds = per_lap(engine, [value / len(case.t) for value in seconds])
             found.append(Near(point.title, engine.name, error[:k], error[k], error[:k:-1], microseconds))
     return tuple(found), tuple(absent)
 

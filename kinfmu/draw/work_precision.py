@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 FLOOR, TOP = 1e-17, 10.0  # relative errors that are shown; what is smaller is drawn at the floor
 LEFT = 1e-20  # where the axis begins: room for a name beside a point of round-off
-_WIDTH, _HEIGHT = 760.0, 260.0  # [pt], of a row of panels
+_WIDTH, _HEIGHT = 760.0, 300.0  # [pt], of a row of panels
 _COLUMNS = 3
 _SHADES = (1.0, 0.62, 0.36)  # of a curve's colour: its engine's highest order of the predictor, and those below
-_MIDDLE = 1e-7  # error at which a curve's name stands
+_ABOVE, _BELOW = 1e-6, 2e-12  # errors at which a curve's name stands: names of two neighbours do not meet
 _NEAR = 0.05  # decades of time between curves that a name cannot part
 _SCALE = {
     1e-3: "1 ns",
@@ -75,7 +75,7 @@ def _chart(panels: Sequence[Panel], looks: Mapping[str, Look], notes: Sequence[s
     times = [time for panel in panels for curve in panel.curves for _, time in curve.points]
     for k, panel in enumerate(panels):
         axes = made.add_subplot(grid[k // _COLUMNS, k % _COLUMNS])
-        _panel(axes, panel, looks, (min(times) / 2.0, max(times) * 2.5))
+        _panel(axes, panel, looks, (min(times) / 4.0, max(times) * 2.5))
         axes.tick_params(labelleft=k % _COLUMNS == 0)
         if k + _COLUMNS >= len(panels):
             axes.set_xlabel("largest relative error of q, qd, qdd", fontsize=SMALL, color=ink(GREY), labelpad=2.0)
@@ -136,8 +136,8 @@ def _name(axes: Axes, engine: str, colour: Colour, curves: Sequence[Curve], othe
     above = min((height - max(mine) for height in theirs if height > max(mine) - _NEAR), default=9.0)
     below = min((min(mine) - height for height in theirs if height < min(mine) + _NEAR), default=9.0)
     upward = above >= min(below, 0.3)
-    at, offset = (max(mine), (0.0, 6.0)) if upward else (min(mine), (0.0, -13.0))
-    named(axes, (_MIDDLE, 10.0**at), engine, colour, offset=offset, ha="center")
+    x, at, offset = (_ABOVE, max(mine), (0.0, 6.0)) if upward else (_BELOW, min(mine), (0.0, -13.0))
+    named(axes, (x, 10.0**at), engine, colour, offset=offset, ha="center")
 
 
 def _heights(curve: Curve) -> list[float]:
@@ -145,7 +145,7 @@ def _heights(curve: Curve) -> list[float]:
     if len(curve.points) < 2:
         return []
     errors, times = np.log10(sorted((max(error, FLOOR), time) for error, time in curve.points)).T
-    return [float(np.interp(math.log10(_MIDDLE) + beside, errors, times)) for beside in (-2.5, 0.0, 2.5)]
+    return [float(np.interp(x, errors, times)) for x in np.linspace(math.log10(_BELOW), math.log10(_ABOVE) + 2.5, 6)]
 
 
 def _notes(axes: Axes, notes: Sequence[str]) -> None:

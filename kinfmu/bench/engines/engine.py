@@ -30,6 +30,11 @@ class Engine(ABC):
     def usual(self) -> Setting:
         """The setting that somebody would use who wants round-off."""
 
+    @property
+    def laps(self) -> int:
+        """How often a call of its ways goes through the samples: more than once for engines made for long arrays."""
+        return 1
+
     @abstractmethod
     def way(self, case: Case, setting: Setting) -> Way | None:
         """A function that takes samples, ready to be timed; None if the engine cannot state the mechanism.
