@@ -65,9 +65,7 @@ def _chart(rows: Sequence[Row], looks: Mapping[str, Look]) -> Figure:
             if order == 0:
                 axes.set_ylabel("largest error", fontsize=SMALL, color=ink(GREY), labelpad=2.0)
             if i == len(rows) - 1:
-                axes.set_xlabel(
-                    "before it   |   distance of the driver [rad]   |   beyond it", fontsize=SMALL, color=ink(GREY)
-                )
+                axes.set_xlabel("before   |   distance [rad]   |   beyond", fontsize=SMALL, color=ink(GREY))
     return made
 
 
