@@ -28,7 +28,8 @@ from kinfmu.solver.pose import ALONE, AT_REST
 from kinfmu.sweep import run_times
 from tests.backends.native import STRICT, Native
 from tests.fmu.test_parameters import geared, linkage
-from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, slider_crank, tight_jaw
+from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar, slider_crank, tight_jaw
+from tests.solver.change_points import two_loops
 
 HEADERS = ("way.h", "solver.h")
 PARTS = {"advance": ("advance.c", "limit.c", "survey.c"), "estimate": ("estimate.c", "softness.c")}  # else by one name
@@ -146,6 +147,8 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
     "beside a change point": (
         lambda: fourbar(4, 1, 3, 2 + 1e-7), wander(1.0, 3.0, QUARTERS, 6), {Status.OK}),
     "slider-crank, crank = rod": (lambda: slider_crank(1.0, 1.0), wander(1.0, 3.0, QUARTERS, 7), {Status.OK}),
+    "two loops": (lambda: two_loops(0.12).mechanism, wander(1.0, 3.0, QUARTERS, 14), {Status.OK, Status.BRIDGED}),
+    "a block of four": (six_bar, wander(1.6, 0.3, [1.6, 2.0], 15), {Status.OK, Status.OUTSIDE}),
     "triple rocker": (
         lambda: kinfmu.load("triple_rocker"), wander(0.0, 0.8, [math.acos(1 / 13), -math.acos(1 / 13)], 8),
         {Status.OK, Status.OUTSIDE}),

@@ -15,7 +15,7 @@ bool kf_covers(const kf_bridge *bridge, double u)
 }
 
 /* Unknowns moved by the turns of a bridge; `to` may be `z`. */
-static void raise(const kf_bridge *bridge, const double *z, double *to)
+static void turn_on(const kf_bridge *bridge, const double *z, double *to)
 {
     int k;
     for (k = 0; k < KF_UNKNOWNS; ++k) {
@@ -52,7 +52,7 @@ static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pos
     if (bridge->turns == 0.0) { /* as it was found */
         return kf_evaluated_as_given(&solver->model, &bridge->u[node], z, &pose->found);
     }
-    raise(bridge, z, there);
+    turn_on(bridge, z, there);
     return kf_evaluated(&solver->model, &bridge->u[node], there, NULL, &pose->found);
 }
 
@@ -73,7 +73,7 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     const kf_span *const span = &solver->spans[bridge->span];
     double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
     kf_span_read(span, place(bridge, span, u[0]), z, zd, zdd);
-    raise(bridge, z, z);
+    turn_on(bridge, z, z);
     kf_fresh(pose, -1, INFINITY, -INFINITY);
     if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
         return false;
@@ -94,7 +94,7 @@ static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
     double largest = fabs(bridge->centre) / kf_reach[0];
     int k;
     kf_span_middle(span, z);
-    raise(bridge, z, z);
+    turn_on(bridge, z, z);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         largest = fmax(largest, fabs(z[k]) / kf_unknown_scales[k]);
     }

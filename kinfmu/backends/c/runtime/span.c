@@ -88,8 +88,8 @@ double kf_span_apart(const kf_span *span)
 }
 
 /* z and its two derivatives with respect to the driver at x = (u - centre) / half, from four of the nodes. */
-static void read(const kf_span *span, const double *places, const int *nodes, double x, double *z, double *zd,
-                 double *zdd)
+static void read_at(const kf_span *span, const double *places, const int *nodes, double x, double *z, double *zd,
+                    double *zdd)
 {
     const double half = span->half, per_x = 1.0 / half;
     int i, k;
@@ -112,7 +112,7 @@ static void read(const kf_span *span, const double *places, const int *nodes, do
 /* By the inner nodes: these give the numbers. */
 void kf_span_read(const kf_span *span, double x, double *z, double *zd, double *zdd)
 {
-    read(span, inner_places, inner_nodes, x, z, zd, zdd);
+    read_at(span, inner_places, inner_nodes, x, z, zd, zdd);
 }
 
 /* What the outer nodes say less than the inner ones: the error estimate. */
@@ -120,8 +120,8 @@ void kf_span_difference(const kf_span *span, double x, double *z, double *zd, do
 {
     double outer[3][KF_ROOM(KF_UNKNOWNS)];
     int k;
-    read(span, inner_places, inner_nodes, x, z, zd, zdd);
-    read(span, outer_places, outer_nodes, x, outer[0], outer[1], outer[2]);
+    read_at(span, inner_places, inner_nodes, x, z, zd, zdd);
+    read_at(span, outer_places, outer_nodes, x, outer[0], outer[1], outer[2]);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         z[k] -= outer[0][k];
         zd[k] -= outer[1][k];
