@@ -14,7 +14,7 @@ from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
-MEASUREMENTS = ("accuracy", "sample", "step", "import", "chains")
+MEASUREMENTS = ("accuracy", "sample", "step", "native", "import", "chains")
 ALL = "all"
 
 
@@ -65,6 +65,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
               singular points: tables and charts as in docs/accuracy.md
     sample    a sample of solve beside a dense numpy Newton
     step      a step of the FMU beside the smallest pythonfmu FMU
+    native    a step of the native FMU in a C host beside closed forms by hand
     import    `import kinfmu` beside bare Python
     chains    chains of up to a thousand loops
     all       all of these
@@ -86,6 +87,10 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             from kinfmu.bench import fmu_step
 
             click.echo(fmu_step.run(gallery.load("fourbar"), **given))
+        elif name == "native":
+            from kinfmu.bench import native_step
+
+            click.echo(native_step.run(gallery.load("fourbar"), **given))
         elif name == "import":
             from kinfmu.bench import import_time
 

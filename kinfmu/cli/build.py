@@ -9,6 +9,7 @@ import click
 
 from kinfmu.cli.arguments import MECHANISM, SETTING
 from kinfmu.cli.group import about, main
+from kinfmu.cli.progress import Progress
 from kinfmu.cli.settings import with_parameters
 
 if TYPE_CHECKING:
@@ -19,7 +20,21 @@ if TYPE_CHECKING:
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("-o", "output", type=click.Path(path_type=Path), help="Where to; <name>.fmu if nothing is said.")
 @click.option(
-    "--flavour", type=click.Choice(["python"]), default="python", show_default=True, help="What the FMU is made of."
+    "--flavour",
+    type=click.Choice(["python", "native"]),
+    default="python",
+    show_default=True,
+    help="What the FMU is made of: Python, for hosts that are Python processes, or C, for all hosts.",
+)
+@click.option(
+    "--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version of FMI; 3: native only."
+)
+@click.option(
+    "--platforms",
+    type=click.Choice(["host", "all"]),
+    default="host",
+    show_default=True,
+    help="Of native FMUs: this platform, by the system's compiler, or all, by zig.",
 )
 @click.option(
     "--drive",
@@ -32,6 +47,8 @@ def build(
     mechanism: str,
     output: Path | None,
     flavour: str,
+    fmi: str,
+    platforms: str,
     drive: Any,
     outputs: str | None,
     settings: tuple[tuple[str, str], ...],
@@ -43,9 +60,19 @@ def build(
     mech = with_parameters(mechanism, settings)
     drive = drive or default_drive(mech)
     wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    with about(mechanism):
-        path = built(mech, output or _own_folder(mech), flavour=flavour, drive=drive, outputs=wanted)
-    click.echo(f"{path}: {path.stat().st_size / 1000.0:.0f} kB, FMI 2.0 co-simulation, driven by {drive}")
+    with about(mechanism), Progress("compiling for all platforms", least=2) as progress:
+        path = built(
+            mech,
+            output or _own_folder(mech),
+            flavour=flavour,
+            drive=drive,
+            outputs=wanted,
+            fmi=int(fmi),
+            platforms=platforms,
+            progress=progress,
+        )
+    kinds = "co-simulation" if flavour == "python" else "co-simulation and model exchange"
+    click.echo(f"{path}: {path.stat().st_size / 1000.0:.0f} kB, FMI {fmi}.0 {kinds}, driven by {drive}")
 
 
 def _own_folder(mechanism: Mechanism) -> Path:

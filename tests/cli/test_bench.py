@@ -157,7 +157,7 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, step, import, chains, all",
+            "known: accuracy, sample, step, native, import, chains, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -186,6 +186,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
     [
         ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve", "the same, error"]),
         ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
+        ("native", ["closed form", "FMI 2.0, instantiate", "FMI 3.0, instantiate"]),
         ("import", ["pass", "import kinfmu", "difference"]),
     ],
 )

@@ -261,3 +261,18 @@ def test_parameters_that_cannot_be_set_are_told(
     assert fails("check", slider, "--set", "crank=2 deg").startswith(f"{slider}: [parameters] crank = '2 deg': unit")
     assert fails("check", slider, "--set", "crank=rod").endswith("needs itself: crank -> rod -> crank")
     assert fails("check", slider, "--set", "crank=nan").endswith("[parameters] crank = nan must be a finite number")
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_native_fmus_are_built_and_simulated(command: Command, tmp_path: Path, fmi: str) -> None:
+    built = command("build", "fourbar", "--flavour", "native", "--fmi", fmi, "-o", "four.fmu")
+    assert re.fullmatch(
+        rf"four\.fmu: \d+ kB, FMI {fmi}\.0 co-simulation and model exchange, driven by time\n", built.stdout
+    )
+    result = command("simulate", "four.fmu", "--stop", "1", "--mcap", "four.mcap", "--rrd", "four.rrd")
+    assert result.stdout.startswith("2 samples: 2 ok; largest residual ")
+    assert log.read(tmp_path / "four.mcap")["crank.phi"].tolist() == pytest.approx([0.0, np.pi / 180])
+
+
+def test_the_python_flavour_refuses_what_only_the_native_one_has(fails: Callable[..., str]) -> None:
+    assert "the python flavour is FMI 2.0" in fails("build", "fourbar", "--fmi", "3", "-o", "four.fmu")

@@ -77,6 +77,7 @@ def _header(variables: Interface, version: str, token: str) -> str:
         "extern const char *const kf_variable_names[KF_VARIABLES];",
         "extern const int kf_part_first[KF_PARTS + 1];",
         "extern const unsigned char kf_part_of[KF_REALS];",
+        "extern const unsigned short kf_bit_of[KF_REALS]; /* 1 << kf_part_of */",
         "extern const double kf_real_starts[KF_REALS];",
         "extern const bool kf_real_is_positive[KF_REALS];",
         "extern const bool kf_driven_by_time_start;",
@@ -92,6 +93,7 @@ def _tables(variables: Interface) -> str:
     parts = [part for part in variables.parts if part.name not in NOT_REAL]
     real = [variable for part in parts for variable in part.variables]
     (drive,) = variables.part("drive")
+    place = _numbers(len(part.variables) for part in parts)
     positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
@@ -99,7 +101,8 @@ def _tables(variables: Interface) -> str:
         "",
         *array("char *const kf_variable_names", [string(variable.name) for variable in variables]),
         *array("int kf_part_first", [0, *accumulate(len(part.variables) for part in parts)]),
-        *array("unsigned char kf_part_of", _numbers(len(part.variables) for part in parts)),
+        *array("unsigned char kf_part_of", place),
+        *array("unsigned short kf_bit_of", [1 << k for k in place]),
         *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
         *array("bool kf_real_is_positive", booleans(positive)),
         f"const bool kf_driven_by_time_start = {'true' if drive.start else 'false'};",

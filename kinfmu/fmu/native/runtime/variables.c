@@ -103,19 +103,27 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
 kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
 {
     kf_state *const s = &instance->now;
+    kf_answer answer = KF_DONE;
     unsigned parts = 0;
-    kf_answer answer;
+    bool times = false;
     size_t k;
     for (k = 0; k < count; ++k) {
         const unsigned reference = references[k];
         if (reference < KF_REALS) {
-            parts |= KF_BIT(kf_part_of[reference]);
-        } else if (reference != KF_TIME) {
+            parts |= kf_bit_of[reference];
+        } else if (reference == KF_TIME) {
+            times = true;
+        } else {
             return kf_not_a(instance, reference, KF_REAL_WORD);
         }
     }
-    answer = kf_read(instance, parts);
-    for (k = 0; k < count; ++k) {
+    if (parts & ~KF_GIVEN_PARTS) {
+        answer = kf_read(instance, parts);
+    }
+    for (k = 0; !times && k < count; ++k) {
+        values[k] = s->real[references[k]];
+    }
+    for (k = 0; times && k < count; ++k) {
         values[k] = references[k] == KF_TIME ? s->time : s->real[references[k]];
     }
     return answer;
@@ -196,7 +204,7 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
     for (k = 0; k < count; ++k) {
         const unsigned reference = references[k];
         const double value = values[k];
-        if (reference >= 3 * KF_DRIVERS || !isfinite(value)) {
+        if (reference >= 3 * KF_DRIVERS || !(value - value == 0.0)) { /* inputs come first; a finite number */
             const kf_answer answer = set_other(instance, reference, value);
             if (answer != KF_DONE) {
                 return answer;

@@ -1,0 +1,112 @@
+"""What a step of the native FMU costs in a C host, beside an FMU of closed forms written by hand."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import tempfile
+import zipfile
+from collections.abc import Callable, Sequence
+from itertools import count
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+from kinfmu.backends.c import compiler
+from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.fmu import description
+from kinfmu.fmu.build import build
+from kinfmu.mechanism import Mechanism
+from kinfmu.naming import derivative_name
+
+STEPS = 360 * 200  # in a round, of one degree each: whole turns
+ROUNDS = 40
+INSTANCES = 200
+CLOSED_FORM_OUTPUTS = tuple(range(2, 17))  # value references of closed_form.c
+_SOURCES = Path(__file__).with_name("native_host")
+_WORDS = {2: "Real", 3: "Float64"}
+
+
+def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
+    """A table: processor time of a step (set 1, step, get 15) of the mechanism's native FMU and of the closed forms.
+
+    In both versions of FMI, with their ratio and what it takes to instantiate the FMU.
+    """
+    lines = [
+        f"{'native FMU step: set 1, step 1 deg, get 15':44}{'ours':>10}{'closed form':>14}{'ratio':>9}{'quartiles':>16}"
+    ]
+    for fmi in (2, 3):
+        with tempfile.TemporaryDirectory(prefix="kinfmu_bench_", ignore_cleanup_errors=True) as folder:
+            ours, instantiate = _ours(mechanism, fmi, Path(folder))
+            ways = [ours, _closed_form(fmi)]
+            ns = [[value / STEPS * 1e9 for value in row] for row in in_turn(ways, rounds, process_time)]
+        ratio = spread([a / b for a, b in zip(*ns, strict=True)])
+        mine, other = (spread(row).median for row in ns)
+        lines.append(
+            f"{f'FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us':44}{mine:7.0f} ns{other:11.0f} ns{ratio.median:9.2f}"
+            f"{ratio.lower:8.2f} to {ratio.upper:.2f}"
+        )
+    return "\n".join(lines)
+
+
+def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], None], float]:
+    """A round of the mechanism's FMU, and the seconds that an instance takes."""
+    fmu = build(mechanism, folder / "ours.fmu", flavour="native", fmi=fmi, drive="inputs")
+    with zipfile.ZipFile(fmu) as zipped:
+        zipped.extractall(folder)
+    about = description.read((folder / "modelDescription.xml").read_bytes(), "ours")
+    binary = next(path for path in (folder / "binaries").rglob("*.*") if path.is_file())
+    library = ctypes.CDLL(str(binary))
+    token = about.token.encode()
+    prefix = f"fmi{fmi}"
+    if fmi == 2:
+        create = library.fmi2Instantiate
+        arguments: tuple[Any, ...] = (b"ours", 1, token, None, None, 0, 0)
+    else:
+        create = library.fmi3InstantiateCoSimulation
+        false = ctypes.c_bool(False)
+        arguments = (b"ours", token, None, *([false] * 4), None, ctypes.c_size_t(0), None, None, None)
+    create.restype = ctypes.c_void_p
+    start = perf_counter()
+    instances = [ctypes.c_void_p(create(*arguments)) for _ in range(INSTANCES)]
+    seconds = (perf_counter() - start) / INSTANCES
+    for other in instances[1:]:
+        library[f"{prefix}FreeInstance"](other)
+    (instance, *_) = instances
+    if fmi == 2:
+        library.fmi2EnterInitializationMode(instance)
+    else:
+        zero = ctypes.c_double(0.0)
+        library.fmi3EnterInitializationMode(instance, ctypes.c_bool(False), zero, zero, ctypes.c_bool(False), zero)
+    library[f"{prefix}ExitInitializationMode"](instance)
+    references = about.interface.value_references()
+    first = [variable.name for variable in about.interface.part("values")][:5]
+    outputs = [references[derivative_name(name, order)] for order in range(3) for name in first]
+    return _rounds(fmi, library, instance, outputs), seconds
+
+
+def _closed_form(fmi: int) -> Callable[[], None]:
+    """A round of the closed forms."""
+    sources = {"closed_form.c": (_SOURCES / "closed_form.c").read_text("utf-8")}
+    library = ctypes.CDLL(str(compiler.shared_library(sources, (f"-DFMI={fmi}",))))
+    library.instantiate.restype = ctypes.c_void_p
+    return _rounds(fmi, library, ctypes.c_void_p(library.instantiate()), CLOSED_FORM_OUTPUTS)
+
+
+def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence[int]) -> Callable[[], None]:
+    """A function that steps an FMU through a round in C, each going on where the last one ended."""
+    host = ctypes.CDLL(str(compiler.shared_library({"host.c": (_SOURCES / "host.c").read_text("utf-8")})))
+    step = getattr(host, f"host_run{fmi}")
+    word = _WORDS[fmi]
+    functions = [library[f"fmi{fmi}{name}"] for name in (f"Set{word}", "DoStep", f"Get{word}")]
+    references, values = (ctypes.c_uint * len(outputs))(*outputs), (ctypes.c_double * len(outputs))()
+    rounds = count()
+
+    def one() -> None:
+        first, degree = ctypes.c_long(next(rounds) * STEPS), ctypes.c_double(math.pi / 180.0)
+        length, steps = ctypes.c_size_t(len(outputs)), ctypes.c_long(STEPS)
+        failed = step(instance, *functions, 0, references, length, values, first, steps, degree)
+        if failed:
+            raise RuntimeError(f"{failed} calls failed")
+
+    return one
