@@ -39,11 +39,11 @@ for _ in range(int(count)):
 """
 ECOS = """
 import sys
-from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
+from ecospy import EcosSimulation, EcosSimulationStructure
 fmu, step, count, *names = sys.argv[1:]
 structure = EcosSimulationStructure()
 structure.add_model("fourbar", fmu)
-with EcosSimulation(structure, step_size=float(step)) as simulation:
+with EcosSimulation(float(step), structure=structure) as simulation:
     simulation.init()
     for _ in range(int(count)):
         simulation.step(1)
@@ -111,4 +111,6 @@ def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path
         header, *lines = list(csv.reader(file))
     columns = [next(k for k, cell in enumerate(header) if f"::{name}[" in cell.replace(" ", "")) for name in NAMES]
     rows = np.array([[float(line[k]) for k in (header.index(header[1]), *columns)] for line in lines if len(line) > 1])
-    np.testing.assert_allclose(rows[:, 1:], _wanted("crank_rocker", rows[:, 0]), rtol=0, atol=2e-5)  # it prints 6 digits
+    np.testing.assert_allclose(
+        rows[:, 1:], _wanted("crank_rocker", rows[:, 0]), rtol=0, atol=2e-5
+    )  # it prints 6 digits

@@ -1,0 +1,64 @@
+"""No access out of bounds, nothing undefined, nothing uninitialized, nothing leaked: a C host under the sanitizers."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu.fmu.interface import interface
+from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.plan import compile_plan
+from tests.fmu.test_parameters import linkage
+
+HOST = Path(__file__).with_name("host.c")
+CC = shutil.which("gcc") or shutil.which("clang")
+TOKEN = "{00000000-0000-0000-0000-000000000000}"  # noqa: S105  # a guid
+
+
+def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -> Path:
+    """The FMU's sources and a host, linked into one program."""
+    plan = compile_plan(mechanism)
+    variables = interface(plan, "inputs", has_time=fmi == 3)
+    files = sources(plan, variables, f"{fmi}.0", TOKEN) | headers(f"{fmi}.0")
+    program = folder / "host"
+    sources_and_host = files | {"host.c": HOST.read_text("utf-8")}
+    references = variables.value_references()
+    outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
+    defined = {
+        "FMI": fmi,
+        "FIRST_OUTPUT": references[outputs[0]],
+        "OUTPUTS": len(outputs),
+        "DRIVERS": len(plan.drivers),
+        "PARAMETER": references[plan.parameters[0].name] if plan.parameters else -1,
+    }
+    for name, text in sources_and_host.items():
+        (folder / name).write_text(text, "utf-8")
+    units = sorted(name for name in sources_and_host if name.endswith(".c"))
+    command = [str(CC), "-std=c99", "-g", "-O1", "-ffp-contract=off", *flags]
+    command += [*(f"-D{name}={value}" for name, value in defined.items()), *units, "-o", str(program), "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if "cannot find" in done.stderr:
+        pytest.skip(f"this compiler has no {flags}")
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+@pytest.mark.skipif(CC is None, reason="neither gcc nor clang is there")
+@pytest.mark.parametrize("name", ["fourbar", "five_bar", "settable"])
+def test_address_and_undefined_behaviour_sanitizers_find_nothing(name: str, fmi: int, tmp_path: Path) -> None:
+    mechanism = linkage() if name == "settable" else kinfmu.load(name)
+    flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+
+
+@pytest.mark.skipif(CC is None or shutil.which("valgrind") is None, reason="valgrind or a compiler is not there")
+def test_valgrind_finds_nothing(fmi: int, tmp_path: Path) -> None:
+    command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "-q", _program(linkage(), fmi, tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
