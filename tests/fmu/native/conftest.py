@@ -16,7 +16,7 @@ Build = Callable[..., Path]
 Start = Callable[..., Host]
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="package", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compiled libraries stay inside the tests, and are compiled quickly."""
     with pytest.MonkeyPatch.context() as patch:
