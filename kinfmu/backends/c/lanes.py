@@ -1,7 +1,7 @@
 """lanes.c: the formulas of a plan for many samples side by side, free of branches.
 
 A unit's position, rates and accelerations are one loop over the lanes, so that intermediate numbers stay in registers.
-Newton corrects a good prediction twice; sines and cosines of the unknowns are computed once and then rotated.
+Newton corrects a good prediction; sines and cosines of the unknowns are computed once and then rotated.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
 
-CORRECTIONS = 2
+CORRECTIONS = 1  # of a good prediction; the sweep corrects once more where that does not do
 LISTS = ("x", "x1", "x2")
 _VECTORS = {"sin": "kf_sin", "cos": "kf_cos"}
 _BRANCHING = ("curve", "atan2", "floor")
@@ -161,11 +161,20 @@ class _Lanes:
         ]
 
     def _outputs(self, order: int) -> list[str]:
-        """Copies the outputs that are coordinates, and computes the others."""
+        """The outputs that are formulas; those that are coordinates are taken from where they stand."""
+        where = {self._rate_of(name, order) for name in self.place}
         writer = Writer(self.names, [*self.derived, *self.home])
-        targets = [motion[1:][order] for motion in self.plan.outputs_motion]
-        lines = [f"{line};" for line in writer.statements(targets)]
-        lines += [f"lanes->outputs[{order}][{k}][i] = {writer.expression(node)};" for k, node in enumerate(targets)]
+        targets = [
+            (k, motion[1:][order])
+            for k, motion in enumerate(self.plan.outputs_motion)
+            if not (
+                isinstance(motion[1:][order], Node)
+                and motion[1:][order].op == "symbol"
+                and motion[1:][order].name in where
+            )
+        ]
+        lines = [f"{line};" for line in writer.statements([node for _, node in targets])]
+        lines += [f"lanes->outputs[{order}][{k}][i] = {writer.expression(node)};" for k, node in targets]
         return self._loop(("outputs", "rates", "accelerations")[order], lines, writer)
 
     def _watches(self) -> list[str]:
@@ -204,7 +213,7 @@ class _LaneUnit:
             body += self._newton(writer, block) if block.unknowns else self._given_outright(writer, block)
         where = places(kind)
         own = {name: field for name, (order, field) in where.items() if order == 0 and field.startswith("k")}
-        body += [f"x[row->{field}][i] = {identifier(name)};" for name, field in own.items()]
+        body += [f"x_{field}[i] = {identifier(name)};" for name, field in own.items()]
         body += [f"hold[{k}][i] = {self.names.of(node)};" for node, k in self.hold.items()]
         motion: list[str] = []
         for order in (1, 2):
@@ -214,11 +223,11 @@ class _LaneUnit:
                     motion += [f"{line};" for line in writer.statements([nodes[order]])]
                     motion.append(f"{identifier(derivative_name(name, order))} = {writer.expression(nodes[order])};")
             for name, field in own.items():
-                motion.append(f"{LISTS[order]}[row->{field}][i] = {identifier(derivative_name(name, order))};")
+                motion.append(f"{LISTS[order]}_{field}[i] = {identifier(derivative_name(name, order))};")
         found = {name for block in kind.blocks for name, _ in block.assigned}
         found |= {derivative_name(name, order) for name in kind.coordinates for order in (1, 2)}
         unknowns = [name for block in kind.blocks for name in block.unknowns]
-        loads = [f"{identifier(name)} = x[row->{own[name]}][i];" for name in unknowns]
+        loads = [f"{identifier(name)} = x_{own[name]}[i];" for name in unknowns]
         later: list[str] = []
         found |= set(unknowns)
         for node in writer.used:
@@ -231,20 +240,19 @@ class _LaneUnit:
                 loads.append(f"{name} = model->parameters[{self.parameters[node.name]}];")
             elif node.name in where:
                 order, field = where[node.name]
-                (loads if order == 0 else later).append(f"{name} = {LISTS[order]}[row->{field}][i];")
+                (loads if order == 0 else later).append(f"{name} = {LISTS[order]}_{field}[i];")
             else:
                 loads.append(f"{name} = row->{name};")
         lines = [*loads, *body, "if (full) {", *(f"    {line}" for line in [*later, *motion]), "}"]
         solved = kind.solved is not None
+        used = sorted(set(re.findall(r"\b(x[12]?)_([gk]\d+)\[i\]", "\n".join(lines))))
         return [
             *row_type(kind),
             "",
             f"static inline void unit{kind.label}(const kf_model *model, const row{kind.label} *row, kf_lanes *lanes,",
             f"    double (*hold)[KF_LANES],{' const double factor,' if solved else ''} const bool full)",
             "{",
-            "    double(*const x)[KF_LANES] = lanes->x;",
-            "    double(*const x1)[KF_LANES] = lanes->x1;",
-            "    double(*const x2)[KF_LANES] = lanes->x2;",
+            *(f"    double *const {name}_{field} = lanes->{name}[row->{field}];" for name, field in used),
             "    int i;",
             "    (void)model;",
             "    (void)hold;",

@@ -396,11 +396,11 @@ class _Model:
         expressions, lines = self._expressions(formulas)
         out = ("outputs", "rates", "accelerations")[order]
         places = [where[node.name] if plain else -1 for node, plain in zip(wanted, told, strict=True)]
-        table = array(f"static int {out}_places", places)
+        table = array(f"int kf_{out}_places", places)
         copying = [
             "for (k = 0; k < KF_OUTPUTS; ++k) {",
-            f"    if ({out}_places[k] >= 0) {{",
-            f"        {out}[k] = {_SOURCES[order]}[{out}_places[k]];",
+            f"    if (kf_{out}_places[k] >= 0) {{",
+            f"        {out}[k] = {_SOURCES[order]}[kf_{out}_places[k]];",
             "    }",
             "}",
         ]

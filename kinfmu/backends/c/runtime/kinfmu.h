@@ -73,6 +73,11 @@ extern const char *const kf_watch_names[KF_ROOM(KF_WATCHES)];
 extern const char *const kf_parameter_names[KF_ROOM(KF_PARAMETERS)];
 extern const char *const kf_block_row_names[KF_ROOM(KF_BLOCKS)]; /* "Q.x, Q.y" */
 
+/* Where outputs that are coordinates stand in x, x1, x2; -1: a formula. */
+extern const int kf_outputs_places[KF_ROOM(KF_OUTPUTS)];
+extern const int kf_rates_places[KF_ROOM(KF_OUTPUTS)];
+extern const int kf_accelerations_places[KF_ROOM(KF_OUTPUTS)];
+
 bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room);
 void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
 int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd, double s,

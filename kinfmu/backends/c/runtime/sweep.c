@@ -23,11 +23,10 @@
 #define SPACING (TURN / NODES) /* [rad, sizes]: predictions are off by 1e-8 or so */
 #define SAME 1e-9            /* difference of poses that are a turn apart */
 #define SURE 0.05         /* determinant from which samples may be solved side by side: it leaves nine digits of qdd */
-#define MOST_MOVED 1e-3      /* correction beyond which two of them do not arrive */
+#define MOST_MOVED 1e-3      /* correction beyond which two of them do not arrive, nor rotations do */
 #define CLOSED 1e-30         /* squared residual of what has arrived, for angles of some radians */
 #define FARTHEST 1e5         /* [rad]: beyond, the rounding of the angle is lost in lanes */
 #define MOST_NODES 200000    /* on either side of the anchor */
-#define CORRECTIONS 2
 
 /* The quintics of the unknowns between a node and the next. */
 typedef struct {
@@ -302,22 +301,19 @@ static bool lay_nodes(kf_sweep *sweep, const kf_job *job)
     const double most = fmin((double)MOST_NODES, FARTHEST / sweep->spacing);
     kf_node *nodes = malloc(3 * sizeof *nodes);
     double low = 0.0, high = 0.0;
-    bool done = false;
+    bool done = nodes != NULL;
     int64_t k;
     if (sweep->lanes == NULL) {
         sweep->lanes = calloc(1, sizeof *sweep->lanes);
     }
-    if (nodes == NULL || sweep->lanes == NULL || !make_room(sweep, 0, NODES)) {
-        free(nodes);
-        return false;
+    for (k = 0; k < job->count; ++k) {
+        const double place = (job->u[k] - kf_anchor_u[0]) / sweep->spacing;
+        low = place < low ? place : low;
+        high = place > high ? place : high;
     }
-    sweep->repeats = kf_driver_is_angle[0] && lay(sweep, NODES, nodes) && is_repeated(sweep, &nodes[0], &nodes[1]);
-    if (!sweep->repeats) {
-        for (k = 0; k < job->count; ++k) {
-            const double place = (job->u[k] - kf_anchor_u[0]) / sweep->spacing;
-            low = place < low ? place : low;
-            high = place > high ? place : high;
-        }
+    sweep->repeats = kf_driver_is_angle[0] && high - low > NODES && done && make_room(sweep, 0, NODES)
+        && lay(sweep, NODES, nodes) && is_repeated(sweep, &nodes[0], &nodes[1]);
+    if (done && !sweep->repeats) {
         low = floor(fmax(low, -most));
         high = ceil(fmin(high, most));
         done = make_room(sweep, (int64_t)low, (int64_t)(high > low ? high : low + 1.0));
@@ -328,38 +324,41 @@ static bool lay_nodes(kf_sweep *sweep, const kf_job *job)
     }
     sweep->started = false;
     free(nodes);
-    return done || sweep->repeats;
+    return done && sweep->lanes != NULL;
 }
 
-/* Predictions of up to KF_LANES samples from `start` on; alone[i]: not to be solved side by side. */
-static void predict(const kf_sweep *sweep, const kf_job *job, int64_t start, int count, bool *alone)
+/* Predictions of the samples from `start` on; alone[i]: not to be solved side by side. */
+static void predict(const kf_sweep *sweep, const kf_job *job, int64_t start, int32_t *alone)
 {
     kf_lanes *const lanes = sweep->lanes;
     const double per_spacing = 1.0 / sweep->spacing;
     const double begin = node_place(sweep, sweep->first);
+    const double last = (double)sweep->intervals_count;
+    const double per_turn = sweep->repeats ? 1.0 / NODES : 0.0;
+    const double *const u = job->u + start;
+    double *const own = lanes->x[KF_COORDINATES - 1];
     double x[KF_LANES], turns[KF_LANES];
     int32_t number[KF_LANES];
     int i, k, from, to;
+    memcpy(own, u, KF_LANES * sizeof(double));
+    memcpy(lanes->x1[KF_COORDINATES - 1], job->ud + start, KF_LANES * sizeof(double));
+    memcpy(lanes->x2[KF_COORDINATES - 1], job->udd + start, KF_LANES * sizeof(double));
+    KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
-        const int64_t sample = start + (i < count ? i : count - 1);
-        const double u = job->u[sample];
-        double place = (u - begin) * per_spacing;
-        turns[i] = sweep->repeats ? __builtin_floor(place * (1.0 / NODES)) : 0.0;
+        double place = (own[i] - begin) * per_spacing;
+        turns[i] = __builtin_floor(place * per_turn);
         place -= NODES * turns[i];
-        alone[i] = !(place >= 0.0 && place < (double)sweep->intervals_count && fabs(u) < FARTHEST);
+        alone[i] = !((place >= 0.0) & (place < last) & (fabs(own[i]) < FARTHEST));
         place = alone[i] ? 0.0 : place;
         number[i] = (int32_t)place;
         x[i] = place - (double)number[i];
-        lanes->x[KF_COORDINATES - 1][i] = u;
-        lanes->x1[KF_COORDINATES - 1][i] = job->ud[sample];
-        lanes->x2[KF_COORDINATES - 1][i] = job->udd[sample];
     }
     for (from = 0; from < KF_LANES; from = to) {
         const kf_interval *const interval = &sweep->intervals[number[from]];
         for (to = from + 1; to < KF_LANES && number[to] == number[from]; ++to) {
         }
         for (i = from; i < to && !interval->plain; ++i) {
-            alone[i] = true;
+            alone[i] = 1;
         }
         for (k = 0; k < KF_UNKNOWNS; ++k) {
             const double c0 = interval->c[0][k], c1 = interval->c[1][k], c2 = interval->c[2][k];
@@ -374,70 +373,110 @@ static void predict(const kf_sweep *sweep, const kf_job *job, int64_t start, int
     }
 }
 
-static void copy_table(const kf_table *table, int64_t start, int count, double (*rows)[KF_LANES])
+/* Keep a sample for later; false if memory ran out. */
+static bool leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
 {
-    int i, k;
-    if (table->start == NULL) {
-        return;
-    }
-    if (table->row == 1) {
-        for (k = 0; k < KF_OUTPUTS; ++k) {
-            memcpy(table->start + start + k * table->column, rows[k], (size_t)count * sizeof(double));
+    const double u = job->u[sample];
+    kf_left *one;
+    if (sweep->alone_count == sweep->alone_room) {
+        const int64_t room = 2 * sweep->alone_room + 1024;
+        kf_left *const more = realloc(sweep->alone, (size_t)room * sizeof *more);
+        if (more == NULL) {
+            return false;
         }
-        return;
+        sweep->alone = more;
+        sweep->alone_room = room;
     }
-    for (i = 0; i < count; ++i) {
-        double *const place = table->start + (ptrdiff_t)(start + i) * table->row;
-        for (k = 0; k < KF_OUTPUTS; ++k) {
-            place[k * table->column] = rows[k][i];
+    one = &sweep->alone[sweep->alone_count++];
+    one->turns = sweep->repeats && fabs(u) < FARTHEST ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
+    one->u = one->turns == 0.0 ? u : kf_turned(u, -one->turns);
+    one->sample = sample;
+    return true;
+}
+
+/* Let the outputs of one order go where they are wanted; a table by samples is filled by `copy` afterwards. */
+static void point(const kf_table *table, int64_t start, const int *places, double **list, double **formulas,
+                  double (*rooms)[KF_LANES], double (*formula_rooms)[KF_LANES])
+{
+    int k;
+    for (k = 0; k < KF_COORDINATES; ++k) {
+        list[k] = rooms[k];
+    }
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        double *const column = table->row == 1 && table->start != NULL ? table->start + start + k * table->column : NULL;
+        formulas[k] = formula_rooms[k];
+        if (places[k] < 0 && column != NULL) {
+            formulas[k] = column;
+        } else if (column != NULL && list[places[k]] == rooms[places[k]]) {
+            list[places[k]] = column;
         }
     }
 }
 
-static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start, int count)
+static void copy(const kf_table *table, int64_t start, const int *places, double *const *list, double *const *formulas)
+{
+    int i, k;
+    for (k = 0; k < KF_OUTPUTS && table->start != NULL; ++k) {
+        const double *const from = places[k] >= 0 ? list[places[k]] : formulas[k];
+        double *const to = table->start + (ptrdiff_t)start * table->row + k * table->column;
+        for (i = 0; i < KF_LANES && from != to; ++i) {
+            to[i * table->row] = from[i];
+        }
+    }
+}
+
+/* KF_LANES samples from `start` on; false if memory ran out. */
+static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
 {
     const bool full = job->tables[1].start != NULL || job->tables[2].start != NULL;
     const double tolerance = sweep->solver.tolerance;
     kf_lanes *const lanes = sweep->lanes;
-    bool alone[KF_LANES];
-    int i, k;
-    predict(sweep, job, start, count, alone);
-    kf_lanes_solve(&sweep->solver.model, lanes, full);
-    for (k = 0; k < 3; ++k) {
-        copy_table(&job->tables[k], start, count, lanes->outputs[k]);
+    const double *const u = job->u + start;
+    int32_t alone[KF_LANES];
+    int i, k, passes, open = 0, left = 0;
+    point(&job->tables[0], start, kf_outputs_places, lanes->x, lanes->outputs[0], lanes->coordinate_rooms[0],
+          lanes->output_rooms[0]);
+    point(&job->tables[1], start, kf_rates_places, lanes->x1, lanes->outputs[1], lanes->coordinate_rooms[1],
+          lanes->output_rooms[1]);
+    point(&job->tables[2], start, kf_accelerations_places, lanes->x2, lanes->outputs[2], lanes->coordinate_rooms[2],
+          lanes->output_rooms[2]);
+    predict(sweep, job, start, alone);
+    for (passes = 1; passes <= 2; ++passes) { /* once more for all if one of them has not arrived */
+        kf_lanes_solve(&sweep->solver.model, lanes, full);
+        open = 0;
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_LANES; ++i) {
+            const double margin = lanes->margin[i], moved = lanes->moved[i];
+            alone[i] |= !((margin >= SURE) & (KF_TRUST * moved <= margin) & (moved <= MOST_MOVED));
+            open += !(alone[i] | (lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i])));
+        }
+        if (open == 0) {
+            break;
+        }
     }
-    for (i = 0; i < count; ++i) {
-        const double u = lanes->x[KF_COORDINATES - 1][i];
-        const bool arrived = lanes->error[i] <= CLOSED * (1.0 + u * u) && lanes->margin[i] >= SURE
-            && KF_TRUST * lanes->moved[i] <= lanes->margin[i] && lanes->moved[i] <= MOST_MOVED;
-        alone[i] = alone[i] || !arrived;
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_LANES; ++i) {
+        alone[i] |= !(lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i]));
         job->status[start + i] = KF_OK;
-        job->iterations[start + i] = CORRECTIONS;
+        job->iterations[start + i] = open == 0 ? passes : passes - 1;
         job->residual[start + i] = sqrt(lanes->error[i]);
     }
     for (k = 0; k < KF_WATCHES; ++k) {
-        for (i = 0; i < count; ++i) {
+        for (i = 0; i < KF_LANES; ++i) {
             const double watch = lanes->watches[k][i];
             job->watches[(start + i) * KF_WATCHES + k] = watch;
-            alone[i] = alone[i] || !(fabs(watch) <= tolerance);
+            alone[i] |= !(fabs(watch) <= tolerance);
         }
     }
-    for (i = 0; i < count; ++i) {
-        if (alone[i]) {
-            if (sweep->alone_count == sweep->alone_room) {
-                const int64_t room = 2 * sweep->alone_room + 1024;
-                kf_left *const more = realloc(sweep->alone, (size_t)room * sizeof *more);
-                if (more == NULL) {
-                    return false;
-                }
-                sweep->alone = more;
-                sweep->alone_room = room;
-            }
-            const double u = job->u[start + i];
-            kf_left *const one = &sweep->alone[sweep->alone_count++];
-            one->turns = sweep->repeats && fabs(u) < FARTHEST ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
-            one->u = one->turns == 0.0 ? u : kf_turned(u, -one->turns);
-            one->sample = start + i;
+    copy(&job->tables[0], start, kf_outputs_places, lanes->x, lanes->outputs[0]);
+    copy(&job->tables[1], start, kf_rates_places, lanes->x1, lanes->outputs[1]);
+    copy(&job->tables[2], start, kf_accelerations_places, lanes->x2, lanes->outputs[2]);
+    for (i = 0; i < KF_LANES; ++i) {
+        left += alone[i];
+    }
+    for (i = 0; i < KF_LANES && left > 0; ++i) {
+        if (alone[i] && !leave(sweep, job, start + i)) {
+            return false;
         }
     }
     return true;
@@ -502,9 +541,13 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
             return false;
         }
         sweep->alone_count = 0;
-        for (; sample < job->count; sample += KF_LANES) {
-            const int64_t left = job->count - sample;
-            if (!solve_side_by_side(sweep, job, sample, left < KF_LANES ? (int)left : KF_LANES)) {
+        for (; sample + KF_LANES <= job->count; sample += KF_LANES) {
+            if (!solve_side_by_side(sweep, job, sample)) {
+                return false;
+            }
+        }
+        for (; sample < job->count; ++sample) {
+            if (!leave(sweep, job, sample)) {
                 return false;
             }
         }

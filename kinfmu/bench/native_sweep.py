@@ -1,0 +1,123 @@
+"""A sweep by the native engine beside a four-bar's closed form written by hand, and beside what numba makes of one."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+
+from kinfmu.backends.c import compiler
+from kinfmu.backends.c.library import FLAGS, Library
+from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.chains import fourbar_chain
+from kinfmu.errors import MissingPackageError
+from kinfmu.gallery import load
+from kinfmu.plan import compile_plan
+from kinfmu.run import FloatArray
+from kinfmu.sweep import solve
+
+ROUNDS = 9
+SAMPLES = 360_000  # a thousand turns by one degree
+CHAIN_SAMPLES = 2000
+LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gallery's crank_rocker
+COORDINATES = ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
+
+
+def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
+    """A table: nanoseconds of processor time a sample, and how often the closed form's."""
+    u = np.linspace(0.0, np.pi / 180.0 * samples, samples, endpoint=False)
+    driven = (u[:, None].copy(), np.ones((samples, 1)), np.zeros((samples, 1)))
+    crank_rocker, fourbar = (Library(compile_plan(load(name), COORDINATES)) for name in ("crank_rocker", "fourbar"))
+    columns = np.empty((15, samples))
+    tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
+    by_samples = [np.empty((samples, 5)) for _ in range(3)]
+    ways: dict[str, Callable[[], object]] = {
+        "closed form by hand, laid side by side": _closed_form(u, columns),
+        "crank-rocker, q, qd, qdd": lambda: crank_rocker.sweep(driven, tables),
+        "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples),
+        "the same, q alone": lambda: crank_rocker.sweep(driven, (tables[0], None, None)),
+        "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables),
+        "kinfmu.solve: a Run of its own": lambda: solve(load("crank_rocker"), crank_angle=u, engine="native"),
+    }
+    absent = ""
+    try:
+        ways["closed form in a loop, by numba"] = _numba_loop(u, columns)
+    except MissingPackageError as error:
+        absent = f"\n{error}"
+    times = [
+        spread([value / samples * 1e9 for value in seconds])
+        for seconds in in_turn(list(ways.values()), rounds, process_time)
+    ]
+    lines = [f"{samples} samples of 1 degree, {rounds} rounds in turn; ns of processor time a sample"]
+    lines.append(f"{'':44}{'median':>9}{'min':>9}{'max':>9}{'times closed form':>19}")
+    for name, of in zip(ways, times, strict=True):
+        lines.append(f"{name:44}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}{of.median / times[0].median:19.2f}")
+    return "\n".join([*lines, *_chain(rounds)]) + absent
+
+
+def _chain(rounds: int, count: int = 1000) -> list[str]:
+    """A long chain: microseconds a sample, and seconds to plan and to compile."""
+    start = perf_counter()
+    plan = compile_plan(fourbar_chain(count))
+    planned = perf_counter()
+    library = Library(plan)
+    ready = perf_counter()
+    u = plan.anchor_values[0][0] + np.linspace(0.0, 1.5, CHAIN_SAMPLES)
+    driven = (u[:, None], np.ones((CHAIN_SAMPLES, 1)), np.zeros((CHAIN_SAMPLES, 1)))
+    tables = [np.empty((CHAIN_SAMPLES, len(plan.outputs)), order="F") for _ in range(3)]
+    (seconds,) = in_turn([lambda: library.sweep(driven, tables)], rounds, process_time)
+    of = spread([value / CHAIN_SAMPLES * 1e6 for value in seconds])
+    return [
+        f"chain of {count} four-bars, q, qd, qdd: {of.median:.1f} us a sample ({of.low:.1f} to {of.high:.1f}); "
+        f"planned in {planned - start:.1f} s, C written and compiled (or found) in {ready - planned:.1f} s"
+    ]
+
+
+def _closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
+    files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
+    library = ctypes.CDLL(str(compiler.shared_library(files | compiler.sources(("sincos.h",)), FLAGS)))
+    ud, udd = np.ones(len(u)), np.zeros(len(u))
+    pointers = [array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in (u, ud, udd)]
+    out = columns.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+    lengths = [ctypes.c_double(length) for length in LENGTHS]
+
+    def way() -> object:
+        library.closed_form(ctypes.c_int64(len(u)), *pointers, *lengths, out)
+        return (u, ud, udd)  # to live as long as what points at them
+
+    return way
+
+
+def _numba_loop(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
+    if find_spec("numba") is None:
+        raise MissingPackageError("numba is not installed: pip install 'kinfmu[bench]'")
+    import numba
+
+    loop: Any = numba.njit(_loop)
+    ground, crank, coupler, rocker = LENGTHS
+    return lambda: loop(u, ground, crank, coupler, rocker, columns)
+
+
+def _loop(u: FloatArray, g: float, a: float, b: float, c: float, columns: FloatArray) -> None:
+    """The closed form, sample after sample, at speed 1."""
+    for i in range(len(u)):
+        s, k = a * np.sin(u[i]), a * np.cos(u[i])
+        dx, dy = g - k, -s
+        square = dx * dx + dy * dy
+        e = 0.5 + 0.5 * (b * b - c * c) / square
+        h = np.sqrt(b * b / square - e * e)
+        qx, qy = e * dx - h * dy, e * dy + h * dx
+        rx, ry = qx - dx, qy - dy
+        det = qx * ry - qy * rx
+        w2, w3 = (s * rx - k * ry) / det, (s * qx - k * qy) / det
+        ax, ay = k + qx * w2 * w2 - rx * w3 * w3, s + qy * w2 * w2 - ry * w3 * w3
+        columns[0, i], columns[1, i], columns[2, i] = u[i], k, s
+        columns[3, i], columns[4, i] = np.arctan2(qy, qx), np.arctan2(ry, rx)
+        columns[5, i], columns[6, i], columns[7, i], columns[8, i], columns[9, i] = 1.0, -s, k, w2, w3
+        columns[10, i], columns[11, i], columns[12, i] = 0.0, -k, -s
+        columns[13, i], columns[14, i] = (ax * rx + ay * ry) / det, (ax * qx + ay * qy) / det
