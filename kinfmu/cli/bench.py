@@ -14,7 +14,7 @@ from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
-MEASUREMENTS = ("accuracy", "sample", "step", "native", "import", "chains")
+MEASUREMENTS = ("accuracy", "sample", "sweep", "step", "native", "import", "chains")
 ALL = "all"
 
 
@@ -64,6 +64,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     accuracy  run time against error of every engine in every setting, and past
               singular points: tables and charts as in docs/accuracy.md
     sample    a sample of solve beside a dense numpy Newton
+    sweep     a sweep by the native engine beside a closed form written by hand
     step      a step of the FMU beside the smallest pythonfmu FMU
     native    a step of the native FMU in a C host beside closed forms by hand
     import    `import kinfmu` beside bare Python
@@ -83,6 +84,10 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             from kinfmu.bench import solve_sample
 
             click.echo(solve_sample.run(**given))
+        elif name == "sweep":
+            from kinfmu.bench import native_sweep
+
+            click.echo(native_sweep.run(**given))
         elif name == "step":
             from kinfmu.bench import fmu_step
 

@@ -19,7 +19,7 @@
 #endif
 
 /* As many lanes as the first caches hold. */
-#define KF_LANES (KF_COORDINATES <= 64 ? 256 : KF_COORDINATES <= 512 ? 32 : 8)
+#define KF_LANES (KF_COORDINATES <= 64 ? 256 : 32)
 
 /* x, x1, x2, outputs: where the numbers of each coordinate and of each output that is a formula go: rooms of their own, or
  * straight into a table.
