@@ -28,7 +28,7 @@ LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gall
 COORDINATES = ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
 
 
-def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
+def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     """A table: nanoseconds of processor time a sample, and how often the closed form's."""
     u = np.linspace(0.0, np.pi / 180.0 * samples, samples, endpoint=False)
     driven = (u[:, None].copy(), np.ones((samples, 1)), np.zeros((samples, 1)))
@@ -37,7 +37,7 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
     tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
     by_samples = [np.empty((samples, 5)) for _ in range(3)]
     ways: dict[str, Callable[[], object]] = {
-        "closed form by hand, laid side by side": _closed_form(u, columns),
+        "closed form by hand, laid side by side": closed_form(u, columns),
         "crank-rocker, q, qd, qdd": lambda: crank_rocker.sweep(driven, tables),
         "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples),
         "the same, q alone": lambda: crank_rocker.sweep(driven, (tables[0], None, None)),
@@ -57,10 +57,10 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
     lines.append(f"{'':44}{'median':>9}{'min':>9}{'max':>9}{'times closed form':>19}")
     for name, of in zip(ways, times, strict=True):
         lines.append(f"{name:44}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}{of.median / times[0].median:19.2f}")
-    return "\n".join([*lines, *_chain(rounds)]) + absent
+    return "\n".join([*lines, *_chain(rounds, loops)]) + absent
 
 
-def _chain(rounds: int, count: int = 1000) -> list[str]:
+def _chain(rounds: int, count: int) -> list[str]:
     """A long chain: microseconds a sample, and seconds to plan and to compile."""
     start = perf_counter()
     plan = compile_plan(fourbar_chain(count))
@@ -78,7 +78,8 @@ def _chain(rounds: int, count: int = 1000) -> list[str]:
     ]
 
 
-def _closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
+def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
+    """Fills columns (15, n): COORDINATES at u (n,), their rates and accelerations, by hand-written C at speed 1."""
     files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
     library = ctypes.CDLL(str(compiler.shared_library(files | compiler.sources(("sincos.h",)), FLAGS)))
     ud, udd = np.ones(len(u)), np.zeros(len(u))

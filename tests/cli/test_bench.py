@@ -7,14 +7,18 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kinfmu import gallery
-from kinfmu.bench import accuracy, case, chains, singular
+from kinfmu.backends.c import compiler
+from kinfmu.bench import accuracy, case, chains, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
+from kinfmu.errors import CompilerError
+from tests import oracle
 from tests.cli.conftest import Command
 
 QUICK = ["kinfmu", "kinfmu native", "generated Python", "scipy fsolve"]
@@ -157,7 +161,7 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, step, native, import, chains, all",
+            "known: accuracy, sample, sweep, step, native, import, chains, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -199,6 +203,35 @@ def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list
     for line, name in zip(rows[-len(lines) :], lines, strict=True):
         assert line.startswith(name)
         assert re.search(r"\d+\.\d", line)
+
+
+def test_a_sweep_is_set_beside_the_closed_form(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    try:
+        compiler.command()
+    except CompilerError as error:
+        pytest.skip(str(error))
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    monkeypatch.setattr("kinfmu.backends.c.library.FLAGS", ("-O1",))
+    monkeypatch.setattr(native_sweep, "FLAGS", ("-O1",))
+    table = native_sweep.run(rounds=1, samples=2000, loops=3)
+    assert table.splitlines()[2].split()[-1] == "1.00"
+    assert "crank-rocker, q, qd, qdd" in table
+    assert "chain of 3 four-bars" in table
+
+
+def test_the_closed_form_by_hand_is_right(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    try:
+        compiler.command()
+    except CompilerError as error:
+        pytest.skip(str(error))
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    u = np.linspace(0.1, 6.0, 50)
+    columns = np.empty((15, 50))
+    native_sweep.closed_form(u, columns)()
+    exact = oracle.fourbar(40, 20, 50, 50, list(u))
+    assert oracle.largest_error(columns[[0, 3, 4]].T, exact.q, modulo_turns=True) < 1e-13
+    assert oracle.largest_error(columns[[5, 8, 9]].T, exact.qd) < 1e-13
+    assert oracle.largest_error(columns[[10, 13, 14]].T, exact.qdd) < 1e-13
 
 
 def test_chains_tell_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
