@@ -42,10 +42,9 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
             ns = [[value / STEPS * 1e9 for value in row] for row in in_turn(ways, rounds, process_time)]
         ratio = spread([a / b for a, b in zip(*ns, strict=True)])
         mine, other = (spread(row).median for row in ns)
-        lines.append(
-            f"{f'FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us':44}{mine:7.0f} ns{other:11.0f} ns{ratio.median:9.2f}"
-            f"{ratio.lower:8.2f} to {ratio.upper:.2f}"
-        )
+        name = f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us"
+        figures = f"{mine:7.0f} ns{other:11.0f} ns{ratio.median:9.2f}{ratio.lower:8.2f} to {ratio.upper:.2f}"
+        lines.append(f"{name:44}{figures}")
     return "\n".join(lines)
 
 

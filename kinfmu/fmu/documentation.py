@@ -23,7 +23,8 @@ unwired: they are then estimated from the samples, with errors that fall with th
 and three samples, of which nothing is known.</p>
 <h2>When a pose cannot be reached</h2>
 <p><code>solver.status</code> says so, outputs keep the last good values, <code>solver.message</code> names driver,
-value and limit, and the next step is Discard. The host may set other inputs and go on. Status: {statuses}.</p>
+value and limit, and the next step is Discard (in FMUs of native code a get of positions, rates and accelerations, too).
+The host may set other inputs and go on. Status: {statuses}.</p>
 <h2>Variables</h2>
 <table>
 <tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th></th></tr>
