@@ -94,7 +94,7 @@ def test_outputs_can_be_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"flavour": "natve"}, "flavour 'natve' is not known; flavours: python"),
+        ({"flavour": "natve"}, "flavour 'natve' is not known; did you mean 'native'.*flavours: python, native"),
         ({"drive": "input"}, "drive = 'input' is not known; did you mean 'inputs'"),
         ({"path": "fourbar.zip"}, r"fourbar\.zip: the file of an FMU ends in \.fmu"),
     ],
