@@ -59,6 +59,7 @@ def _many(seeds: range, family: str | None, jobs: int) -> int:
                     done = report.mechanisms.total()
                     print(f"{done} of {len(tasks)}, {told - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would take the report
             print("interrupted: what was found so far\n")
     command = "scripts/stress" + (f" --family '{family}'" if family else "")
     print("\n".join(report.lines(command)))
