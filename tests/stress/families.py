@@ -38,7 +38,8 @@ class RedrawError(Exception):
 class Draw(Random):
     """A random generator, and the parts of a unit that it draws lengths in."""
 
-    parts = 1000  # decimals, of which most are no doubles; 1024: exact as doubles, sums with whole numbers too
+    parts = 1000
+    finest = 11  # decimals of a small difference
 
 
 def drawn_length(rng: Draw, low: float, high: float) -> Fraction:
@@ -160,10 +161,8 @@ def near_change_points(rng: Draw) -> Sketch:
 
 
 def _gap(rng: Draw) -> Fraction:
-    """A small difference, 1e-11 to 1e-2, either way; where lengths are exact as doubles, so is this."""
-    if rng.parts != 1000:
-        return Fraction(_side(rng), 2 ** rng.randint(8, 28))
-    return Fraction(_side(rng) * rng.randint(1, 9), 10 ** rng.randint(3, 11))
+    """A small difference, 1e-11 to 1e-2, either way; no finer than doubles tell apart where it stands."""
+    return Fraction(_side(rng) * rng.randint(1, 9), 10 ** rng.randint(3, rng.finest))
 
 
 # ------------------------------------------------------------------------------------------------- slider-cranks

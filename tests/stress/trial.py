@@ -219,12 +219,12 @@ def trial(seed: int, family: str | None = None) -> Trial:
 
 def _drawn(rng: Draw, family: str) -> Drawn:
     chance = rng.random()
-    rng.parts = 1024 if chance < FAR_SHARE else 1000
+    rng.finest = 8 if chance < FAR_SHARE else 11
     sketch = FAMILIES[family][0](rng)
     scale = Fraction(10) ** (rng.randint(-6, 6) if rng.random() < 0.25 else 0)
     direction = rng.choice(DIRECTIONS) if rng.random() < 0.5 else DIRECTIONS[0]
     at = (Fraction(0), Fraction(0))
-    if chance < FAR_SHARE:  # so that the doubles there are the lengths as drawn
+    if chance < FAR_SHARE:  # as decimal numbers, which kinfmu takes them for
         scale, direction = Fraction(1), DIRECTIONS[0]
         at = (Fraction(rng.randint(-2_000_000, 2_000_000)), Fraction(rng.randint(-1_000_000, 1_000_000)))
     elif chance < BESIDE_SHARE:
