@@ -26,7 +26,7 @@ from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.mechanism import toml_file
 from kinfmu.plan import SolvePlan
 
-FLAGS = ("-fvisibility=hidden", "-s")  # only FMI's functions are seen from outside
+FLAGS = ("-O3", "-fvisibility=hidden", "-s")  # only FMI's functions are seen from outside
 _COMMON: dict[str, float | bool] = {"needsExecutionTool": False, "canBeInstantiatedOnlyOncePerProcess": False}
 CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
     "2.0": {

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -99,7 +100,7 @@ def test_fmpy_compiles_the_sources_inside_and_the_result_is_the_same(
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="other platforms need ziglang")
 def test_all_platforms_are_compiled_with_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quick = tuple(one for one in PLATFORMS if one.suffix != ".dll")  # zig's first library for windows takes minutes
-    monkeypatch.setattr("kinfmu.fmu.native.archive.PLATFORMS", quick)
+    monkeypatch.setattr(import_module("kinfmu.fmu.native.archive"), "PLATFORMS", quick)
     seen: list[tuple[int, int]] = []
     path = kinfmu.build(
         kinfmu.load("fourbar"),

@@ -100,31 +100,41 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
     return KF_DONE;
 }
 
-kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
+/* A list with the time in it, or with what is no Real variable. */
+static kf_answer get_unusual(kf_instance *instance, const unsigned *references, size_t count, double *values)
 {
-    kf_state *const s = &instance->now;
     kf_answer answer = KF_DONE;
-    unsigned parts = 0;
-    bool times = false;
     size_t k;
-    for (k = 0; k < count; ++k) {
-        const unsigned reference = references[k];
-        if (reference < KF_REALS) {
-            parts |= kf_bit_of[reference];
-        } else if (reference == KF_TIME) {
-            times = true;
+    for (k = 0; answer <= KF_DISCARD && k < count; ++k) {
+        if (references[k] == KF_TIME) {
+            values[k] = instance->now.time;
+        } else if (references[k] < KF_REALS) {
+            const kf_answer one = kf_get_real(instance, &references[k], 1, &values[k]);
+            answer = one > answer ? one : answer;
         } else {
-            return kf_not_a(instance, reference, KF_REAL_WORD);
+            answer = kf_not_a(instance, references[k], KF_REAL_WORD);
         }
     }
-    if (parts & ~KF_GIVEN_PARTS) {
+    return answer;
+}
+
+kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
+{
+    const double *const real = instance->now.real;
+    kf_answer answer = KF_DONE;
+    unsigned parts = 0;
+    size_t k;
+    for (k = 0; k < count; ++k) {
+        parts |= kf_bit_of[references[k] < KF_VARIABLES ? references[k] : KF_VARIABLES];
+    }
+    if (parts & KF_NOT_REAL) {
+        return get_unusual(instance, references, count, values);
+    }
+    if (parts & ~instance->now.known || !KF_GOOD(instance->now.status)) {
         answer = kf_read(instance, parts);
     }
-    for (k = 0; !times && k < count; ++k) {
-        values[k] = s->real[references[k]];
-    }
-    for (k = 0; times && k < count; ++k) {
-        values[k] = references[k] == KF_TIME ? s->time : s->real[references[k]];
+    for (k = 0; k < count; ++k) {
+        values[k] = real[references[k]];
     }
     return answer;
 }
