@@ -163,7 +163,9 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
     lines += [tuple(number[node] for node in group) for group in roots]
     for block in unit:
         rows = tuple(name.rpartition(".")[2] for name in (*block.row_names, *block.assigned_by))
-        lines.append((tuple(own[name] for name in block.coordinates), len(block.unknowns), block.row_scales, rows))
+        lines.append(
+            (tuple(own[name] for name in block.coordinates), len(block.unknowns), block.row_scales, block.usual, rows)
+        )
     return _Form(tuple(lines), nodes, Member(given, tuple(constants), coordinates))
 
 
@@ -206,6 +208,7 @@ def _renamed(block: Block, names: dict[str, str], new: dict[Node, Node]) -> Bloc
         velocity=tuple(new[node] for node in block.velocity),
         acceleration=tuple(new[node] for node in block.acceleration),
         determinant_scale=block.determinant_scale,
+        usual=block.usual,
     )
 
 

@@ -40,6 +40,9 @@ class Block:
     velocity: tuple[Node, ...]
     acceleration: tuple[Node, ...]
     determinant_scale: float  # the largest |determinant| of J met over random poses: what counts as far from singular
+    usual: tuple[
+        float, ...
+    ]  # largest lengths met of the rows (of the columns, if tall) of J of three unknowns and more
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -104,6 +107,7 @@ def build_block(
     one = tracer.graph.constant(1.0)
     columns = [tracer.graph.derivative(residuals, {unknown: one}) for unknown in unknowns]
     jacobian = tuple(zip(*columns, strict=True)) if columns else ()
+    scale, usual = _determinant_scale(jacobian, anchor, system.size)
     return Block(
         assigned=tuple(assigned),
         unknowns=structure.unknowns,
@@ -114,32 +118,40 @@ def build_block(
         jacobian=jacobian,
         velocity=tuple(rates.of(residuals, at_rest=unknowns)),
         acceleration=tuple(rates.second(residuals, unaccelerated=unknowns)),
-        determinant_scale=_determinant_scale(jacobian, anchor, system.size),
+        determinant_scale=scale,
+        usual=usual,
     )
 
 
-def block_determinant(jacobian: NDArray[np.float64]) -> float:
+def block_determinant(jacobian: NDArray[np.float64], usual: Sequence[float]) -> float:
     """What the run time watches as the determinant of a block.
 
     For one and two unknowns det J itself; from three on that of the rows scaled to unit length; for tall J the product
-    of R's diagonal over the column lengths.
+    of R's diagonal over the column lengths. Since scaling hides a row (a column) that vanishes, as where all links of a
+    loop fall in line, both are times its length over the usual one.
     """
     m, k = jacobian.shape
     if m > k:
         lengths = np.linalg.norm(jacobian, axis=0)
-        return float(np.prod(np.abs(np.diag(np.linalg.qr(jacobian, mode="r"))) / np.where(lengths > 0.0, lengths, 1.0)))
+        part = min(1.0, *(lengths / usual))
+        diagonal = np.abs(np.diag(np.linalg.qr(jacobian, mode="r")))
+        return float(part * np.prod(diagonal / np.where(lengths > 0.0, lengths, 1.0)))
     if k > 2:
-        jacobian = jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
+        lengths = np.linalg.norm(jacobian, axis=1)
+        return float(min(1.0, *(lengths / usual)) * np.linalg.det(jacobian / lengths[:, None]))
     return float(np.linalg.det(jacobian))
 
 
-def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], size: float) -> float:
+def _determinant_scale(
+    jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], size: float
+) -> tuple[float, tuple[float, ...]]:
+    """The largest |determinant| over random poses, and the usual lengths of rows or columns."""
     if not jacobian:
-        return 1.0
+        return 1.0, ()
     rng = np.random.default_rng(1989)
-    largest = 0.0
     flat = [entry for row in jacobian for entry in row]
     met = {symbol.name: anchor[symbol.name] for symbol in symbols(flat)}
+    matrices = []
     for sample in range(_DETERMINANT_SAMPLES):
         turned = {
             name: value
@@ -149,6 +161,15 @@ def _determinant_scale(jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, 
             else value + size * rng.uniform(-0.5, 0.5)
             for name, value in met.items()
         }
-        entries = evaluate(flat, turned)
-        largest = max(largest, abs(block_determinant(np.reshape(entries, (len(jacobian), -1)))))
-    return float(f"{largest:.2g}") or 1.0  # a scale: more digits would differ between machines
+        matrices.append(np.reshape(evaluate(flat, turned), (len(jacobian), -1)))
+    m, k = matrices[0].shape
+    usual: tuple[float, ...] = ()
+    if m > k or k > 2:
+        lengths = np.linalg.norm(matrices, axis=1 if m > k else 2).max(axis=0)
+        usual = tuple(_rounded(length) for length in lengths)
+    return _rounded(max(abs(block_determinant(matrix, usual)) for matrix in matrices)), usual
+
+
+def _rounded(scale: float) -> float:
+    """A scale: more digits would differ between machines."""
+    return float(f"{scale:.2g}") or 1.0

@@ -131,7 +131,7 @@ class SolvePlan:
             made_of = [*(number[arg] for arg in node.args), *([] if node.value is None else [node.value])]
             lines.append(f"{k} = {node.op} {' '.join(map(str, made_of))}")
         for block in self.blocks:
-            scales = f"{block.row_scales} {block.determinant_scale!r}"
+            scales = f"{block.row_scales} {block.determinant_scale!r} {block.usual}"
             lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in _nodes(block)]}")
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]

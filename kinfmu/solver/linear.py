@@ -53,6 +53,16 @@ def factor(matrix: Matrix) -> LU:
     return LU(rows, order, scales, determinant)
 
 
+def row_part(matrix: Matrix, usual: tuple[float, ...]) -> float:
+    """The least length of a row over its usual one, at most 1: rows scaled to unit length hide one that vanishes."""
+    return min(1.0, *[sqrt(sum([e * e for e in row])) / u for row, u in zip(matrix, usual, strict=True)])
+
+
+def column_part(matrix: Matrix, usual: tuple[float, ...]) -> float:
+    """The same of the columns, for a tall matrix."""
+    return row_part([list(column) for column in zip(*matrix, strict=True)], usual)
+
+
 def lu_solve(factors: LU, right: list[float]) -> list[float]:
     """x with A x = b from the factors of A."""
     rows, k = factors.lu, len(factors.order)

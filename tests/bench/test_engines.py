@@ -42,7 +42,10 @@ def test_fsolve_is_as_good_as_its_tolerance(case: Case) -> None:
     assert fine <= rough <= 1e-2
 
 
-@pytest.mark.parametrize(("engine", "package"), [(Casadi(), "casadi"), (Pylinkage(), "pylinkage")], ids=["casadi", "pylinkage"])
+PEERS = [(Casadi(), "casadi"), (Pylinkage(), "pylinkage")]
+
+
+@pytest.mark.parametrize(("engine", "package"), PEERS, ids=["casadi", "pylinkage"])
 def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> None:
     pytest.importorskip(package)
     jansen = of_gallery("jansen_leg")

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinfmu.solver.linear import Singular, factor, lu_solve, qr_factor, qr_solve, reciprocal_condition
+from kinfmu.solver.linear import (
+    Singular,
+    column_part,
+    factor,
+    lu_solve,
+    qr_factor,
+    qr_solve,
+    reciprocal_condition,
+    row_part,
+)
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 5, 8])
@@ -30,6 +39,13 @@ def test_least_squares_are_those_of_numpy() -> None:
 def test_matrix_without_a_pivot_is_singular(matrix: list[list[float]]) -> None:
     with pytest.raises(Singular):
         factor(matrix)
+
+
+def test_part_of_a_matrix_is_its_shortest_row_or_column_over_the_usual_one() -> None:
+    matrix = [[3.0, 4.0], [0.6, 0.8]]
+    assert row_part(matrix, (5.0, 2.0)) == pytest.approx(0.5)
+    assert row_part(matrix, (5.0, 0.5)) == 1.0
+    assert column_part([[3.0, 1.0], [4.0, 0.0], [0.0, 0.0]], (10.0, 1.0)) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("k", [2, 3, 4])

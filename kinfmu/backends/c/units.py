@@ -202,7 +202,7 @@ class Units:
         inside += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
         inside.append(f"error = {square(r, block.row_scales)};")
         jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-        inside += self._determinant(jacobian)
+        inside += self._determinant(jacobian, block.usual)
         starts = [f"z[row->{self.own[name]}]" for name in block.unknowns]
         angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
         names = [identifier(name) for name in block.unknowns]
@@ -225,19 +225,22 @@ class Units:
             "}",
         ]
 
-    def _determinant(self, jacobian: Sequence[Sequence[str]]) -> list[str]:
+    def _determinant(self, jacobian: Sequence[Sequence[str]], usual: Sequence[float]) -> list[str]:
         m, k = len(jacobian), len(jacobian[0])
         if m == k <= 2:
             return [f"det = {determinant(jacobian)};"]
         flat = ", ".join(entry for row in jacobian for entry in row)
+        part = f"kf_row_part({k}, matrix, usual)" if m == k else f"kf_column_part({m}, {k}, matrix, usual)"
         call = f"kf_lu({k}, matrix, <kept>, &det)" if m == k else f"kf_qr({m}, {k}, matrix, <kept>, &det)"
         return [
             "{",
             f"    const double matrix[{m * k}] = {{{flat}}};",
+            f"    static const double usual[{k}] = {{{', '.join(map(repr, usual))}}};",
             f"    if (!{call}) {{",
             "        newton->failed = error;",
             "        return false;",
             "    }",
+            f"    det *= {part};",
             "}",
         ]
 

@@ -49,7 +49,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     inside.append(f"error = {square(r, block.row_scales)}")
     jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
     z = [identifier(name) for name in block.unknowns]
-    inside += _determinant(label, jacobian)
+    inside += _determinant(label, jacobian, block.usual)
     # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
     angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
     settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
@@ -73,12 +73,16 @@ def kept_name(block: Block, label: str) -> str:
     return f"det{label}" if is_small(block) else f"factors{label}"
 
 
-def _determinant(label: str, jacobian: Sequence[Sequence[str]]) -> list[str]:
+def _determinant(label: str, jacobian: Sequence[Sequence[str]], usual: Sequence[float]) -> list[str]:
     m, n = len(jacobian), len(jacobian[0])
     if m == n <= 2:
         return [f"det{label} = {determinant(jacobian)}"]
-    factor = "factor" if m == n else "qr_factor"
-    return [f"factors{label} = {factor}({matrix(jacobian)})", f"det{label} = factors{label}.determinant"]
+    factor, part = ("factor", "row_part") if m == n else ("qr_factor", "column_part")
+    return [
+        f"jacobian = {matrix(jacobian)}",
+        f"factors{label} = {factor}(jacobian)",
+        f"det{label} = factors{label}.determinant * {part}(jacobian, {tuple(usual)!r})",
+    ]
 
 
 def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:

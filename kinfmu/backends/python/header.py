@@ -27,7 +27,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
     if curves:
         imports += ["", "from .curve import curve"]
     if large:
-        imports += ["", "from .linear import factor, lu_solve, qr_factor, qr_solve"]
+        imports += ["", "from .linear import column_part, factor, lu_solve, qr_factor, qr_solve, row_part"]
     kinds = tuple(driver.quantity.kind for driver in plan.drivers)
     rows, scales = tuple(b.row_names for b in solved), tuple(b.row_scales for b in solved)
     reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)

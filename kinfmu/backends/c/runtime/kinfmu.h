@@ -102,6 +102,8 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant);
 void kf_lu_solve(int k, const double *factors, const double *right, double *x);
 bool kf_qr(int m, int k, const double *matrix, double *factors, double *determinant);
 void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x);
+double kf_row_part(int k, const double *matrix, const double *usual);
+double kf_column_part(int m, int k, const double *matrix, const double *usual);
 double kf_reciprocal_condition(int m, int k, double *matrix);
 
 #endif

@@ -59,6 +59,38 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
     return true;
 }
 
+/* The least length of a row over what is usual for it, at most 1: rows scaled to unit length hide one that vanishes. */
+double kf_row_part(int k, const double *matrix, const double *usual)
+{
+    double least = 1.0;
+    int i, j;
+    for (i = 0; i < k; ++i) {
+        double square = 0.0, part;
+        for (j = 0; j < k; ++j) {
+            square += matrix[i * k + j] * matrix[i * k + j];
+        }
+        part = sqrt(square) / usual[i];
+        least = part < least ? part : least;
+    }
+    return least;
+}
+
+/* The same of the columns, for a tall matrix (m, k). */
+double kf_column_part(int m, int k, const double *matrix, const double *usual)
+{
+    double least = 1.0;
+    int i, j;
+    for (j = 0; j < k; ++j) {
+        double square = 0.0, part;
+        for (i = 0; i < m; ++i) {
+            square += matrix[i * k + j] * matrix[i * k + j];
+        }
+        part = sqrt(square) / usual[j];
+        least = part < least ? part : least;
+    }
+    return least;
+}
+
 /* x with A x = b from the factors of A. */
 void kf_lu_solve(int k, const double *factors, const double *right, double *x)
 {
