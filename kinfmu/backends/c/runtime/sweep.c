@@ -26,7 +26,7 @@
 #define MOST_MOVED 1e-3      /* correction beyond which two of them do not arrive, nor rotations do */
 #define CLOSED 1e-30         /* squared residual of what has arrived, for angles of some radians */
 #define FARTHEST 1e5         /* [rad]: beyond, the rounding of the angle is lost in lanes */
-#define MOST_NODES 200000    /* on either side of the anchor */
+#define MOST_MEMORY 1e8      /* [bytes] for nodes on either side of the anchor */
 
 /* The quintics of the unknowns between a node and the next. */
 typedef struct {
@@ -298,7 +298,7 @@ static bool is_repeated(kf_sweep *sweep, const kf_node *a, const kf_node *b)
 
 static bool lay_nodes(kf_sweep *sweep, const kf_job *job)
 {
-    const double most = fmin((double)MOST_NODES, FARTHEST / sweep->spacing);
+    const double most = fmin(floor(MOST_MEMORY / sizeof *sweep->intervals), FARTHEST / sweep->spacing);
     kf_node *nodes = malloc(3 * sizeof *nodes);
     double low = 0.0, high = 0.0;
     bool done = nodes != NULL;
