@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
 from kinfmu.backends.c.library import Library
 from kinfmu.plan import SolvePlan
 from kinfmu.run import FloatArray
@@ -35,7 +37,12 @@ class NativeEngine:
 
     def sweep(self, driven: Driven, tables: Tables) -> Swept:
         """Fill the tables; what cannot be reached is NaN there."""
-        told = self._library.sweep(driven, tables, self._parameters, self._tolerance)
+        plain = all(stride > 0 and stride % 8 == 0 for table in tables for stride in table.strides)
+        filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
+        told = self._library.sweep(driven, filled, self._parameters, self._tolerance)
+        for table, values in zip(tables, filled, strict=True):
+            if table is not values:
+                table[:] = values
         late = _Late(self._library, driven, self._parameters, self._tolerance)
         return Swept(
             status=told.status,

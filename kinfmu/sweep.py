@@ -232,4 +232,6 @@ def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]
     for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
         if array.shape != shape or array.dtype != np.float64:
             raise KinfmuError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+        if not array.flags.writeable:
+            raise KinfmuError(f"out: {name} is read-only")
     return out

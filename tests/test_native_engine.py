@@ -10,6 +10,7 @@ import pytest
 import kinfmu
 from kinfmu import gallery, sweep
 from kinfmu.backends.c import compiler, library
+from kinfmu.backends.c.lanes import emit_lanes
 from kinfmu.errors import CompilerError, KinfmuError
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
@@ -147,6 +148,27 @@ def test_without_a_compiler_auto_is_python_and_native_says_why(monkeypatch: pyte
     assert kinfmu.solve(kinfmu.load("fourbar"), [0.0]).info["engine"] == "python"
     with pytest.raises(CompilerError, match="no C compiler"):
         kinfmu.solve(kinfmu.load("fourbar"), [0.0], engine="native")
+
+
+def test_times_and_tables_may_be_views_of_others() -> None:
+    mechanism = kinfmu.load("crank_rocker")
+    t = np.linspace(0.0, 4.0, 3 * SAMPLES)[::3]
+    out = tuple(np.zeros((SAMPLES, 7), dtype=[("a", "f8"), ("b", "i4")])["a"] for _ in range(3))
+    strided = kinfmu.solve(mechanism, t, engine="native", out=out)  # type: ignore[arg-type]
+    plain = kinfmu.solve(mechanism, t.copy(), engine="native")
+    np.testing.assert_array_equal(strided.values, plain.values)
+    np.testing.assert_array_equal(strided.accelerations, plain.accelerations)
+    out[1].flags.writeable = False
+    with pytest.raises(KinfmuError, match="out: rates is read-only"):
+        kinfmu.solve(mechanism, t, engine="native", out=out)  # type: ignore[arg-type]
+
+
+def test_only_what_angles_turn_in_sines_and_cosines_is_taken_to_repeat() -> None:
+    def repeats(name: str) -> bool:
+        return "KF_REPEATS 1" in emit_lanes(compile_plan(kinfmu.load(name)))["lane_sizes.h"]
+
+    assert [repeats(name) for name in ("fourbar", "jansen_leg", "fourbar_chain:3")] == [True, True, True]
+    assert [repeats(name) for name in ("geared_five_bar", "rack_steering", "stephenson_six_bar")] == [False] * 3
 
 
 def driven(u: np.ndarray) -> Driven:

@@ -30,7 +30,8 @@ class Span:
         self.nodes = nodes
         self.held = 0
         for block in range(len(model.BLOCKS)):
-            if min(abs(nodes[2].determinants[block]), abs(nodes[3].determinants[block])) < REGULAR:
+            before, after = nodes[2].determinants[block], nodes[3].determinants[block]
+            if before * after <= 0.0 or min(abs(before), abs(after)) < REGULAR:  # steep ones are regular at both ends
                 self.held |= 1 << block
         self._inner: list[Hermite] | None = None  # made when first read: many bridges are only crossed
         self._outer: list[Hermite] | None = None

@@ -37,6 +37,12 @@ def test_a_loop_that_falls_in_line_inside_a_larger_block_keeps_its_smooth_branch
     assert trial(2548, "six-bars driven at the end").judged().faults == []
 
 
+@pytest.mark.parametrize("seed", [3263, 3583, 6731, 7940])
+def test_a_near_change_point_that_falls_steeply_is_not_bridged(seed: int) -> None:
+    """Half a width beside it the block is regular; it is interpolated all the same, and must prove that it closes."""
+    assert trial(seed, "near change points").judged().faults == []
+
+
 # --------------------------------------------------------------------------------------------------- the oracle
 
 

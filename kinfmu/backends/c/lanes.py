@@ -38,10 +38,43 @@ def has_lanes(plan: SolvePlan) -> bool:
 def emit_lanes(plan: SolvePlan) -> dict[str, str]:
     """Texts of lane_sizes.h and, if the plan has lanes, of lanes.c, by file name."""
     if not has_lanes(plan):
-        return {"lane_sizes.h": "#define KF_HAS_LANES 0\n#define KF_LANE_HOLD 0\n"}
+        return {"lane_sizes.h": "#define KF_HAS_LANES 0\n#define KF_LANE_HOLD 0\n#define KF_REPEATS 0\n"}
     lanes = _Lanes(plan)
-    sizes = f"#define KF_HAS_LANES 1\n#define KF_LANE_HOLD {lanes.holds[-1]}\n"
+    sizes = (
+        f"#define KF_HAS_LANES 1\n#define KF_LANE_HOLD {lanes.holds[-1]}\n#define KF_REPEATS {int(_repeats(plan))}\n"
+    )
     return {"lane_sizes.h": sizes, "lanes.c": lanes.source()}
+
+
+def _repeats(plan: SolvePlan) -> bool:
+    """True if a whole turn of any angle changes nothing: all stand in sines and cosines, but where one is another.
+
+    A gear or a coupling of angles tells how often they have turned: such a plan is not taken to repeat.
+    """
+    angles = {name for block in plan.blocks for name in block.coordinates if name.endswith(".phi")}
+    angles |= {driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"}
+
+    def is_turned(node: Node) -> bool:
+        """An angle, and no more than constants added to it."""
+        while node.op in ("+", "-") and node.args[1].constant is not None:
+            node = node.args[0]
+        while node.op == "+" and node.args[0].constant is not None:
+            node = node.args[1]
+        return node.op == "symbol" and node.name in angles
+
+    rows = [node for block in plan.blocks for node in block.residuals]
+    rows += [m[0] for block in plan.blocks for name, m in block.assigned if not (name in angles and is_turned(m[0]))]
+    found: set[Node] = set()
+    stack = list(rows)
+    while stack:
+        node = stack.pop()
+        if node in found or (node.op in ("sin", "cos") and is_turned(node.args[0])):
+            continue
+        if node.op == "symbol" and node.name in angles:
+            return False
+        found.add(node)
+        stack += node.args
+    return True
 
 
 class _Lanes:
@@ -321,7 +354,8 @@ class _LaneUnit:
             f"det = {determinant(self.jacobian)};",
             "size = fabs(det * factor);",
             "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
-            f"lanes->error[i] += {square(r, block.row_scales)};",
+            f"size = {square(r, block.row_scales)};",
+            "lanes->error[i] = size > lanes->error[i] || size != size ? size : lanes->error[i]; /* a NaN stays */",
             "per_det = 1.0 / det;",
         ]
         return lines + self._given_outright(writer, block)

@@ -93,6 +93,7 @@ class Library:
         self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(n, d) driver values, speeds and accelerations at times; parameters: those of the plan if none."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
         values = parameters or [parameter.value for parameter in self.plan.parameters]
         given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))

@@ -29,7 +29,7 @@ typedef struct {
     double *outputs[3][KF_ROOM(KF_OUTPUTS)];
     double hold[KF_ROOM(KF_LANE_HOLD)][KF_LANES];
     double watches[KF_ROOM(KF_WATCHES)][KF_LANES];
-    double error[KF_LANES];  /* sum of the squared residuals, relative to the size */
+    double error[KF_LANES];  /* largest of the blocks' squared residuals, relative to the size */
     double margin[KF_LANES]; /* smallest |determinant| */
     double moved[KF_LANES];  /* correction of the prediction, in radians and sizes */
     double coordinate_rooms[3][KF_COORDINATES][KF_LANES];

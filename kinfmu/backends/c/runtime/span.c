@@ -45,7 +45,8 @@ void kf_span_hold(kf_span *span, const double *before, const double *after)
 {
     int k;
     for (k = 0; k < KF_BLOCKS; ++k) {
-        span->held[k] = fmin(fabs(before[k]), fabs(after[k])) < KF_REGULAR;
+        span->held[k] = before[k] * after[k] <= 0.0 /* a steep one may be regular at both ends */
+            || fmin(fabs(before[k]), fabs(after[k])) < KF_REGULAR;
     }
 }
 

@@ -6,8 +6,8 @@
  * both, in whatever order samples come, corrected side by side in lanes, and checked: residual, determinants, corrections
  * and rows set aside. What fails a check, or lies beside a singular point or a limit, is solved as if it were alone.
  *
- * Where the driver is an angle and the mechanism is as it was after one turn, but for whole turns of its angles, the nodes
- * of one turn serve all: models with lanes hold bare angles in linear rows only, and these closed at both ends of it.
+ * Where the driver is an angle, all angles stand in sines and cosines, and the mechanism is after one turn as it was but
+ * for whole turns of its angles, the nodes of one turn serve all.
  */
 #include "sweep.h"
 
@@ -25,7 +25,7 @@
 #define SURE 0.05         /* determinant from which samples may be solved side by side: it leaves nine digits of qdd */
 #define MOST_MOVED 1e-3      /* correction beyond which two of them do not arrive, nor rotations do */
 #define CLOSED 1e-30         /* squared residual of what has arrived, for angles of some radians */
-#define FARTHEST 1e5         /* [rad]: beyond, the rounding of the angle is lost in lanes */
+#define FARTHEST 1e5         /* [rad, sizes]: beyond, the rounding of the angle is lost in lanes */
 #define MOST_MEMORY 1e8      /* [bytes] for nodes on either side of the anchor */
 
 /* The quintics of the unknowns between a node and the next. */
@@ -298,7 +298,7 @@ static bool is_repeated(kf_sweep *sweep, const kf_node *a, const kf_node *b)
 
 static bool lay_nodes(kf_sweep *sweep, const kf_job *job)
 {
-    const double most = fmin(floor(MOST_MEMORY / sizeof *sweep->intervals), FARTHEST / sweep->spacing);
+    const double most = fmin(floor(MOST_MEMORY / sizeof *sweep->intervals), FARTHEST * kf_reach[0] / sweep->spacing);
     kf_node *nodes = malloc(3 * sizeof *nodes);
     double low = 0.0, high = 0.0;
     bool done = nodes != NULL;
@@ -311,7 +311,7 @@ static bool lay_nodes(kf_sweep *sweep, const kf_job *job)
         low = place < low ? place : low;
         high = place > high ? place : high;
     }
-    sweep->repeats = kf_driver_is_angle[0] && high - low > NODES && done && make_room(sweep, 0, NODES)
+    sweep->repeats = KF_REPEATS && kf_driver_is_angle[0] && high - low > NODES && done && make_room(sweep, 0, NODES)
         && lay(sweep, NODES, nodes) && is_repeated(sweep, &nodes[0], &nodes[1]);
     if (done && !sweep->repeats) {
         low = floor(fmax(low, -most));
@@ -348,7 +348,7 @@ static void predict(const kf_sweep *sweep, const kf_job *job, int64_t start, int
         double place = (own[i] - begin) * per_spacing;
         turns[i] = __builtin_floor(place * per_turn);
         place -= NODES * turns[i];
-        alone[i] = !((place >= 0.0) & (place < last) & (fabs(own[i]) < FARTHEST));
+        alone[i] = !((place >= 0.0) & (place < last) & (fabs(own[i]) < FARTHEST * kf_reach[0]));
         place = alone[i] ? 0.0 : place;
         number[i] = (int32_t)place;
         x[i] = place - (double)number[i];
@@ -374,10 +374,14 @@ static void predict(const kf_sweep *sweep, const kf_job *job, int64_t start, int
 }
 
 /* Keep a sample for later; false if memory ran out. */
-static bool leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
+static bool leave(kf_sweep *sweep, kf_job *job, int64_t sample)
 {
     const double u = job->u[sample];
     kf_left *one;
+    if (!isfinite(u)) { /* no place in the order */
+        put_gap(job, sample, KF_OUTSIDE);
+        return true;
+    }
     if (sweep->alone_count == sweep->alone_room) {
         const int64_t room = 2 * sweep->alone_room + 1024;
         kf_left *const more = realloc(sweep->alone, (size_t)room * sizeof *more);
@@ -388,7 +392,7 @@ static bool leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
         sweep->alone_room = room;
     }
     one = &sweep->alone[sweep->alone_count++];
-    one->turns = sweep->repeats && fabs(u) < FARTHEST ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
+    one->turns = sweep->repeats && fabs(u) < FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
     one->u = one->turns == 0.0 ? u : kf_turned(u, -one->turns);
     one->sample = sample;
     return true;
@@ -432,6 +436,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     const double tolerance = sweep->solver.tolerance;
     kf_lanes *const lanes = sweep->lanes;
     const double *const u = job->u + start;
+    const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
     int32_t alone[KF_LANES];
     int i, k, passes, open = 0, left = 0;
     point(&job->tables[0], start, kf_outputs_places, lanes->x, lanes->outputs[0], lanes->coordinate_rooms[0],
@@ -448,7 +453,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
         for (i = 0; i < KF_LANES; ++i) {
             const double margin = lanes->margin[i], moved = lanes->moved[i];
             alone[i] |= !((margin >= SURE) & (KF_TRUST * moved <= margin) & (moved <= MOST_MOVED));
-            open += !(alone[i] | (lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i])));
+            open += !(alone[i] | (lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i] * per_square)));
         }
         if (open == 0) {
             break;
@@ -456,7 +461,7 @@ static bool solve_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     }
     KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
-        alone[i] |= !(lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i]));
+        alone[i] |= !(lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i] * per_square));
         job->status[start + i] = KF_OK;
         job->iterations[start + i] = open == 0 ? passes : passes - 1;
         job->residual[start + i] = sqrt(lanes->error[i]);
@@ -519,8 +524,8 @@ static void solve_those_left(kf_sweep *sweep, kf_job *job)
     solve_on_one_side(sweep, job, middle - 1, -1);
     for (k = 0; k < job->count; ++k) { /* again, for the message */
         if (!KF_GOOD((kf_status)job->status[k]) && (k == 0 || KF_GOOD((kf_status)job->status[k - 1]))) {
-            if (job->failure_count < job->most_failures) {
-                solve_alone(sweep, job, k, 0.0);
+            if (job->failure_count < job->most_failures && solve_alone(sweep, job, k, 0.0)) {
+                continue;
             }
             tell_failure(sweep, job, k);
         }
