@@ -10,19 +10,18 @@ import re
 from collections.abc import Sequence
 from itertools import accumulate
 
-from kinfmu.backends.alike import Kind, positions, runs_of
+from kinfmu.backends.alike import Kind, positions
 from kinfmu.backends.c.text import array, assigned, declared
-from kinfmu.backends.c.units import places, row_type, rows_of
+from kinfmu.backends.c.units import placed, places, row_type, rows_of
+from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.newton import determinant, is_small, opposite_solution, solution, square
-from kinfmu.backends.parametric import parametric
 from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.plan.trace import is_parameter, parameter_symbol
+from kinfmu.plan.trace import is_parameter
 
 CORRECTIONS = 1  # of a good prediction; the sweep corrects once more where that does not do
-LISTS = ("x", "x1", "x2")
 _VECTORS = {"sin": "kf_sin", "cos": "kf_cos"}
 _BRANCHING = ("curve", "atan2", "floor")
 
@@ -77,33 +76,15 @@ def _repeats(plan: SolvePlan) -> bool:
     return True
 
 
-class _Lanes:
+class _Lanes(Lists):
     def __init__(self, plan: SolvePlan) -> None:
-        self.plan = plan
+        super().__init__(plan)
         self.names = Names((name for block in plan.blocks for name in block.coordinates), functions=_VECTORS)
-        _, derived = parametric(plan)
-        self.derived = {node: k for k, node in enumerate(derived)}
-        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
-        self.runs = runs_of(plan.blocks, self._rate_of)
-        given_outright = [name for block in plan.blocks for name, _ in block.assigned]
-        order = [*plan.unknowns, *given_outright, *(driver.inputs[0] for driver in plan.drivers)]
-        self.place = {name: k for k, name in enumerate(order)}
-        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
-        kinds = {run.kind.label: run.kind for run in self.runs}
-        self.units = {k: _LaneUnit(kind, self.parameters, self.derived, plan.size) for k, kind in kinds.items()}
-        self.home = {  # nodes of units that are alone in their kind -> number of their run
-            node: number
-            for number, run in enumerate(self.runs, start=1)
-            if len(run.members) == 1 and not run.kind.constants
-            for node in self.units[run.kind.label].positions
-            if node.args and node not in self.derived
-        }
-        readers = [self._outputs(k) for k in range(3)] + [self._watches()]  # they say what is handed on
+        self.units = {k: _LaneUnit(kind, self.parameters, self.derived, plan.size) for k, kind in self.kinds.items()}
+        self.taken = self.home({label: units.positions for label, units in self.units.items()})
+        readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # they say what is handed on
         self.holds = [0, *accumulate(len(self.units[run.kind.label].hold) for run in self.runs)]
-        self.readers = [self._placed(line) for lines in readers for line in lines]
-
-    def _rate_of(self, name: str, order: int) -> str:
-        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+        self.readers = [placed(line, self.holds) for lines in readers for line in lines]
 
     def source(self) -> str:
         factors = [1.0 / block.determinant_scale for block in self.plan.blocks if block.unknowns]
@@ -117,7 +98,7 @@ class _Lanes:
                 *(array("static double determinant_factors", factors) if factors else ()),
                 "",
                 *(line for units in self.units.values() for line in units.source()),
-                *(line for k, run in enumerate(self.runs, start=1) for line in rows_of(k, run, self.place)),
+                *(line for k, run in self.numbered() for line in rows_of(k, run, self.place)),
                 *self.readers,
                 *self._solve(),
             ]
@@ -125,7 +106,7 @@ class _Lanes:
 
     def _solve(self) -> list[str]:
         lines = []
-        for number, run in enumerate(self.runs, start=1):
+        for number, run in self.numbered():
             many = len(run.members) > 1
             row, hold = f"&run_{number}[{'k' if many else 0}]", f"lanes->hold + {self.holds[number - 1]}"
             factor = f", determinant_factors[{run.first}{' + k' * many}]" if run.kind.solved else ""
@@ -161,19 +142,15 @@ class _Lanes:
             "",
         ]
 
-    def _placed(self, line: str) -> str:
-
-        return re.sub(r"<(\d+):(\d+)>", lambda match: str(self.holds[int(match[1]) - 1] + int(match[2])), line)
-
     def _loop(self, name: str, lines: Sequence[str], writer: Writer) -> list[str]:
         """A function that goes through the lanes."""
-        where = {self._rate_of(one, k): f"{LISTS[k]}[{at}]" for one, at in self.place.items() for k in range(3)}
+        where = {name: f"{LISTS[k]}[{at}]" for k in range(3) for name, at in self.stands(k).items()}
         loads = []
         for node in writer.used:
             if node in self.derived:
                 source = f"model->derived[{self.derived[node]}]"
-            elif node in self.home:
-                number = self.home[node]
+            elif node in self.taken:
+                number = self.taken[node]
                 source = f"lanes->hold[<{number}:{self.units[self.runs[number - 1].kind.label].handed_on(node)}>][i]"
             elif is_parameter(node):
                 source = f"model->parameters[{self.parameters[node.name]}]"
@@ -193,25 +170,16 @@ class _Lanes:
             "",
         ]
 
-    def _outputs(self, order: int) -> list[str]:
+    def _formulas(self, order: int) -> list[str]:
         """The outputs that are formulas; those that are coordinates are taken from where they stand."""
-        where = {self._rate_of(name, order) for name in self.place}
-        writer = Writer(self.names, [*self.derived, *self.home])
-        targets = [
-            (k, motion[1:][order])
-            for k, motion in enumerate(self.plan.outputs_motion)
-            if not (
-                isinstance(motion[1:][order], Node)
-                and motion[1:][order].op == "symbol"
-                and motion[1:][order].name in where
-            )
-        ]
+        writer = Writer(self.names, [*self.derived, *self.taken])
+        targets = [(k, node) for k, (node, place) in enumerate(self.outputs(order)) if place is None]
         lines = [f"{line};" for line in writer.statements([node for _, node in targets])]
         lines += [f"lanes->outputs[{order}][{k}][i] = {writer.expression(node)};" for k, node in targets]
         return self._loop(("outputs", "rates", "accelerations")[order], lines, writer)
 
     def _watches(self) -> list[str]:
-        writer = Writer(self.names, [*self.derived, *self.home])
+        writer = Writer(self.names, [*self.derived, *self.taken])
         targets = [node for _, node in self.plan.watches]
         lines = [f"{line};" for line in writer.statements(targets)]
         lines += [f"lanes->watches[{k}][i] = {writer.expression(node)};" for k, node in enumerate(targets)]

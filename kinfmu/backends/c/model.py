@@ -10,15 +10,13 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
-from kinfmu.backends.alike import Run, runs_of
 from kinfmu.backends.c.text import array, assigned, booleans, declared, string
-from kinfmu.backends.c.units import LISTS, Units, rows_of
-from kinfmu.backends.parametric import parametric
+from kinfmu.backends.c.units import Units, placed, rows_of
+from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
-from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.trace import is_parameter, parameter_symbol
+from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.continuation import NO_NUMBER
 from kinfmu.solver.curve import CurveData
 
@@ -29,39 +27,20 @@ def emit(plan: SolvePlan) -> dict[str, str]:
     return {"sizes.h": model.sizes(), "model.c": model.source()}
 
 
-class _Model:
+class _Model(Lists):
     def __init__(self, plan: SolvePlan) -> None:
-        self.plan = plan
+        super().__init__(plan)
         data = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
         self.curves: dict[CurveData, str] = {one: f"&curve_{k}" for k, one in enumerate(data, start=1)}
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
-        _, derived = parametric(plan)
-        self.derived = {node: k for k, node in enumerate(derived)}
-        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
-        self.runs = runs_of(plan.blocks, self._rate_of)
         self.solved = [block for block in plan.blocks if block.unknowns]
-        given_outright = [name for block in plan.blocks for name, _ in block.assigned]
-        self.order = [*plan.unknowns, *given_outright, *(driver.inputs[0] for driver in plan.drivers)]
-        self.place = {name: k for k, name in enumerate(self.order)}
-        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
-        kinds = {run.kind.label: run.kind for run in self.runs}
-        self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in kinds.items()}
-        self.home = {  # of the nodes of units that are alone in their kind
-            node: number
-            for number, run in self._numbered()
-            if len(run.members) == 1 and not run.kind.constants
-            for node in self.units[run.kind.label].positions
-            if node.args and node not in self.derived
-        }
-        readers = [self._outputs(order) for order in range(3)] + [self._watches()]  # they say what is handed on
+        self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in self.kinds.items()}
+        self.taken = self.home({label: units.positions for label, units in self.units.items()})
+        readers = [self._written(order) for order in range(3)] + [self._watches()]  # they say what is handed on
         self.unit_sources = {label: units.source() for label, units in self.units.items()}
         rooms = [len(run.members) * self.units[run.kind.label].room() for run in self.runs]
         self.holds = [0, *accumulate(rooms)]  # where the numbers that each run hands on stand
-        self.readers = [self._placed(line) for lines in readers for line in lines]
-
-    def _rate_of(self, name: str, order: int) -> str:
-        """Name of a derivative of a coordinate or of a driver's value."""
-        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+        self.readers = [placed(line, self.holds) for lines in readers for line in lines]
 
     def sizes(self) -> str:
         """sizes.h."""
@@ -114,7 +93,7 @@ class _Model:
             "} kf_newton;",
             "",
             *(line for source in self.unit_sources.values() for line in source),
-            *(line for number, run in self._numbered() for line in rows_of(number, run, self.place)),
+            *(line for number, run in self.numbered() for line in rows_of(number, run, self.place)),
             *self._drive(),
             *self._bind(),
             *self._position(),
@@ -126,9 +105,6 @@ class _Model:
             *self._entries("residuals"),
         ]
         return "\n".join(lines) + "\n"
-
-    def _numbered(self) -> list[tuple[int, Run]]:
-        return list(enumerate(self.runs, start=1))
 
     def _names(self) -> list[str]:
         plan = self.plan
@@ -276,7 +252,7 @@ class _Model:
             "    x[KF_COORDINATES - KF_DRIVERS + k] = u[k];",
             "}",
         ]
-        for number, run in self._numbered():
+        for number, run in self.numbered():
             label, room = run.kind.label, self.units[run.kind.label].room()
             start = self.holds[number - 1]
             place = f"hold + {start} + k * {room}" if len(run.members) > 1 else f"hold + {start}"
@@ -346,7 +322,7 @@ class _Model:
             f"    {out}[KF_COORDINATES - KF_DRIVERS + k] = {driver}[k];",
             "}",
         ]
-        for number, run in self._numbered():
+        for number, run in self.numbered():
             room, start, many = self.units[run.kind.label].room(), self.holds[number - 1], len(run.members) > 1
             arguments = [f"&run_{number}[{'k' if many else 0}]", "x", f"hold + {start}{f' + k * {room}' * many}"]
             if run.kind.solved:
@@ -357,29 +333,21 @@ class _Model:
         return [signature, "{", *(f"    {line}" for line in [*lines[:3], *(f"(void){u};" for u in unused), *lines[3:]]),
                 "}", ""]  # fmt: skip
 
-    def _placed(self, line: str) -> str:
-        """A statement with the place of what it takes from a unit: '<3:7>' is number 7 of what run 3 hands on."""
-        return re.sub(r"<(\d+):(\d+)>", lambda match: str(self.holds[int(match[1]) - 1] + int(match[2])), line)
-
     def _expressions(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
         """Expressions of the targets, and the statements before them."""
-        writer = Writer(self.names, [*self.derived, *self.home])
+        writer = Writer(self.names, [*self.derived, *self.taken])
         body = [f"{line};" for line in writer.statements(targets)]
         expressions = [writer.expression(node) for node in targets]
         return expressions, [*self._loads(writer), *body]
 
     def _loads(self, writer: Writer) -> list[str]:
-        where = {
-            self._rate_of(name, order): f"{_SOURCES[order]}[{k}]"
-            for name, k in self.place.items()
-            for order in range(3)
-        }
+        where = {name: f"{_SOURCES[order]}[{k}]" for order in range(3) for name, k in self.stands(order).items()}
         lines = []
         for node in writer.used:
             if node in self.derived:
                 lines.append(f"{self.names.of(node)} = model->derived[{self.derived[node]}];")
-            elif node in self.home:
-                number = self.home[node]
+            elif node in self.taken:
+                number = self.taken[node]
                 place = self.units[self.runs[number - 1].kind.label].handed_on(node)
                 lines.append(f"{self.names.of(node)} = found->hold[<{number}:{place}>];")
             elif is_parameter(node):
@@ -388,15 +356,14 @@ class _Model:
                 lines.append(f"{identifier(node.name)} = {where[node.name]};")
         return lines
 
-    def _outputs(self, order: int) -> list[str]:
-        where = {self._rate_of(name, order): k for name, k in self.place.items()}
-        wanted = [motion[1:][order] for motion in self.plan.outputs_motion]
-        told = [isinstance(node, Node) and node.op == "symbol" and node.name in where for node in wanted]
-        formulas = [node for node, plain in zip(wanted, told, strict=True) if not plain]
-        expressions, lines = self._expressions(formulas)
+    def _written(self, order: int) -> list[str]:
+        """The function of the outputs of an order: some stand in a list, others are formulas."""
+        wanted = self.outputs(order)
+        expressions, lines = self._expressions([node for node, place in wanted if place is None])
         out = ("outputs", "rates", "accelerations")[order]
-        places = [where[node.name] if plain else -1 for node, plain in zip(wanted, told, strict=True)]
-        table = array(f"int kf_{out}_places", places)
+        table = array(f"int kf_{out}_places", [-1 if place is None else place for _, place in wanted])
+        rest = [k for k, (_, place) in enumerate(wanted) if place is None]
+        is_copied = len(rest) < len(wanted)
         copying = [
             "for (k = 0; k < KF_OUTPUTS; ++k) {",
             f"    if (kf_{out}_places[k] >= 0) {{",
@@ -404,14 +371,13 @@ class _Model:
             "    }",
             "}",
         ]
-        rest = [k for k, plain in enumerate(told) if not plain]
-        lines += copying if any(told) else []
+        lines += copying if is_copied else []
         lines += [f"{out}[{k}] = {text};" for k, text in zip(rest, expressions, strict=True)]
         name = ("kf_outputs", "kf_output_rates", "kf_output_accelerations")[order]
         lists = "".join(f" const double *{one}," for one in LISTS[1 : order + 1])
         signature = f"void {name}(const kf_model *model, const kf_found *found,{lists}\n    double *{out})"
         unused = _unused(lines, "model", "found", *LISTS[1 : order + 1])
-        return [*table, "", *self._function(signature, lines, unused, ["int k;"] if any(told) else ())]
+        return [*table, "", *self._function(signature, lines, unused, ["int k;"] if is_copied else ())]
 
     def _watches(self) -> list[str]:
         expressions, lines = self._expressions([node for _, node in self.plan.watches])
@@ -429,7 +395,7 @@ class _Model:
         """kf_jacobian or kf_residuals: numbers of one block."""
         lines = ["const double *const x = found->x;", "const double *const hold = found->hold;"]
         calls = []
-        for number, run in self._numbered():
+        for number, run in self.numbered():
             if run.kind.solved:
                 room, start, count = self.units[run.kind.label].room(), self.holds[number - 1], len(run.members)
                 k = f"block - {run.first}"

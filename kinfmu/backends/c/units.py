@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.backends.alike import Kind, Run, positions
 from kinfmu.backends.c.text import assigned, declared
+from kinfmu.backends.lists import LISTS
 from kinfmu.backends.newton import (
     ITERATIONS,
     ROUND_OFF,
@@ -32,8 +33,6 @@ from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.curve import CurveData
-
-LISTS = ("x", "x1", "x2")
 
 
 class Units:
@@ -356,3 +355,11 @@ def rows_of(number: int, run: Run, place: Mapping[str, int]) -> list[str]:
         told = f" /* {', '.join(member.own)} */"
         rows.append(f"    {{{', '.join([*given, *map(repr, member.constants), *own])}}},{told}")
     return [f"static const row{run.kind.label} run_{number}[{len(rows)}] = {{", *rows, "};", ""]
+
+
+def placed(line: str, holds: Sequence[int]) -> str:
+    """A statement with the place of what it takes from a unit: '<3:7>' is number 7 of what run 3 hands on.
+
+    holds: where the numbers that each run hands on begin.
+    """
+    return re.sub(r"<(\d+):(\d+)>", lambda match: str(holds[int(match[1]) - 1] + int(match[2])), line)

@@ -1,23 +1,21 @@
 """The model module of a plan of many blocks: coordinates stand in lists, alike blocks are loops over tables.
 
 Unrolled, such a plan would be functions of tens of thousands of statements and names, which are slow to compile and
-fall out of the processor's caches. The lists hold the unknowns first, in the order of z, then the coordinates that are
-given outright, then the drivers: x their positions, x1 their rates, x2 their accelerations.
+fall out of the processor's caches. What stands where in the lists is told in kinfmu.backends.lists.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.backends.alike import Run, runs_of
-from kinfmu.backends.parametric import parametric
+from kinfmu.backends.alike import Run
+from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.python.binding import bound
 from kinfmu.backends.python.block_code import indented, tupled
 from kinfmu.backends.python.header import curve_names, drive, header
-from kinfmu.backends.python.loops import LISTS, Loops
+from kinfmu.backends.python.loops import Loops
 from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node
-from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan
 
 
@@ -26,35 +24,22 @@ def looped(plan: SolvePlan) -> str:
     return _Looped(plan).module()
 
 
-class _Looped:
+class _Looped(Lists):
     def __init__(self, plan: SolvePlan) -> None:
-        self.plan = plan
+        super().__init__(plan)
         self.curves = curve_names(plan)
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
-        _, self.prolog = parametric(plan)
-        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
-        self.runs = runs_of(plan.blocks, self._rate_of)
-        assigned = [name for block in plan.blocks for name, _ in block.assigned]
-        self.order = [*plan.unknowns, *assigned, *(driver.inputs[0] for driver in plan.drivers)]
-        self.place = {name: k for k, name in enumerate(self.order)}
-        self.moving = {  # symbol -> where its number stands
-            self._rate_of(name, order): f"{LISTS[order]}[{k}]" for name, k in self.place.items() for order in range(3)
-        }
+        self.moving = {name: f"{LISTS[order]}[{k}]" for order in range(3) for name, k in self.stands(order).items()}
         self.alone = len(plan.drivers) == 1
-        self.unknowns, self.assigned = len(plan.unknowns), len(assigned)
-
-    def _rate_of(self, name: str, order: int) -> str:
-        """Name of a derivative of a coordinate or of a driver's value."""
-        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+        self.unknowns = len(plan.unknowns)
 
     def module(self) -> str:
-        kinds = {run.kind.label: run.kind for run in self.runs}
         with_parameters = bool(self.plan.parameters)
         functions = [
             *drive(self.plan, self.curves),
             *(
                 line
-                for kind in kinds.values()
+                for kind in self.kinds.values()
                 for line in Loops(kind, self.curves).source(with_residuals=with_parameters)
             ),
             *self._position(),
@@ -71,21 +56,21 @@ class _Looped:
         ]
         if with_parameters:
             functions += self._appended("residuals", "Residuals of each block, relative to the size.", "residual")
-            functions = bound(self.plan, self.names, self.prolog, functions)
-        gathers = any(_is_long(self._outputs(order)[1]) for order in range(3))
+            functions = bound(self.plan, self.names, list(self.derived), functions)
+        gathers = any(_is_long(self._gathered(order)[1]) for order in range(3))
         head = header(self.plan, self.curves, extra=("from operator import itemgetter",) if gathers else ())
         return "\n".join([*head, *self._tables(), *functions]) + "\n"
 
     def _tables(self) -> list[str]:
         """Rows of each run, the factors of the determinants, and the places of the outputs."""
         solved = [block for block in self.plan.blocks if block.unknowns]
-        lines = [f"REST = (0.0,) * {self.assigned}  # room for the coordinates that are given outright"]
+        lines = [f"REST = (0.0,) * {self.given_outright}  # room for the coordinates that are given outright"]
         lines += [f"DETERMINANT_FACTORS = {tuple(1.0 / block.determinant_scale for block in solved)!r}"]
         for order, name in enumerate(_GATHERS):
-            places = self._outputs(order)[1]
+            places = self._gathered(order)[1]
             if _is_long(places):
                 lines.append(f"{name} = itemgetter{tuple(places)!r}")
-        for number, run in enumerate(self.runs, start=1):
+        for number, run in self.numbered():
             given = [[self.place[name] for name in member.given] for member in run.members]
             rows = [
                 (*places, *member.constants, *(self.place[name] for name in member.own))
@@ -97,10 +82,7 @@ class _Looped:
 
     def _values(self) -> list[str]:
         """What the position hands on, as later functions take it."""
-        return [f"    {tupled(['x', *(f'holds{k}' for k, _ in self._numbered())])} = values"]
-
-    def _numbered(self) -> list[tuple[int, Run]]:
-        return list(enumerate(self.runs, start=1))
+        return [f"    {tupled(['x', *(f'holds{k}' for k, _ in self.numbered())])} = values"]
 
     def _position(self) -> list[str]:
         lines = [
@@ -112,7 +94,7 @@ class _Looped:
             "    x = [*predicted, *REST, *u]",
             "    determinants, largest, iterations = [], 0.0, 0",
         ]
-        for k, run in self._numbered():
+        for k, run in self.numbered():
             label = run.kind.label
             if run.kind.solved:
                 arguments = f"RUN_{k}, x, z, held, {run.first}, determinants, largest, iterations"
@@ -138,14 +120,14 @@ class _Looped:
             if rows
             else "0.0"
         )
-        values = tupled(["x", *(f"holds{k}" for k, _ in self._numbered())])
+        values = tupled(["x", *(f"holds{k}" for k, _ in self.numbered())])
         lines.append(f"    watch = {watch}")
         summary = f"found, determinants, {margin}, sqrt(largest), iterations, {moved}, watch"
         return [*lines, f"    return {summary}, {values}", ""]
 
     def _expressions(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
         """Expressions of the targets, and the statements before them, which take from the lists what they need."""
-        writer = Writer(self.names, self.prolog)
+        writer = Writer(self.names, self.derived)
         body = writer.statements(targets)
         expressions = [writer.expression(node) for node in targets]
         names = [node.name for node in writer.used if node.op == "symbol" and node.name in self.moving]
@@ -159,7 +141,7 @@ class _Looped:
         """Calls that fill x1 (order 1) or x2 (order 2), block after block."""
         lists = ", ".join(LISTS[1 : order + 1])
         lines = []
-        for k, run in self._numbered():
+        for k, run in self.numbered():
             if run.kind.solved:
                 name = ("velocity", "acceleration")[order - 1]
                 lines.append(f"    {name}{run.kind.label}(RUN_{k}, holds{k}, {lists}, {given}, {run.first})")
@@ -234,8 +216,8 @@ class _Looped:
 
     def _carried(self) -> list[str]:
         """Rates and accelerations of all coordinates from those of the unknowns."""
-        first = [line for k, run in self._numbered() for line in self._carrying(1, k, run)]
-        second = [line for k, run in self._numbered() for line in self._carrying(2, k, run)]
+        first = [line for k, run in self.numbered() for line in self._carrying(1, k, run)]
+        second = [line for k, run in self.numbered() for line in self._carrying(2, k, run)]
         return [
             "",
             "def carried(values, ud, zd):",
@@ -255,23 +237,18 @@ class _Looped:
             "",
         ]
 
-    def _outputs(self, order: int) -> tuple[list[Node], list[int]]:
+    def _gathered(self, order: int) -> tuple[list[Node], list[int]]:
         """Outputs of an order that are formulas, and the place of each output in its list with those appended."""
-        where = {self._rate_of(name, order): k for name, k in self.place.items()}
         formulas: list[Node] = []
         places = []
-        for motion in self.plan.outputs_motion:
-            node: Node = motion[1:][order]
-            if node.op == "symbol" and node.name in where:
-                places.append(where[node.name])
-            else:
-                places.append(len(self.order) + len(formulas))
-                formulas.append(node)
+        for node, place in self.outputs(order):
+            places.append(len(self.order) + len(formulas) if place is None else place)
+            formulas += [node] if place is None else []
         return formulas, places
 
     def _row(self, orders: Sequence[int]) -> list[str]:
         """The end of a function that returns the outputs of some orders, one after another."""
-        wanted = [self._outputs(order) for order in orders]
+        wanted = [self._gathered(order) for order in orders]
         expressions, lines = self._expressions([node for formulas, _ in wanted for node in formulas])
         parts = []
         for order, (formulas, places) in zip(orders, wanted, strict=True):
@@ -323,7 +300,7 @@ class _Looped:
 
     def _appended(self, name: str, docstring: str, one: str) -> list[str]:
         calls = [
-            f"    {one}{run.kind.label}(RUN_{k}, holds{k}, found)" for k, run in self._numbered() if run.kind.solved
+            f"    {one}{run.kind.label}(RUN_{k}, holds{k}, found)" for k, run in self.numbered() if run.kind.solved
         ]
         return [
             "",

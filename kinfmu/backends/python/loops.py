@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.backends.alike import Kind, positions
+from kinfmu.backends.lists import LISTS
 from kinfmu.backends.python.block_code import (
     assigned_lines,
     indented,
@@ -32,8 +33,6 @@ from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.curve import CurveData
-
-LISTS = ("x", "x1", "x2")  # coordinates, their rates, their accelerations
 
 
 class Loops:
@@ -200,5 +199,3 @@ class Loops:
 
 _HOLD = "<hold>"
 _HELD = "held and held >> number & 1"  # as a rule nothing is held
-
-__all__ = ["LISTS", "Loops"]
