@@ -9,13 +9,14 @@ import numpy as np
 from kinfmu.errors import LogError, MissingPackageError, listed
 from kinfmu.log.record import description
 from kinfmu.log.target import replacing
-from kinfmu.run import Run
+from kinfmu.run import Column, Run
 
 
 def write_table(run: Run, path: str | Path) -> None:
     """Write all columns of `run` to a .csv, .parquet or .npz file.
 
-    CSV: one line of names, then one a sample; numbers read back to the same bits, a sample without numbers says nan.
+    CSV: one line of names, then one a sample; numbers read back to the same bits, but -0.0, which is written as 0.0; a
+    sample without numbers says nan.
     Nothing but names and numbers, so that `pandas.read_csv(path)` does; Parquet (metadata of fields and table) and npz
     (`kinfmu.units` beside `kinfmu.columns`) carry the units and the mechanism too.
     """
@@ -27,8 +28,13 @@ def write_table(run: Run, path: str | Path) -> None:
         writers[suffix](run, temporary)
 
 
+def _columns(run: Run) -> list[Column]:
+    """The run's columns without negative zeros, which mean nothing to who reads a table."""
+    return [column._replace(values=column.values + 0) for column in run.columns()]
+
+
 def _write_csv(run: Run, path: Path) -> None:
-    columns = list(run.columns())
+    columns = _columns(run)
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(_quoted(column.name) for column in columns) + "\n")
         rows = zip(*(column.values.tolist() for column in columns), strict=True)
@@ -47,7 +53,7 @@ def _write_parquet(run: Run, path: Path) -> None:
     except ImportError:
         raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
 
-    columns = list(run.columns())
+    columns = _columns(run)
     about = description(run) | {"mechanism": run.mechanism_text} | {f"info.{k}": v for k, v in run.info.items()}
     schema = pa.schema(
         [
@@ -61,7 +67,7 @@ def _write_parquet(run: Run, path: Path) -> None:
 
 
 def _write_npz(run: Run, path: Path) -> None:
-    columns = list(run.columns())
+    columns = _columns(run)
     texts = {
         "kinfmu.columns": np.array([column.name for column in columns]),
         "kinfmu.units": np.array([column.unit for column in columns]),

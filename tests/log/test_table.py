@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ def test_parquet_carries_units_and_mechanism(run_with_gap: Run, tmp_path: Path) 
     table = parquet.read_table(tmp_path / "run.parquet")
     for column in run_with_gap.columns():
         assert table.schema.field(column.name).metadata == {b"unit": column.unit.encode()}
-        assert table[column.name].to_numpy().tobytes() == np.ascontiguousarray(column.values).tobytes()
+        assert table[column.name].to_numpy().tobytes() == (column.values + 0).tobytes()
     assert table.schema.metadata[b"kinfmu.mechanism"].decode() == run_with_gap.mechanism_text
     assert table.schema.field("coupler.vx").metadata == {b"unit": b"m/s"}
 
@@ -57,6 +58,22 @@ def test_npz_carries_units(any_run: Run, tmp_path: Path) -> None:
         for column in any_run.columns():
             np.testing.assert_array_equal(file[column.name], column.values)
         assert str(file["kinfmu.mechanism"]) == any_run.mechanism_text
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_negative_zeros_are_written_as_zero(suffix: str, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / f"run{suffix}"
+    write_table(dataclasses.replace(run, values=np.where(run.values == 0.0, -0.0, run.values)), path)
+    if suffix == ".csv":
+        assert "-0.0," not in path.read_text()
+        return
+    if suffix == ".npz":
+        with np.load(path) as file:
+            column = file["coupler.phi"]
+    else:
+        column = pytest.importorskip("pyarrow.parquet").read_table(path)["coupler.phi"].to_numpy()
+    assert not column.any()
+    assert not np.signbit(column).any()
 
 
 def test_an_unknown_kind_of_table_is_refused(run: Run, tmp_path: Path) -> None:

@@ -1,0 +1,49 @@
+"""kinfmu export: tables of a record, by the file's ending."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu.cli.export import FORMATS
+from kinfmu.log import read, write_mcap
+from tests.cli.conftest import Command, read_csv
+from tests.log.runs import fourbar
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    write_mcap(fourbar(np.arange(181.0)), path)
+    return path
+
+
+def test_a_record_is_exported_as_csv(record: Path, command: Command, tmp_path: Path) -> None:
+    result = command("export", record, "-o", "run.csv")
+    assert result.exit_code == 0
+    assert result.stdout == "written: run.csv\n"
+    table = read_csv(tmp_path / "run.csv")
+    np.testing.assert_array_equal(table["coupler.x"], read(record)["coupler.x"])
+    assert list(table) == [column.name for column in read(record).columns()]
+
+
+def test_parquet_holds_the_units(record: Path, command: Command, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert command("export", record, "-o", "run.parquet").exit_code == 0
+    schema = parquet.read_schema(tmp_path / "run.parquet")
+    assert schema.field("coupler.vx").metadata == {b"unit": b"m/s"}
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_format_says_where_it_cannot_be_written(suffix: str, record: Path, fails: Callable[..., str]) -> None:
+    assert fails("export", record, "-o", f"none/run{suffix}").startswith(f"none/run{suffix}: the folder ")
+
+
+def test_what_cannot_be_exported_is_told(record: Path, refuses: Callable[..., str], fails: Callable[..., str]) -> None:
+    assert refuses("export", record, "-o", "run.xls").startswith("-o run.xls: nothing is exported as '.xls'; endings: ")
+    assert "'none.mcap' does not exist" in refuses("export", "none.mcap", "-o", "run.csv")
+    record.write_text("no record")
+    assert "not a whole MCAP file" in fails("export", record, "-o", "run.csv")
