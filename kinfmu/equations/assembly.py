@@ -30,6 +30,8 @@ _LOOKS = 4  # random poses at which the structure of the rows is seen
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
+_FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
+_SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
 
 
@@ -80,33 +82,58 @@ def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Flo
 def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:
     """Up to `count` poses spread along the motion that the rows of a part leave, starting with the one nearest to q.
 
-    Random directions of the null space of its Jacobian (seeded), `step` in radians and sizes. Empty if the rows do not
-    close near q; one pose if they leave no motion. Drivers among the rows stand at 0.
+    Random directions of the null space of its Jacobian (seeded), `step` in radians and sizes. Where the motion ends or
+    comes to a singular point, where other branches cross, it is followed from the first pose the other way. Empty if
+    the rows do not close near q; one pose if they leave no motion. Drivers among the rows stand at 0.
     """
-    u = np.zeros(len(part.system.mechanism.drivers))
-    rng = np.random.default_rng(1989)
-    start, gap = close(part, q, u)
+    start, gap = close(part, q, np.zeros(len(part.system.mechanism.drivers)))
     if gap > CLOSED:
         return []
-    samples, direction = [start], None
-    while len(samples) < count:
-        free = null_space(part.jacobian(samples[-1]))  # (n, free directions)
-        if free.shape[1] == 0:
-            break
-        if direction is None:
-            direction = free @ rng.standard_normal(free.shape[1])
-        direction = free @ (free.T @ direction) + 0.3 * free @ rng.standard_normal(free.shape[1])
-        direction /= np.abs(direction).max()
-        length = step
-        while length > 1e-3:
-            pose, gap = close(part, samples[-1] + length * part.column_scales * direction, u)
-            if gap <= CLOSED:
+    rng = np.random.default_rng(1989)
+    samples = [start]
+    free, least = _freedom(part.jacobian(start))  # (n, free directions)
+    least = min(_FAR_FROM_SINGULAR, 0.3 * least)
+    first = free @ rng.standard_normal(free.shape[1])
+    for direction in (first, -first):
+        pose = start
+        while free.shape[1] > 0 and len(samples) < count:
+            free, _ = _freedom(part.jacobian(pose))
+            direction = free @ (free.T @ direction) + 0.3 * free @ rng.standard_normal(free.shape[1])
+            direction /= np.abs(direction).max()
+            onward = _onward(part, pose, free, direction, step, least)
+            if onward is None:
                 break
-            length /= 2.0
-        else:
-            break
-        samples.append(pose)
+            pose = onward
+            samples.append(pose)
     return samples
+
+
+def _onward(
+    part: Part, pose: FloatArray, free: FloatArray, direction: FloatArray, step: float, least: float
+) -> FloatArray | None:
+    """A pose one step, or as much of it as can be gone, in a free direction; None where the motion ends.
+
+    It is not singular (`least`: see _freedom) and on the same branch, where the motion goes on in that direction.
+    """
+    u = np.zeros(len(part.system.mechanism.drivers))
+    along = direction / np.linalg.norm(direction)
+    while step > 1e-3:
+        ahead, gap = close(part, pose + step * part.column_scales * direction, u)
+        if gap <= CLOSED:
+            there, regular = _freedom(part.jacobian(ahead))
+            more = there.shape[1] - free.shape[1]  # directions: less than 0 where a singular pose is left
+            if regular >= least and (more < 0 or (more == 0 and np.linalg.norm(there.T @ along) >= _SAME_WAY)):
+                return ahead
+        step /= 2.0
+    return None
+
+
+def _freedom(jacobian: FloatArray) -> tuple[FloatArray, float]:
+    """The null space of a Jacobian (n, k), and the least of its other singular values over the largest."""
+    _, singular, right = np.linalg.svd(jacobian)
+    relative = singular / singular.max(initial=1e-300)
+    rank = int((relative > _RANK).sum())
+    return np.asarray(right[rank:].T), float(relative[:rank].min(initial=1.0))
 
 
 def null_space(matrix: FloatArray, small: float = _RANK) -> FloatArray:

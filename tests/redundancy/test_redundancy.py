@@ -12,6 +12,7 @@ from kinfmu.equations import System
 from kinfmu.errors import InconsistentError
 from kinfmu.redundancy import find_redundancy
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar
+from tests.stress.trial import trial
 
 
 def test_the_third_parallel_bar_is_named_with_what_implies_it() -> None:
@@ -26,6 +27,15 @@ def test_the_third_parallel_bar_is_named_with_what_implies_it() -> None:
 def test_the_finding_does_not_depend_on_the_start_pose(degrees: float) -> None:
     redundancy = find_redundancy(System(reference_fourbar(start_degrees=degrees)))
     assert [row.row.name for row in redundancy.redundant] == ["AB.length"]
+
+
+@pytest.mark.parametrize("seed", [4030, 4591, 6451, 7032])
+def test_motion_is_judged_on_its_own_branch_when_a_change_point_is_near(seed: int) -> None:
+    """Steps from these starts end beside a change point, from where the other branch is as near."""
+    redundancy = find_redundancy(System(trial(seed, "redundant parallelograms").drawn.mechanism))
+    assert redundancy.mobility == 1
+    assert len(redundancy.redundant) == 1
+    assert redundancy.inconsistent == ()
 
 
 @pytest.mark.parametrize("turn", [0.0, 30.0, 90.0])
