@@ -80,7 +80,7 @@ def solve(
         run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, wrap=wrap, **samples)
     write_table(run, output)
     click.echo(f"{verdict(run)}; written to {output}")
-    fail_if_failed(run)
+    fail_if_failed(run, by_samples=angle is not None)
 
 
 def _driver_values(text: str, quantity: Quantity, length_unit: str) -> tuple[float, float, float]:

@@ -21,8 +21,10 @@ def verdict(run: Run) -> str:
     return f"{len(run)} samples: {said}{largest}"
 
 
-def fail_if_failed(run: Run) -> None:
+def fail_if_failed(run: Run, *, by_samples: bool = False) -> None:
+    """Raise what a run failed at first; by_samples: its times count the samples, from 0."""
     for event in run.events:
         if event.level == "error":
             told = event.text.startswith("at t = ")  # an FMU says itself when
-            raise KinfmuError(event.text if told else f"at t = {event.t:g} s: {event.text}")
+            when = f"sample {event.t:.0f}" if by_samples else f"at t = {event.t:g} s"
+            raise KinfmuError(event.text if told else f"{when}: {event.text}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
+from .message import LOCATED, place
 from .pose import ALONE, Model, Pose, Vector, directed, on_road
 from .road import Road, Searched
 from .span import REGULAR
@@ -258,13 +259,7 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
     why = f"branches of {names} cross" if limit.crosses else f"{names} would part"
-    return f"{place(model, target)} cannot be reached: the limit is {place(model, limit.u)}, where {why}"
-
-
-def place(model: Model, u: Vector) -> str:
-    """'crank = 1.0472 rad (60 deg)': driver values for a message."""
-    said = []
-    for name, kind, value in zip(model.DRIVERS, model.DRIVER_KINDS, u, strict=True):
-        degrees = f" ({value * 57.29577951308232:.10g} deg)" if kind == "angle" else ""
-        said.append(f"{name} = {value:.12g} {'rad' if kind == 'angle' else model.LENGTH_UNIT}{degrees}")
-    return ", ".join(said)
+    asked = place(model, target)
+    if asked == place(model, limit.u):
+        asked = place(model, target, LOCATED)
+    return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}, where {why}"

@@ -13,12 +13,12 @@ from .advance import (
     advance,
     keeps_branch,
     limit_message,
-    place,
     surveyed,
     trusted_step,
 )
 from .estimate import estimated_errors, with_drive_errors
 from .linear import reciprocal_condition
+from .message import place
 from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
 from .road import laid
 from .span import REGULAR

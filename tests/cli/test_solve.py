@@ -92,6 +92,17 @@ def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command,
     assert table["solver.status"].tolist() == [0.0] * 4 + [1.0] + [3.0] * 2
 
 
+def test_a_run_over_driver_values_tells_the_sample_and_its_value_and_no_time(
+    fails: Callable[..., str], tmp_path: Path
+) -> None:
+    told = fails("solve", "double_pendulum", "-o", "run.csv", "--angle", "5:7:8")
+    asked = "crank = 6.428571 rad (368.33 deg) cannot be reached"
+    assert told.startswith(f"sample 5: {asked}: the limit is crank = 6.283185307")
+    table = read_csv(tmp_path / "run.csv")
+    assert table["time"][5] == 5
+    assert np.isnan(table["lower.phi"]).tolist() == [False] * 5 + [True] * 3
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -187,8 +187,9 @@ class Trial:
             verdict.faults.append(Fault("the oracles differ", int(k), f"by {verdict.gap:.1g}"))
 
     def _long_doubles_tell(self, u: Floats) -> NDArray[np.bool_]:
-        """False where samples (n, d) lie so close to a limit that what must stay positive is a difference of few digits:
-        the error of qdd there is a rounding over the product of these.
+        """False where samples (n, d) lie so close to a limit that few digits are left of what must stay positive.
+
+        There the error of qdd is a rounding over the product of these.
         """
         with np.errstate(all="ignore"):
             limits = self.drawn.positions(u).closing.limits

@@ -4,6 +4,8 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+#define KF_LARGE 1e6 /* [rad]; beyond, decimals say nothing */
+
 void kf_say(char *message, const char *format, ...)
 {
     const size_t length = strlen(message);
@@ -25,18 +27,43 @@ void kf_say_number(char *message, const char *format, double value)
     }
 }
 
-/* "crank = 1.0472 rad (60 deg)": driver values. */
-void kf_say_place(char *message, const double *u)
+/* A number to so many decimals, without zeros at its end. */
+static void say_decimals(char *message, int count, double value)
 {
+    char *const written = message + strlen(message);
+    char format[16];
+    const bool is_large = !(value > -KF_LARGE && value < KF_LARGE);
+    snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df", count);
+    kf_say_number(message, format, value);
+    if (!is_large && strchr(written, '.') != NULL) {
+        char *end = written + strlen(written);
+        while (end[-1] == '0') {
+            --end;
+        }
+        end -= end[-1] == '.';
+        *end = '\0';
+    }
+    if (strcmp(written, "-0") == 0) {
+        strcpy(written, "0");
+    }
+}
+
+/* "crank = 1.047198 rad (60 deg)": driver values; angles to so many decimals, lengths to so many digits. */
+void kf_say_place(char *message, const double *u, int digits)
+{
+    char format[16];
     int k;
+    snprintf(format, sizeof format, "%%.%dg", digits);
     for (k = 0; k < KF_DRIVERS; ++k) {
         kf_say(message, "%s%s = ", k > 0 ? ", " : "", kf_driver_names[k]);
-        kf_say_number(message, "%.12g", u[k]);
-        kf_say(message, " %s", kf_driver_is_angle[k] ? "rad" : kf_length_unit);
         if (kf_driver_is_angle[k]) {
-            kf_say(message, " (");
-            kf_say_number(message, "%.10g", u[k] * 57.29577951308232);
+            say_decimals(message, digits, u[k]);
+            kf_say(message, " rad (");
+            say_decimals(message, digits - 2, u[k] * 57.29577951308232);
             kf_say(message, " deg)");
+        } else {
+            kf_say_number(message, format, u[k]);
+            kf_say(message, " %s", kf_length_unit);
         }
     }
 }

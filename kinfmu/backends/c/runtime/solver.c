@@ -26,7 +26,7 @@ static kf_status rejected(kf_solver *solver, kf_pose *pose)
     char *const message = solver->message;
     double watches[KF_ROOM(KF_WATCHES)];
     int k, most = 0;
-    kf_say_place(message, KF_POSE_U(pose));
+    kf_say_place(message, KF_POSE_U(pose), KF_ROUGHLY);
     if (!(pose->found.residual <= solver->tolerance)) {
         kf_say(message, ": residual ");
         kf_say_number(message, "%.2g", pose->found.residual);
@@ -105,7 +105,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     }
     solver->message[0] = '\0';
     if (!(sum - sum == 0.0)) {
-        kf_say_place(solver->message, u);
+        kf_say_place(solver->message, u, KF_ROUGHLY);
         kf_say(solver->message, " is not a finite number");
         return failed(pose, KF_OUTSIDE);
     }

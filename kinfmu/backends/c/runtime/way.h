@@ -104,8 +104,9 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
                    double *rates, double *accelerations);
 
 /* message.c */
+enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
 void kf_say(char *message, const char *format, ...);
 void kf_say_number(char *message, const char *format, double value);
-void kf_say_place(char *message, const double *u);
+void kf_say_place(char *message, const double *u, int digits);
 
 #endif
