@@ -8,19 +8,21 @@ import numpy as np
 
 from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
-from kinfmu.draw.instant import Instant, instant
+from kinfmu.draw.instant import instant
 from kinfmu.draw.links import links, shortest
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.motion import motion
 from kinfmu.draw.names import place
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
-from kinfmu.draw.slides import rails, rods, slides, slots_and_blocks
+from kinfmu.draw.slides import rails, slots_and_blocks
 from kinfmu.draw.wheels import MeshName, racks, wheels
 from kinfmu.draw.writing import write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
+from kinfmu.shapes.instant import Instant
+from kinfmu.shapes.slides import rods, slides
 
 MOST_NAMES = 90  # more would cover the drawing
 _SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import Sheet
@@ -16,6 +15,7 @@ from kinfmu.joints.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.shapes import palette
+from kinfmu.shapes.instant import Instant
 
 EDGE = palette.darker(palette.GROUND)
 _HEIGHT, _HALF, _HATCH = 13.0, 8.0, 4.5  # [pt]
@@ -95,7 +95,7 @@ def hatched(sheet: Sheet, line: FloatArray, towards: FloatArray, size: float) ->
 def supports(shown: Instant) -> list[Mark]:
     """Supports of all points of the ground that hold a pin."""
     held: dict[tuple[float, float], list[FloatArray]] = {}  # what leaves a pin of the ground, towards where
-    for member in (*shown.mechanism.joints, *shown.mechanism.drivers):
+    for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Distance | DistanceDriver | Fixed | PointOnLine):
             continue
         for point, other in (member.between, member.between[::-1]):

@@ -1,10 +1,8 @@
-"""The instant that a figure shows: where everything is then, and where the run takes it."""
+"""The instant that a figure shows: the start pose, or one of the run in which links do not hide one another."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,70 +11,16 @@ from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, star
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import KinfmuError
-from kinfmu.joints import Placement, Pose, Revolute
-from kinfmu.joints.placement import body_of
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.placing import poses_of, world
+from kinfmu.shapes.instant import Instant
+from kinfmu.shapes.placing import poses_of
 from kinfmu.sweep import run_times, solve
 
 MOST_SAMPLES = 1000  # of the run; a figure shows no more
 _BESIDE = 0.1  # part of a driver's way; a start pose further from the run is a rough guess
-
-
-@dataclass(frozen=True, eq=False)
-class Instant:
-    """The pose to draw, and the poses of the run.
-
-    poses: (1 + n, 3) by body, the ground too: x, y [length], phi [rad] of the drawn pose, then at n samples of the run,
-    NaN where one holds no numbers. ways: +1.0 or -1.0 by driver, which way it moves first.
-    """
-
-    mechanism: Mechanism
-    poses: Mapping[str, FloatArray]
-    ways: Mapping[str, float]
-
-    @cached_property
-    def body_points(self) -> Mapping[str, tuple[float, float]]:
-        """Body-fixed coordinates of every point, by 'body.point'."""
-        return self.mechanism.body_points
-
-    def track(self, point: str) -> FloatArray:
-        """World coordinates (1 + n, 2) of 'body.point', the first as drawn."""
-        return world(self.poses[body_of(point)], self.body_points[point])
-
-    def point(self, point: str) -> FloatArray:
-        """World coordinates (2,) of 'body.point' as drawn."""
-        return np.asarray(world(self.poses[body_of(point)][:1], self.body_points[point])[0])
-
-    def placed(self, body: str, points: FloatArray) -> FloatArray:
-        """World coordinates (k, 2) of points (k, 2) in a body's frame, as drawn."""
-        return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
-
-    def angle(self, body: str) -> float:
-        """Angle of a body as drawn [rad]."""
-        return float(self.poses[body][0, 2])
-
-    def colour(self, body: str) -> palette.Colour:
-        """Colour of a body, the ground's too."""
-        order = [moving.name for moving in self.mechanism.moving_bodies]
-        return palette.body(order.index(body)) if body in order else palette.GROUND
-
-    def axle(self, wheel: str, carrier: str) -> FloatArray | None:
-        """Where a pin holds a wheel on its carrier, (2,); None if none does."""
-        for joint in self.mechanism.joints:
-            if isinstance(joint, Revolute) and set(joint.bodies()) == {wheel, carrier}:
-                return self.point(joint.between[0])
-        return None
-
-    def value(self, driver: str) -> float:
-        """What a driver measures as drawn [rad or length]."""
-        poses = {name: Pose.of(*pose[0].tolist()) for name, pose in self.poses.items()}
-        (found,) = (one for one in self.mechanism.drivers if one.name == driver)
-        return float(found.measured().value(Placement(poses, self.body_points)))
 
 
 def instant(mechanism: Mechanism) -> Instant:

@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import BAR, Sheet
 from kinfmu.joints import Distance
 from kinfmu.run import FloatArray
 from kinfmu.shapes import palette
+from kinfmu.shapes.instant import Instant
 from kinfmu.shapes.outline import points_of, rim
 
 _EDGE = 0.9  # [pt]
@@ -88,7 +88,7 @@ def links(shown: Instant, rods: Mapping[str, FloatArray]) -> tuple[list[Mark], l
         (plates if is_closed else bars).append(link)
     thin: list[Mark] = [
         ThinBar(joint.name, np.array([shown.point(end) for end in joint.between]))
-        for joint in shown.mechanism.joints
+        for joint in shown.joints
         if isinstance(joint, Distance)
     ]
     return plates, thin + bars

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet, arc, box
@@ -18,6 +17,8 @@ from kinfmu.joints.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.shapes import palette
+from kinfmu.shapes.cylinders import cylinder_shapes
+from kinfmu.shapes.instant import Instant
 
 COLOUR: palette.Colour = (185, 28, 28)
 _RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow
@@ -108,17 +109,15 @@ class Cylinder(Mark):
 
 def motion(shown: Instant) -> list[Mark]:
     """One mark a driver."""
-    return [_mark(shown, driver) for driver in shown.mechanism.drivers]
+    return [_mark(shown, driver) for driver in shown.drivers]
 
 
 def _mark(shown: Instant, driver: Driver) -> Mark:
     value, way = shown.value(driver.name), shown.ways[driver.name]
     text = f"{driver.name} = {_told(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
-        tracks = [shown.track(end) for end in driver.between]
-        lengths = np.hypot(*(tracks[1] - tracks[0]).T)
-        barrel = max(min(0.9 * float(np.nanmin(lengths)), 0.62 * float(lengths[0])), 0.3 * float(lengths[0]))
-        return Cylinder(text, np.array([track[0] for track in tracks]), barrel)
+        (shape,) = (one for one in cylinder_shapes(shown) if one.driver == driver.name)
+        return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel)
     if isinstance(driver, SlideDriver):
         a, b = driver.between
         e = np.array(unit_vector(driver.axis))
@@ -142,7 +141,7 @@ def _told(shown: Instant, driver: Driver, value: float) -> str:
 
 def _pivot(shown: Instant, body: str, against: str) -> FloatArray:
     """The pin between two bodies, else the first pin of the body, else its frame."""
-    pins = [joint for joint in shown.mechanism.joints if isinstance(joint, Revolute) and body in joint.bodies()]
+    pins = [joint for joint in shown.joints if isinstance(joint, Revolute) and body in joint.bodies()]
     for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
         return shown.point(joint.between[0])
     return np.asarray(shown.poses[body][0, :2])

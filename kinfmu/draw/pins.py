@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinfmu.draw.instant import Instant
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet, box
-from kinfmu.draw.slides import Slide
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.shapes import palette
+from kinfmu.shapes.instant import Instant
+from kinfmu.shapes.slides import Slide
 
 _SAME = 1e-6  # of the size; points nearer than that are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # what is drawn where several are in one place: the last of these
@@ -116,7 +116,7 @@ def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
 
 def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Place]) -> None:
     """What joints and cylinders are in which place."""
-    for member in (*shown.mechanism.joints, *shown.mechanism.drivers):
+    for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
             continue
         for point in member.between:
@@ -125,7 +125,7 @@ def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Plac
             place.points.append(point)
             if isinstance(member, Revolute | Fixed) and member.name not in place.joints:
                 place.joints.append(member.name)
-    for joint in shown.mechanism.joints:
+    for joint in shown.joints:
         if isinstance(joint, CamRoller):
             home[joint.between[1]].kinds.add("pin")
             home[joint.between[1]].points.append(joint.between[1])

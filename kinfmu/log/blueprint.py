@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kinfmu.log.blocks import TIMELINE
-from kinfmu.log.linkage import view_box
+from kinfmu.log.linkage import trail_path, trail_time, view_box
 from kinfmu.log.scene import Scene
 from kinfmu.log.series import KINDS, ORDERS, Group
 from kinfmu.log.verdict import happenings
@@ -18,17 +18,19 @@ if TYPE_CHECKING:
 MOST_CURVES = 14  # a longer legend would hide the curves
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
 EDGE = 0.01  # of the run's time, left free before and after the curves
-LEGEND_ROOM = 0.28  # of the run's time, left free behind the curves for the legend
+LEGEND_EDGE, LETTER, PLOT = 34.0, 7.0, 400.0  # [points]; width of a legend around its names, of a letter, of a plot
+LEAST_ROOM, MOST_ROOM = 0.15, 0.6  # of the run's time, left free behind the curves for the legend
 
 
 def single(
     run: Run,
     scene: Scene | None,
     curves: Mapping[tuple[str, str], Group],
-    accuracy: Sequence[Group],
-    iterations: Group,
+    solver: Sequence[Group],
 ) -> rrb.Blueprint:
-    """One run: what moves on the left, what it measures on the right, one row an order, one column a unit."""
+    """One run: what moves on the left, what it measures on the right, one row an order, one column a unit; below that
+    what the solver tells.
+    """
     import rerun.blueprint as rrb
 
     rows: list[rrb.Container | rrb.View] = []
@@ -36,45 +38,30 @@ def single(
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in found]))
-    rows.append(
-        rrb.Horizontal(
-            plot(accuracy[0].title, [("", group) for group in accuracy], [run]),
-            plot(iterations.title, [("", iterations)], [run]),
-        )
-    )
+    rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in solver]))
     rows.append(status_view([""], [run]))
     text: list[rrb.View] = [card_view()]
     if happenings(run):
         text.append(log_view([""]))
     left = rrb.Vertical(
-        linkage_view(["/linkage/**"], [scene] if scene else []),
+        linkage_view(["/linkage"], [run], [scene]),
         rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
         row_shares=[1.7, 1],
     )
-    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.0])
+    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 2) + [1.5, 1.0])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
 
 
 def compared(
     runs: tuple[Run, Run],
-    scenes: Sequence[Scene],
+    scenes: Sequence[Scene | None],
     curves: Sequence[Mapping[tuple[str, str], Group]],
     difference: Mapping[tuple[str, str], Group],
 ) -> rrb.Blueprint:
     """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
     import rerun.blueprint as rrb
 
-    rows: list[rrb.Container | rrb.View] = []
-    overlaid = []
-    for kind in KINDS:
-        pair = [
-            (root, of["position", kind])
-            for root, of in zip(("/a", "/b"), curves, strict=True)
-            if ("position", kind) in of
-        ]
-        if pair:
-            overlaid.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, runs))
-    rows.append(rrb.Horizontal(*overlaid))
+    rows = [_overlaid("position", runs, curves)]
     for order in ORDERS:
         found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
         if found:
@@ -86,12 +73,28 @@ def compared(
     if any(happenings(run) for run in runs):
         text.append(log_view(["/a", "/b"]))
     left = rrb.Vertical(
-        linkage_view(["/a/linkage/**", "/b/linkage/**"], scenes),
+        linkage_view(["/a/linkage", "/b/linkage"], runs, scenes),
         rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
         row_shares=[1.4, 1],
     )
-    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6])
+    apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
+    both = rrb.Vertical(*[_overlaid(order, runs, curves) for order in ORDERS], name="A and B")
+    right = rrb.Tabs(apart, both)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
+
+
+def _overlaid(
+    order: str, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
+) -> rrb.Container | rrb.View:
+    """The curves of both runs in the same plots, one for each unit."""
+    import rerun.blueprint as rrb
+
+    plots = []
+    for kind in KINDS:
+        pair = [(root, of[order, kind]) for root, of in zip(("/a", "/b"), curves, strict=True) if (order, kind) in of]
+        if pair:
+            plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, runs))
+    return rrb.Horizontal(*plots)
 
 
 def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
@@ -133,31 +136,47 @@ def plot(title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run]) -
     """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group)."""
     import rerun.blueprint as rrb
 
+    names = [name for _, group in groups for name in group.names]
+    has_legend = 1 < len(names) <= MOST_CURVES
     ranges = [group.shown for _, group in groups if group.shown]
     axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(runs, LEGEND_ROOM),
+        axis_x=time_axis(runs, _legend_room(names) if has_legend else EDGE),
         axis_y=axis_y,
-        plot_legend=rrb.PlotLegend(
-            corner="RightTop", visible=sum(len(group.names) for _, group in groups) <= MOST_CURVES
-        ),
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )
 
 
-def linkage_view(contents: Sequence[str], scenes: Sequence[Scene]) -> rrb.Spatial2DView:
-    """The linkage, framed; the view stands at the root so that the flip of the plane takes effect."""
+def _legend_room(names: Sequence[str]) -> float:
+    """Part of the run's time that the legend of these curves hides on a usual screen."""
+    width = LEGEND_EDGE + LETTER * max(map(len, names))
+    return min(max(width / max(PLOT - width, 1.0), LEAST_ROOM), MOST_ROOM)
+
+
+def linkage_view(roots: Sequence[str], runs: Sequence[Run], scenes: Sequence[Scene | None]) -> rrb.Spatial2DView:
+    """The linkages, framed, with trails; the view stands at the root so that the flip of the plane takes effect."""
+    import rerun as rr
     import rerun.blueprint as rrb
 
-    boxes = [view_box(scene) for scene in scenes]
+    drawn = [(root, run, scene) for root, run, scene in zip(roots, runs, scenes, strict=True) if scene]
+    boxes = [view_box(scene) for _, _, scene in drawn]
     bounds = None
     if boxes:
         x = (min(box[0][0] for box in boxes), max(box[0][1] for box in boxes))
         y = (min(box[1][0] for box in boxes), max(box[1][1] for box in boxes))
         bounds = rrb.VisualBounds2D(x_range=x, y_range=y)
-    return rrb.Spatial2DView(name="linkage", origin="/", contents=list(contents), visual_bounds=bounds)
+    relative = rr.encodings.TimeRangeBoundary.cursor_relative
+    trails: dict[Any, Any] = {}
+    for root, run, scene in drawn:
+        for point in scene.paths:
+            back = relative(seconds=-trail_time(run, scene, point))
+            ranges = rrb.VisibleTimeRange(TIMELINE, start=back, end=relative(seconds=0.0))
+            trails[trail_path(root, point)] = rrb.VisibleTimeRanges([ranges])
+    contents = [f"{root}/**" for root in roots]
+    return rrb.Spatial2DView(name="linkage", origin="/", contents=contents, visual_bounds=bounds, overrides=trails)
 
 
 def card_view() -> rrb.TextDocumentView:

@@ -13,14 +13,13 @@ from kinfmu.log.blueprint import compared
 from kinfmu.log.card import plain
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.linkage import log_linkage
-from kinfmu.log.rerun_file import log_card, log_group, log_status, recording
+from kinfmu.log.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.scene import drawable
 from kinfmu.log.series import Group, groups
+from kinfmu.log.thinned import thinned
 from kinfmu.log.verdict import sentence
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
-
-APPLICATION = "kinfmu_compare"  # its own, for its blueprint is another
 
 
 class _Look(NamedTuple):
@@ -48,21 +47,28 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
         )
     for run in (a, b):
         nanoseconds(run.t)
-    scenes, notes = zip(*(drawable(run) for run in (a, b)), strict=True)
     difference = _difference(a, b)
-    apart = groups(difference) if difference else {}
-    curves = [groups(run) for run in (a, b)]
-    layout = compared((a, b), [scene for scene in scenes if scene], curves, apart)
-    with recording(path, f"{names[0]} and {names[1]}", layout, APPLICATION) as rec:
-        for run, scene, own, look in zip((a, b), scenes, curves, _LOOKS, strict=True):
+    shown = [thinned(run) for run in (a, b)]
+    scenes, notes = zip(*(drawable(run) for run in shown), strict=True)
+    apart = thinned(difference) if difference else None
+    differences = groups(apart) if apart else {}
+    curves = [groups(run) for run in shown]
+    layout = compared((shown[0], shown[1]), scenes, curves, differences)
+    with recording(path, f"{names[0]} and {names[1]}", layout, application(*shown)) as rec:
+        for run, drawn, scene, own, look in zip((a, b), shown, scenes, curves, _LOOKS, strict=True):
             if scene:
-                log_linkage(rec, f"{look.root}/linkage", run, scene, look.colour, look.bars, look.layer)
+                log_linkage(rec, f"{look.root}/linkage", drawn, scene, look.colour, look.bars, look.layer)
             for group in own.values():
-                log_group(rec, look.root, run, _named(group, look), look.curves)
+                log_group(rec, look.root, drawn, _named(group, look), look.curves)
             log_status(rec, look.root, run)
-        for group in apart.values():
-            log_group(rec, "/difference", a, group)
-        log_card(rec, _card(a, b, difference, names, [note for note in notes if note]))
+        for group in differences.values():
+            log_group(rec, "/difference", apart or a, group)
+        told = [
+            f"{look.name}: {text}"
+            for run, drawn, look in zip((a, b), shown, _LOOKS, strict=True)
+            for text in left_out(run, drawn)
+        ]
+        log_card(rec, _card(a, b, difference, names, [*told, *(note for note in notes if note)]))
 
 
 def _difference(a: Run, b: Run) -> Run | None:

@@ -1,4 +1,4 @@
-"""The moving linkage of a recording, y up."""
+"""The moving linkage of a recording, y up: lines that stand still in the frames of bodies, and the frames that move."""
 
 from __future__ import annotations
 
@@ -8,25 +8,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.log.blocks import send
-from kinfmu.log.scene import DrawnGuide, Scene
+from kinfmu.log.scene import DrawnBody, Scene
+from kinfmu.log.strokes import BROAD, LINK, Stroke
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
-from kinfmu.shapes.placing import world
 
 if TYPE_CHECKING:
     import rerun as rr
 
 MARGIN = 0.12  # around the linkage, as a part of its size
-MOST_NAMES = 12  # more names of bodies than this would hide the linkage; they show when pointed at
-_BODY, _BAR, _PIN = 0.012, 0.006, 0.015  # radii, as parts of the size
+MOST_NAMES = 12  # more names than this would hide the linkage; they show when pointed at
+TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
+LONGEST_TRAIL = 0.2  # of the run's time
+_TRAIL_PIECES = 1500  # of a path over the whole run
+_BAR, _PIN, _POINT = 0.006, 0.012, 0.015  # radii, as parts of the size
 _HATCH = 0.05  # height of a support, as a part of the size
+_SUPPORT_NAMES = 0.04  # more room below, for the names of supports
 
 
 def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
     """Ranges of x and of the flipped y that show everything with a margin."""
     margin = MARGIN * scene.size
-    low, high = scene.low - margin, scene.high + margin
+    below = np.array([0.0, _SUPPORT_NAMES * scene.size if scene.supports else 0.0])
+    low, high = scene.low - margin - below, scene.high + margin
     return (float(low[0]), float(high[0])), (float(-high[1]), float(-low[1]))
+
+
+def trail_path(root: str, point: str) -> str:
+    """Entity of the trail behind a point of interest."""
+    return f"{root}/trails/{point}"
+
+
+def trail_time(run: Run, scene: Scene, point: str) -> float:
+    """How long [s] the trail behind a point reaches back: the usual time for TRAIL of the linkage's size."""
+    steps = np.hypot(*np.diff(scene.paths[point], axis=0).T)
+    way, span = float(np.nansum(steps)), float(np.ptp(run.t)) if len(run) else 0.0
+    return span * min(TRAIL * scene.size / way, LONGEST_TRAIL) if way > 0.0 else 0.0
 
 
 def log_linkage(
@@ -44,142 +61,257 @@ def log_linkage(
     Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
     nothing to draw.
     """
-    import rerun as rr
+    _Linkage(rec, root, run, scene, colour, width, layer).log()
 
-    size = width * scene.size
-    # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
-    rec.log(root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
-    _log_ground(rec, root, scene)
-    good = np.flatnonzero(run.good)
-    named = colour is None and len(scene.bodies) <= MOST_NAMES
-    for body in scene.bodies:
-        path, own = f"{root}/bodies/{body.name}", colour or palette.body(body.index)
-        look = rr.LineStrips2D.from_fields(
-            radii=[_BODY * size], labels=[body.name], show_labels=named, draw_order=layer + 20.0 + body.index / 100
-        )
-        rec.log(path, look, static=True)
-        corners = [world(body.pose[good], (x, y)) for x, y in body.outline]
-        _send_strips(rec, path, run.t[good], np.stack(corners, axis=1))
-        _send_colours(rec, path, run, own)
-    for bar in scene.bars:
-        path = f"{root}/bars/{bar.name}"
-        rec.log(
+
+class _Linkage:
+    """What is being logged, and how."""
+
+    def __init__(
+        self,
+        rec: rr.RecordingStream,
+        root: str,
+        run: Run,
+        scene: Scene,
+        colour: palette.Colour | None,
+        width: float,
+        layer: float,
+    ) -> None:
+        self.rec, self.root, self.run, self.scene = rec, root, run, scene
+        self.colour, self.layer = colour, layer
+        self.size = width * scene.stroke
+        self.width = width
+        self.good = np.flatnonzero(run.good)
+        self.named = colour is None and len(scene.bodies) <= MOST_NAMES
+
+    def log(self) -> None:
+        import rerun as rr
+
+        # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
+        self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
+        self._ground()
+        for body in self.scene.bodies:
+            self._body(body)
+        for bar in self.scene.bars:
+            path = f"{self.root}/bars/{bar.name}"
+            along = bar.ends[:, 1] - bar.ends[:, 0]
+            self._move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
+            line = np.array([[0.0, 0.0], [bar.length, 0.0]])
+            self._lines(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name)
+        self._cylinders()
+        for index, (name, points) in enumerate(self.scene.paths.items()):
+            own = self.colour or palette.body(len(self.scene.bodies) + index)
+            self._path(f"{self.root}/paths/{name}", points, own)
+            self._trail(trail_path(self.root, name), points, own)
+        self._notice()
+
+    def _body(self, body: DrawnBody) -> None:
+        """Its link, what joints add to it, its pins, and its points of interest."""
+        path = f"{self.root}/bodies/{body.name}"
+        own = self.colour or palette.body(body.index)
+        order = 20.0 + body.index / 100.0
+        self._move(path, body.pose)
+        has_link = len(body.outline) > 1
+        if has_link:
+            self._lines(path, body.outline, LINK, own, order, body.name)
+        for k, stroke in enumerate(body.strokes):
+            label = body.name if k == 0 and not has_link else None
+            self._stroke(path, stroke, own, order, label)
+        self._pins(f"{path}/pins", body.pins)
+        first = len(self.scene.bodies)
+        names = list(self.scene.paths)
+        for name, at in body.points.items():
+            tint = self.colour or palette.body(first + names.index(name))
+            self._points(f"{path}/points/{name}", at[None], _POINT, tint, 40.0, [name], self.colour is None)
+
+    def _stroke(self, path: str, stroke: Stroke, own: palette.Colour, order: float, label: str | None = None) -> None:
+        tones = {"own": own, "grey": palette.GROUND, "dark": palette.BACKDROP}
+        tint = self.colour if self.colour and stroke.tone != "dark" else tones[stroke.tone]
+        below = -0.5 if stroke.tone == "own" and not stroke.layer else 0.0  # a cam lies under the link through its pins
+        self._lines(f"{path}/{stroke.name}", stroke.points, stroke.radius, tint, order + stroke.layer + below, label)
+
+    def _cylinders(self) -> None:
+        for cylinder in self.scene.cylinders:
+            path, shape = f"{self.root}/cylinders/{cylinder.shape.driver}", cylinder.shape
+            a, b = cylinder.ends[:, 0], cylinder.ends[:, 1]
+            angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
+            rod = np.array([[-shape.rod, 0.0], [0.0, 0.0]])
+            self._move(f"{path}/rod", np.column_stack([b, angle]))
+            self._lines(f"{path}/rod", rod, _BAR, self.colour or palette.lighter(palette.BAR), 26.0)
+            barrel = np.array([[0.0, 0.0], [shape.barrel, 0.0]])
+            self._move(f"{path}/barrel", np.column_stack([a, angle]))
+            self._lines(f"{path}/barrel", barrel, 0.8 * BROAD, self.colour or palette.GROUND, 27.0)
+            pin = np.zeros((1, 2))
+            for part in ("rod", "barrel"):
+                self._points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
+
+    def _move(self, path: str, pose: FloatArray) -> None:
+        """Frames (n, 3) of an entity, at the samples that hold numbers."""
+        import rerun as rr
+
+        known = pose[self.good]
+        zero = np.zeros(len(known))
+        half = 0.5 * known[:, 2]
+        turn = np.column_stack([zero, zero, np.sin(half), np.cos(half)]).astype(np.float32)
+        shift = np.column_stack([known[:, :2], zero]).astype(np.float32)
+        send(
+            self.rec,
             path,
-            rr.LineStrips2D.from_fields(
-                radii=[_BAR * size], labels=[bar.name], show_labels=named, draw_order=layer + 10.0
-            ),
-            static=True,
+            self.run.t[self.good],
+            lambda rows: rr.Transform3D.columns(translation=shift[rows], quaternion=turn[rows]),
         )
-        _send_strips(rec, path, run.t[good], bar.ends[good])
-        _send_colours(rec, path, run, colour or palette.BAR)
-    _log_points(
-        rec,
-        f"{root}/pins",
-        run,
-        scene.pins,
-        rr.Points2D.from_fields(radii=[_PIN * size], colors=[palette.PIN], draw_order=layer + 30.0),
-    )
-    for index, (name, points) in enumerate(scene.paths.items()):
-        own = colour or palette.body(len(scene.bodies) + index)
-        _log_path(rec, f"{root}/paths/{name}", points, own)
-        tip = rr.Points2D.from_fields(
-            radii=[_PIN * size], colors=[own], labels=[name], show_labels=colour is None, draw_order=layer + 40.0
+
+    def _lines(
+        self, path: str, line: FloatArray, radius: float, colour: palette.Colour, order: float, label: str | None = None
+    ) -> None:
+        """A line that stands still in its frame, from the first pose on; grey where the last pose stands in."""
+        import rerun as rr
+
+        if not len(self.good):
+            return
+        look = rr.LineStrips2D.from_fields(
+            radii=[radius * self.size],
+            labels=[label] if label else None,
+            show_labels=self.named if label else None,
+            draw_order=self.layer + order,
         )
-        _log_points(rec, f"{root}/points/{name}", run, points[:, None, :], tip)
-    _log_notice(rec, f"{root}/notice", run, scene)
+        self.rec.log(path, look, static=True)
+        strip = [line.astype(np.float32)]
+        send(self.rec, path, self.run.t[self.good[:1]], lambda _: rr.LineStrips2D.columns(strips=strip))
+        turns = self._turns()
+        colours = np.array([colour if good else palette.OUT_OF_REACH for good in self.run.good[turns]], np.uint8)
+        send(self.rec, path, self.run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
+
+    def _turns(self) -> NDArray[np.int64]:
+        """The first sample of each stretch with numbers, and of each without."""
+        return np.flatnonzero(np.diff(self.run.good.astype(int), prepend=-1))
+
+    def _pins(self, path: str, pins: tuple[tuple[str, FloatArray], ...]) -> None:
+        """Pins with the names of their joints, which show when pointed at."""
+        if pins:
+            names, at = zip(*pins, strict=True)
+            self._points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
+
+    def _points(
+        self,
+        path: str,
+        points: FloatArray,
+        radius: float,
+        colour: palette.Colour,
+        order: float,
+        names: list[str],
+        shown: bool,
+    ) -> None:
+        """Points (k, 2) that stand still in their frame, from the first pose on."""
+        import rerun as rr
+
+        if not len(self.good):
+            return
+        look = rr.Points2D.from_fields(
+            radii=[radius * self.size], colors=[colour], labels=names, show_labels=shown, draw_order=self.layer + order
+        )
+        self.rec.log(path, look, static=True)
+        columns = rr.Points2D.columns(positions=points.astype(np.float32)).partition([len(points)])
+        send(self.rec, path, self.run.t[self.good[:1]], lambda _: columns)
+
+    def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
+        """Where a point goes over the run, in one piece for each stretch without a gap."""
+        import rerun as rr
+
+        pieces = [piece.astype(np.float32) for piece in stretches(points)]
+        if pieces:
+            line = rr.LineStrips2D(pieces, colors=[colour], radii=self._thin(1.0), draw_order=self.layer + 5.0)
+            self.rec.log(path, line, static=True)
+
+    def _trail(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
+        """Pieces of the path at their own times; the view shows those of a short time back."""
+        import rerun as rr
+
+        step = max(-(-len(points) // _TRAIL_PIECES), 1)
+        ends = np.arange(step, len(points), step)
+        pieces = [points[end - step : end + 1] for end in ends]
+        known = np.array([bool(np.isfinite(piece).all()) for piece in pieces], bool)
+        if not known.any():
+            return
+        look = rr.LineStrips2D.from_fields(radii=self._thin(2.4), colors=[colour], draw_order=self.layer + 6.0)
+        self.rec.log(path, look, static=True)
+        strips = np.stack([piece for piece, is_known in zip(pieces, known, strict=True) if is_known])
+        self._strips(path, self.run.t[ends[known]], strips)
+
+    def _thin(self, points: float) -> Any:
+        """Radius of a line that is thin at any zoom; of two runs that lie on one another the lower one is wide."""
+        import rerun as rr
+
+        return rr.Radius.ui_points(points if self.colour is None else 2.0 * self.width * points)
+
+    def _strips(self, path: str, t: FloatArray, strips: FloatArray) -> None:
+        """One polyline a sample: strips (n, k, 2)."""
+        import rerun as rr
+
+        send(self.rec, path, t, lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32)))
+
+    def _notice(self) -> None:
+        """Above the linkage, while the run has no numbers."""
+        import rerun as rr
+
+        run, scene, path = self.run, self.scene, f"{self.root}/notice"
+        if run.good.all():
+            return
+        place = [(scene.low[0] + scene.high[0]) / 2, scene.high[1] + 0.6 * MARGIN * scene.size]
+        look = rr.Points2D.from_fields(colors=[palette.STATUS[3]], radii=[0.0], show_labels=True)
+        self.rec.log(path, look, static=True)
+        turns = self._turns()
+        lost = ~run.good[turns]
+        before = ~np.maximum.accumulate(run.good)[turns]
+        texts = [
+            "no pose yet" if early else "no pose: the last one that closed, in grey"
+            for early, gone in zip(before, lost, strict=True)
+            if gone
+        ]
+
+        def columns(rows: slice) -> Any:
+            counts = lost[rows].astype(int)
+            first = int(lost[: rows.start].sum())
+            labels = texts[first : first + int(counts.sum())]
+            positions = np.tile(np.array(place, np.float32), (len(labels), 1))
+            return [*rr.Points2D.columns(positions=positions, labels=labels).partition(counts)]
+
+        send(self.rec, path, run.t[turns], columns)
+
+    def _ground(self) -> None:
+        """Supports as triangles on hatched lines, rails, and what else joints add to the ground."""
+        import rerun as rr
+
+        root, scene = self.root, self.scene
+        height = _HATCH * scene.stroke
+        strips: list[NDArray[Any]] = [
+            np.array(point) + height * stroke for point in scene.supports.values() for stroke in _support()
+        ]
+        for stroke in scene.ground:
+            strips += _rail(stroke, height) if stroke.name.startswith("rail/") else [stroke.points]
+        if strips:
+            lines = rr.LineStrips2D(strips, colors=[palette.GROUND], radii=rr.Radius.ui_points(0.9), draw_order=0.0)
+            self.rec.log(f"{root}/ground", lines, static=True)
+        if scene.supports:
+            names = list(scene.supports)
+            below = np.array(list(scene.supports.values())) - [0.0, 1.7 * height]
+            labels = rr.Points2D(
+                below, labels=names, colors=[palette.GROUND], radii=[0.0], show_labels=len(names) <= MOST_NAMES
+            )
+            self.rec.log(f"{root}/ground/names", labels, static=True)
+        if scene.pins:
+            names, at = map(list, zip(*scene.pins, strict=True))
+            pins = rr.Points2D(
+                at, labels=names, colors=[palette.PIN], radii=[_PIN * self.size], show_labels=False, draw_order=30.0
+            )
+            self.rec.log(f"{root}/ground/pins", pins, static=True)
 
 
-def _send_strips(rec: rr.RecordingStream, path: str, t: FloatArray, strips: FloatArray) -> None:
-    """One polyline a sample: strips (n, k, 2)."""
-    import rerun as rr
-
-    send(rec, path, t, lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32)))
-
-
-def _send_colours(rec: rr.RecordingStream, path: str, run: Run, colour: palette.Colour) -> None:
-    """The own colour where there are numbers, grey where the last pose stands in; sent where it changes."""
-    import rerun as rr
-
-    turns = np.flatnonzero(np.diff(run.good.astype(int), prepend=-1))
-    colours = np.array([colour if good else palette.OUT_OF_REACH for good in run.good[turns]], np.uint8).reshape(-1, 3)
-    send(rec, path, run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
-
-
-def _log_points(rec: rr.RecordingStream, path: str, run: Run, points: FloatArray, look: rr.Points2D) -> None:
-    """Points (n, p, 2) of the samples that hold numbers."""
-    import rerun as rr
-
-    good = np.flatnonzero(run.good)
-    if not points.shape[1]:
-        return
-    rec.log(path, look, static=True)
-
-    def columns(rows: slice) -> Any:
-        block = points[good[rows]].astype(np.float32)
-        flat = rr.Points2D.columns(positions=block.reshape(-1, 2))
-        return flat.partition(np.full(len(block), points.shape[1]))
-
-    send(rec, path, run.t[good], columns)
-
-
-def _log_path(rec: rr.RecordingStream, path: str, points: FloatArray, colour: palette.Colour) -> None:
-    """Where a point goes over the run, in one piece for each stretch without a gap."""
-    import rerun as rr
-
+def stretches(points: FloatArray) -> list[FloatArray]:
+    """The parts of a path (n, 2) between its gaps, those of more than one point."""
     known = np.isfinite(points).all(axis=1)
-    pieces = [piece for piece in np.split(points, np.flatnonzero(~known)) if len(piece)]
-    pieces = [piece[np.isfinite(piece).all(axis=1)].astype(np.float32) for piece in pieces]
-    pieces = [piece for piece in pieces if len(piece) > 1]
-    if pieces:
-        line = rr.LineStrips2D(pieces, colors=[colour], radii=rr.Radius.ui_points(1.2), draw_order=5.0)
-        rec.log(path, line, static=True)
-
-
-def _log_notice(rec: rr.RecordingStream, path: str, run: Run, scene: Scene) -> None:
-    """Above the linkage, while the run has no numbers."""
-    import rerun as rr
-
-    if run.good.all():
-        return
-    place = [(scene.low[0] + scene.high[0]) / 2, scene.high[1] + 0.6 * MARGIN * scene.size]
-    rec.log(path, rr.Points2D.from_fields(colors=[palette.STATUS[3]], radii=[0.0], show_labels=True), static=True)
-    turns = np.flatnonzero(np.diff(run.good.astype(int), prepend=-1))
-    lost = ~run.good[turns]
-    before = ~np.maximum.accumulate(run.good)[turns]
-    texts = [
-        "no pose yet" if early else "no pose: the last one that closed, in grey"
-        for early, gone in zip(before, lost, strict=True)
-        if gone
-    ]
-
-    def columns(rows: slice) -> Any:
-        counts = lost[rows].astype(int)
-        first = int(lost[: rows.start].sum())
-        labels = texts[first : first + int(counts.sum())]
-        positions = np.tile(np.array(place, np.float32), (len(labels), 1))
-        return [*rr.Points2D.columns(positions=positions, labels=labels).partition(counts)]
-
-    send(rec, path, run.t[turns], columns)
-
-
-def _log_ground(rec: rr.RecordingStream, root: str, scene: Scene) -> None:
-    """Supports as triangles on hatched lines, and the lines on which points slide."""
-    import rerun as rr
-
-    strips: list[NDArray[Any]] = [
-        np.array(point) + _HATCH * scene.size * stroke for point in scene.supports.values() for stroke in _support()
-    ]
-    strips += [_guide_line(guide, scene) for guide in scene.guides]
-    if strips:
-        lines = rr.LineStrips2D(strips, colors=[palette.GROUND], radii=rr.Radius.ui_points(0.9), draw_order=0.0)
-        rec.log(f"{root}/ground", lines, static=True)
-    if scene.supports:
-        names = list(scene.supports)
-        below = np.array(list(scene.supports.values())) - [0.0, 1.7 * _HATCH * scene.size]
-        labels = rr.Points2D(
-            below, labels=names, colors=[palette.GROUND], radii=[0.0], show_labels=len(names) <= MOST_NAMES
-        )
-        rec.log(f"{root}/ground/names", labels, static=True)
+    pieces = [piece[np.isfinite(piece).all(axis=1)] for piece in np.split(points, np.flatnonzero(~known)) if len(piece)]
+    return [piece for piece in pieces if len(piece) > 1]
 
 
 def _support() -> list[FloatArray]:
@@ -187,13 +319,26 @@ def _support() -> list[FloatArray]:
     feet = np.array([[-0.6, -1.0], [0.6, -1.0]])
     triangle = np.vstack([[0.0, 0.0], feet, [0.0, 0.0]])
     line = np.array([[-1.0, -1.0], [1.0, -1.0]])
-    hatching = [np.array([[x, -1.0], [x - 0.35, -1.45]]) for x in np.linspace(-0.75, 1.0, 6)]
-    return [triangle, line, *hatching]
+    return [triangle, line, *_hatching(line[0], line[1], 0.45)]
 
 
-def _guide_line(guide: DrawnGuide, scene: Scene) -> FloatArray:
-    margin = 0.5 * MARGIN * scene.size
-    (left, bottom), (right, top) = scene.low - margin, scene.high + margin
-    if guide.axis == "x":
-        return np.array([[guide.value, bottom], [guide.value, top]])
-    return np.array([[left, guide.value], [right, guide.value]])
+def _rail(rail: Stroke, height: float) -> list[FloatArray]:
+    """A rail beyond the way of its slide, with hatching on the side of the ground."""
+    first, last = rail.points
+    length = float(np.hypot(*(last - first)))
+    along = (last - first) / length if length > 0.0 else np.array([1.0, 0.0])
+    if along[0] < 0.0:
+        first, last, along = last, first, -along  # so that the ground is below
+    down = 0.5 * height * np.array([along[1], -along[0]])
+    line = np.array([first - 0.8 * height * along, last + 0.8 * height * along]) + down
+    return [line, *_hatching(line[0], line[1], 0.45 * height)]
+
+
+def _hatching(first: FloatArray, last: FloatArray, depth: float) -> list[FloatArray]:
+    """Strokes to the right of a line, looking along it."""
+    length = float(np.hypot(*(last - first)))
+    along = (last - first) / length
+    count = max(round(length / (0.8 * depth)), 3)
+    right = np.array([along[1], -along[0]])
+    tops = first + np.linspace(0.12, 1.0, count)[:, None] * (last - first)
+    return [np.array([top, top + depth * (right - 0.75 * along)]) for top in tops]

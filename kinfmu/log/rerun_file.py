@@ -1,24 +1,28 @@
 """Rerun recording: the picture of a run, with its blueprint inside.
 
-    /linkage/...        bodies, pins, bars, supports, guides, paths of points; y up
+    /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
+    /linkage/paths/...  where points of interest go; /linkage/trails/...: where they just came from
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
                         one curve a coordinate, in rad and the mechanism's unit of length
-    /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors
+    /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors; /solver/margin
     /solver/iterations  of Newton's method
     /solver/status      a lane of states
     /log                changes of status and events
     /card               mechanism, run and verdict
 
-The blueprint names only these paths, which are the same for every run: recordings of one application share blueprints.
+Recordings of one application share a blueprint in the viewer, whatever their own says: so runs that need the same one,
+of the same mechanism and time, are of one application, and what a person arranges for them stays; others are not.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
+from zlib import crc32
 
 import numpy as np
 
@@ -29,8 +33,9 @@ from kinfmu.log.card import card
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.linkage import log_linkage
 from kinfmu.log.scene import drawable
-from kinfmu.log.series import Group, accuracy, error_estimates, groups, iterations
+from kinfmu.log.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.target import replacing
+from kinfmu.log.thinned import thinned
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.run import Run
 from kinfmu.shapes import palette
@@ -44,26 +49,45 @@ _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 def write_rrd(run: Run, path: str | Path) -> None:
-    """Write `run` as a Rerun recording with the blueprint to review it."""
+    """Write `run` as a Rerun recording with the blueprint to review it.
+
+    Of more than thinned.MOST_ROWS samples the recording holds that many and all that tell something, and says so; the
+    lane of states and the log come from all of them.
+    """
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
-    scene, note = drawable(run)
-    curves, turns = groups(run), iterations(run)
-    solver = [group for group in (accuracy(run), error_estimates(run)) if group]
+    shown = thinned(run)
+    scene, note = drawable(shown)
+    curves = groups(shown)
+    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(run, scene, curves, solver, turns)) as rec:
+    with recording(path, name, single(shown, scene, curves, solver), application(run)) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
-            log_linkage(rec, "/linkage", run, scene)
-        for group in (*curves.values(), *solver, turns):
-            log_group(rec, "", run, group)
+            log_linkage(rec, "/linkage", shown, scene)
+        for group in (*curves.values(), *solver):
+            log_group(rec, "", shown, group)
         log_status(rec, "", run)
-        log_card(rec, card(run, note))
+        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
+
+
+def left_out(run: Run, shown: Run) -> list[str]:
+    """A sentence on samples that the recording leaves out, none if it holds all."""
+    if len(shown) == len(run):
+        return []
+    return [f"{len(shown)} of {len(run)} samples are drawn, peaks and gaps among them; the MCAP holds all."]
+
+
+def application(*runs: Run) -> str:
+    """Name of the application that recordings of such runs belong to, such as 'kinfmu_fourbar_12ab34cd'."""
+    ranges = [[group.shown for group in groups(run).values()] for run in runs]
+    spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
+    facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, bool(happenings(run))) for run in runs]))
+    names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
+    return "_".join([APPLICATION, *dict.fromkeys(names), f"{crc32(facts.encode()):08x}"])
 
 
 @contextmanager
-def recording(
-    path: str | Path, name: str, layout: rrb.Blueprint, application: str = APPLICATION
-) -> Iterator[rr.RecordingStream]:
+def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: str) -> Iterator[rr.RecordingStream]:
     """A recording that is at `path` as a whole when the block ends."""
     import rerun as rr
 

@@ -1,4 +1,4 @@
-"""What of a run can be drawn: bodies as lines through their points, pins, supports, bars, guides and paths."""
+"""What of a run can be drawn: bodies as lines in their own frames, pins, supports, rails, bars, cylinders and paths."""
 
 from __future__ import annotations
 
@@ -8,27 +8,37 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Coordinate, Distance
+from kinfmu.joints import Distance
+from kinfmu.log.strokes import Stroke, strokes
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes.cylinders import CylinderShape, cylinder_shapes
+from kinfmu.shapes.instant import Instant
 from kinfmu.shapes.outline import outline, points_of
-from kinfmu.shapes.pins import names_in, pins_of
+from kinfmu.shapes.pins import pins_of, supported
 from kinfmu.shapes.placing import poses_of, world
+
+LOOKS = 2000  # samples of a run that tell how far everything goes
+_ROOMY, _FINEST = 0.15, 0.5  # shortest link, as a part of the size, that needs no thinner lines; the thinnest
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A moving body: a line through its points in its own frame, and where the frame is.
+    """A moving body: lines in its own frame, and where the frame is.
 
-    outline: polyline (k, 2); pose: (n, 3) of x, y [length], phi [rad], NaN where the run has no numbers; index: its
-    place in the file, for the colour.
+    outline: polyline (k, 2) through its points; strokes: what joints add, such as a cam's profile or a slot; pins: by
+    joint, (2,); points: of interest, by name; pose: (n, 3) of x, y [length], phi [rad], NaN where the run has no
+    numbers; index: its place in the file, for the colour.
     """
 
     name: str
     index: int
     outline: FloatArray
+    strokes: tuple[Stroke, ...]
+    pins: tuple[tuple[str, FloatArray], ...]
+    points: Mapping[str, FloatArray]
     pose: FloatArray
 
 
@@ -41,29 +51,29 @@ class DrawnBar:
     ends: FloatArray
 
 
-@dataclass(frozen=True)
-class DrawnGuide:
-    """A line parallel to an axis on which a point slides (joint Coordinate): axis 'x' means x = value [length]."""
+@dataclass(frozen=True, eq=False)
+class DrawnCylinder:
+    """A driven distance: its barrel and rod, ends (n, 2, 2) in the world [length]."""
 
-    name: str
-    axis: str
-    value: float
+    shape: CylinderShape
+    ends: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything to draw of one run, lengths in the mechanism's unit, y up.
 
-    supports: pins of the ground, name -> (x, y); pins: (n, p, 2), where joints hold bodies; paths: (n, 2) of the
-    points of interest, by name; left_out: bodies whose pose the run does not hold -> the missing coordinates; low,
-    high: corners (2,) of the box around everything.
+    supports: pins of the ground, name -> (x, y); ground: rails and wheels that stand still; pins: of the ground, by
+    joint, (2,); paths: (n, 2) of the points of interest, by name; left_out: bodies whose pose the run does not hold ->
+    the missing coordinates; low, high: corners (2,) of the box around everything.
     """
 
     bodies: tuple[DrawnBody, ...]
     bars: tuple[DrawnBar, ...]
-    guides: tuple[DrawnGuide, ...]
+    cylinders: tuple[DrawnCylinder, ...]
+    ground: tuple[Stroke, ...]
     supports: Mapping[str, tuple[float, float]]
-    pins: FloatArray
+    pins: tuple[tuple[str, FloatArray], ...]
     paths: Mapping[str, FloatArray]
     left_out: Mapping[str, tuple[str, ...]]
     low: FloatArray
@@ -71,8 +81,17 @@ class Scene:
 
     @property
     def size(self) -> float:
-        """Larger side of the bounding box, the measure for line widths; 1 when everything is one point."""
+        """Larger side of the bounding box; 1 when everything is one point."""
         return float(max(self.high - self.low)) or 1.0
+
+    @property
+    def stroke(self) -> float:
+        """The measure for line widths: the size, less of it where links are short against it."""
+        lengths = [bar.length for bar in self.bars]
+        for body in self.bodies:
+            lengths += np.hypot(*np.diff(body.outline, axis=0).T).tolist()
+        shortest = min((length for length in lengths if length > 1e-3 * self.size), default=self.size)
+        return self.size * min(max(shortest / (_ROOMY * self.size), _FINEST), 1.0)
 
 
 def drawable(run: Run) -> tuple[Scene | None, str]:
@@ -91,7 +110,11 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     """The drawable part of `run`."""
     poses, left_out = poses_of(run, mechanism)
     points = mechanism.body_points
-    used = {text for joint in mechanism.joints for text in names_in(joint)}
+    shown = _instant(run, mechanism, poses)
+    added = strokes(shown) if shown else {}
+    cylinders = cylinder_shapes(shown) if shown else []
+    used = {name for joint in mechanism.joints for name in supported(joint)}
+    used |= {end for cylinder in cylinders for end in cylinder.between}
 
     def track(point: str) -> FloatArray | None:
         body = point.partition(".")[0]
@@ -99,48 +122,77 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
             return np.tile(np.array(points[point]), (len(run), 1))
         return world(poses[body], points[point]) if body in poses else None
 
+    def ends_of(between: tuple[str, str]) -> FloatArray | None:
+        a, b = map(track, between)
+        return None if a is None or b is None else np.stack([a, b], axis=1)
+
+    pins: dict[str, list[tuple[str, FloatArray]]] = {}
+    for joint in mechanism.joints:
+        for name in pins_of(joint):
+            pins.setdefault(name.partition(".")[0], []).append((joint.name, np.array(points[name])))
     bodies = tuple(
-        DrawnBody(body.name, index, outline(points_of(body)), poses[body.name])
+        DrawnBody(
+            body.name,
+            index,
+            outline(points_of(body)),
+            tuple(added.get(body.name, ())),
+            tuple(pins.get(body.name, ())),
+            {name: np.array(points[p]) for name, p in mechanism.points.items() if p.partition(".")[0] == body.name},
+            poses[body.name],
+        )
         for index, body in enumerate(mechanism.moving_bodies)
         if body.name in poses
     )
-    bars, guides = [], []
-    for joint in mechanism.joints:
-        if isinstance(joint, Distance):
-            ends = [track(point) for point in joint.between]
-            if ends[0] is not None and ends[1] is not None:
-                bars.append(DrawnBar(joint.name, joint.length, np.stack([ends[0], ends[1]], axis=1)))
-        elif isinstance(joint, Coordinate):
-            guides.append(DrawnGuide(joint.name, joint.axis, joint.value))
-    paths = {name: path for name, point in mechanism.points.items() if (path := track(point)) is not None}
+    bars = tuple(
+        DrawnBar(joint.name, joint.length, ends)
+        for joint in mechanism.joints
+        if isinstance(joint, Distance) and (ends := ends_of(joint.between)) is not None
+    )
+    driven = tuple(DrawnCylinder(shape, ends) for shape in cylinders if (ends := ends_of(shape.between)) is not None)
     supports = {
         name.partition(".")[2]: (point[0], point[1])
         for name, point in points.items()
         if name in used and name.startswith(f"{GROUND_NAME}.")
     }
-    pins = [pin for joint in mechanism.joints for point in pins_of(joint, points) if (pin := track(point)) is not None]
+    ground = tuple(added.get(GROUND_NAME, ()))
     return Scene(
         bodies,
-        tuple(bars),
-        tuple(guides),
+        bars,
+        driven,
+        ground,
         supports,
-        np.stack(pins, axis=1) if pins else np.empty((len(run), 0, 2)),
-        paths,
+        tuple(pins.get(GROUND_NAME, ())),
+        {name: path for name, point in mechanism.points.items() if (path := track(point)) is not None},
         left_out,
-        *_bounds(mechanism, poses, supports),
+        *_bounds(bodies, ground, supports),
     )
 
 
+def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> Instant | None:
+    """The first sample with numbers, and some of the others; None if there is none."""
+    good = np.flatnonzero(run.good)
+    if not len(good):
+        return None
+    rows = np.concatenate([good[:1], good[_some(len(good))]])
+    placed = {name: pose[rows] for name, pose in poses.items()} | {GROUND_NAME: np.zeros((len(rows), 3))}
+    return Instant(mechanism, placed, {driver.name: 1.0 for driver in mechanism.drivers})
+
+
+def _some(count: int) -> slice:
+    """At most LOOKS of so many samples."""
+    return slice(None, None, max(-(-count // LOOKS), 1))
+
+
 def _bounds(
-    mechanism: Mechanism, poses: Mapping[str, FloatArray], supports: Mapping[str, tuple[float, float]]
+    bodies: tuple[DrawnBody, ...], ground: tuple[Stroke, ...], supports: Mapping[str, tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Corners of the box around the supports and all points of all bodies over the run."""
-    corners = [np.array(list(supports.values()), dtype=float).reshape(-1, 2)]
-    for body in mechanism.moving_bodies:
-        if body.name in poses:
-            pose = poses[body.name]
-            pose = pose[np.isfinite(pose).all(axis=1)]
-            corners += [world(pose, (x, y)) for x, y in points_of(body)]
+    """Corners of the box around the ground and all lines of all bodies over the run."""
+    corners = [np.array(list(supports.values()), dtype=float).reshape(-1, 2), *(stroke.points for stroke in ground)]
+    for body in bodies:
+        pose = body.pose[np.isfinite(body.pose).all(axis=1)]
+        pose = pose[_some(len(pose))]
+        for points in (body.outline, *(stroke.extent for stroke in body.strokes)):
+            corners += [world(pose, (x, y)) for x, y in points]
     everything = np.vstack(corners)
     if not len(everything):
         everything = np.zeros((1, 2))

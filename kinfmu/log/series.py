@@ -92,13 +92,20 @@ def accuracy(run: Run) -> Group:
     curves = {"residual": run.residual}
     if run.watch_names:
         curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
-    return _logarithmic("accuracy", curves, 0, SMALLEST)
+    return _logarithmic("accuracy", f"log10 {', '.join(curves)}", curves, 0, SMALLEST)
 
 
 def error_estimates(run: Run) -> Group | None:
-    """log10 of the estimated errors of q, qd, qdd, which samples near singular points have; None if there are none."""
-    curves = {f"error of {name}": run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
-    return _logarithmic("error", curves, 2, np.nan) if np.any(run.error > 0.0) else None
+    """log10 of the estimated errors of q, qd and qdd; None if no sample has any."""
+    curves = {name: run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
+    if not np.any(run.error > 0.0):
+        return None
+    return _logarithmic("error", "log10 error", curves, 2, np.nan)
+
+
+def margin(run: Run) -> Group:
+    """log10 of the margin, 1 / condition of the worst block: 0 far from singular points, -16 at one."""
+    return _logarithmic("margin", "log10 margin", {"margin": run.margin}, 1, SMALLEST)
 
 
 def iterations(run: Run) -> Group:
@@ -113,13 +120,13 @@ def iterations(run: Run) -> Group:
     )
 
 
-def _logarithmic(path: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
+def _logarithmic(path: str, title: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
     """log10 of the curves; `zero` is drawn in the place of 0, and nothing where nothing is known."""
     table = np.column_stack(list(curves.values()))
     table[np.isinf(table)] = np.nan
     return Group(
         path=f"solver/{path}",
-        title="log10 of residual, watch, estimated error",
+        title=title,
         names=tuple(curves),
         colours=tuple(palette.body(first_colour + k) for k in range(len(curves))),
         values=np.log10(np.where(table > 0.0, np.maximum(table, SMALLEST), zero)),

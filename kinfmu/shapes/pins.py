@@ -1,24 +1,22 @@
-"""Where a joint is seen: the points that it names."""
+"""Where joints hold bodies by pins."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import fields
-
-from kinfmu.joints import Revolute
+from kinfmu.joints import CamRoller, Coordinate, Distance, Fixed, PointOnLine, Revolute
 from kinfmu.joints.joint import Joint
 
 
-def pins_of(joint: Joint, points: Collection[str]) -> list[str]:
-    """Points 'body.point' where a joint is drawn; those of a revolute joint coincide."""
-    named = [text for text in names_in(joint) if text in points]
-    return named[:1] if isinstance(joint, Revolute) else named
+def pins_of(joint: Joint) -> tuple[str, ...]:
+    """Points 'body.point' where a joint has a pin; those of a revolute joint coincide, a block that slides has none."""
+    if isinstance(joint, Revolute | Fixed):
+        return joint.between[:1]
+    if isinstance(joint, Distance):
+        return joint.between
+    if isinstance(joint, PointOnLine | CamRoller):
+        return joint.between[1:]
+    return (joint.of,) if isinstance(joint, Coordinate) else ()
 
 
-def names_in(joint: Joint) -> list[str]:
-    """What the text fields of a joint say: points, bodies and choices."""
-    found: list[str] = []
-    for key in fields(joint):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
-        value = getattr(joint, key.name)
-        found += [one for one in (value if isinstance(value, tuple) else (value,)) if isinstance(one, str)]
-    return found
+def supported(joint: Joint) -> tuple[str, ...]:
+    """Points 'body.point' that a joint loads, each on its own body: supports, where they are the ground's."""
+    return joint.between if isinstance(joint, Revolute | Fixed) else pins_of(joint)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSettings, Translational
-from kinfmu.draw.cams import Disc, cams
 from kinfmu.draw.instant import instant
 from kinfmu.joints import CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
 from kinfmu.joints.laws import Law, MotionSequence, Polynomial, Segment
+from kinfmu.shapes.cams import CamShape, cam_shapes
 
 QUARTER = 0.5 * math.pi
 
@@ -36,24 +36,24 @@ def cam(follower: Body, guide: Joint, contact: Joint, angle: float) -> Mechanism
     )
 
 
-def translating(contact: Joint, angle: float) -> Disc:
+def translating(contact: Joint, angle: float) -> CamShape:
     follower = Body("follower", {"tip": (0, 0), "stem": (0, 45)}, (5, 30, 0))
     guide = Translational("guide", ("ground.G", "follower.stem"), QUARTER)
     return the_disc(cam(follower, guide, contact, angle))
 
 
-def oscillating(angle: float) -> Disc:
+def oscillating(angle: float) -> CamShape:
     follower = Body("follower", {"C": (0, 0), "tip": (50, 0)}, (60, 0, 2.3))
     contact = CamOscillating("contact", ("ground", "follower"), "cam", lift(0.4), offset=2.2)
     return the_disc(cam(follower, Revolute("C", ("ground.C", "follower.C")), contact, angle))
 
 
-def the_disc(mechanism: Mechanism) -> Disc:
-    (disc,) = (mark for mark in cams(instant(mechanism)) if isinstance(mark, Disc))
+def the_disc(mechanism: Mechanism) -> CamShape:
+    (disc,) = cam_shapes(instant(mechanism))
     return disc
 
 
-def drawn(kind: str, angle: float) -> Disc:
+def drawn(kind: str, angle: float) -> CamShape:
     if kind == "oscillating":
         return oscillating(angle)
     if kind == "roller":

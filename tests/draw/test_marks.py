@@ -29,8 +29,9 @@ from kinfmu.draw.ground import Rail, Support, supports
 from kinfmu.draw.instant import instant
 from kinfmu.draw.motion import Cylinder, Push, Turn, motion
 from kinfmu.draw.pins import Pin, pins
-from kinfmu.draw.slides import Block, Slot, rails, rods, slides, slots_and_blocks
+from kinfmu.draw.slides import Block, Slot, rails, slots_and_blocks
 from kinfmu.draw.wheels import Belt, Rack, Wheel, racks, wheels
+from kinfmu.shapes.slides import rods, slides
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 
@@ -161,8 +162,15 @@ def test_pitch_circles_touch_and_keep_the_ratio(ratio: float, radii: tuple[float
 def test_wheels_that_turn_alike_on_the_ground_have_a_belt() -> None:
     marks = wheels(instant(geared(2.0, sun="sun", carrier="arm")))
     (belt,) = (mark for mark in marks if isinstance(mark, Belt))
-    assert belt.radii[0] == pytest.approx(2.0 * belt.radii[1])
-    assert sum(belt.radii) < 3.0
+    sun, planet = sorted((mark for mark in marks if isinstance(mark, Wheel)), key=lambda wheel: wheel.radius)
+    assert planet.radius == pytest.approx(2.0 * sun.radius)
+    assert planet.radius + sun.radius < 3.0
+    for a, b in belt.parts:  # each a tangent of both
+        along = (b - a) / np.hypot(*(b - a))
+        for wheel in (sun, planet):
+            off = min((end - wheel.centre for end in (a, b)), key=lambda way: float(np.hypot(*way)))
+            assert np.hypot(*off) == pytest.approx(wheel.radius)
+            assert along @ off == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_rack_touches_its_pinion_on_the_side_that_rolls() -> None:

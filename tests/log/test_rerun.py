@@ -76,11 +76,17 @@ def test_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
 
 def test_links_stand_where_the_run_says(run: Run, tmp_path: Path) -> None:
     write_rrd(run, tmp_path / "run.rrd")
-    ((line,),) = (
-        value for time, value in rows(tmp_path / "run.rrd", "/linkage/bodies/coupler", STRIPS) if time == 60e9
-    )
-    x, y = run["coupler.x"][60], run["coupler.y"][60]
-    np.testing.assert_allclose(line, [[x - 1, y], [x, y], [x + 1, y]], atol=1e-6)
+    path = tmp_path / "run.rrd"
+    ((_, (line,)),) = rows(path, "/linkage/bodies/crank", STRIPS)
+    np.testing.assert_allclose(line, [[0, 0], [1, 0]])
+    for entity, angle, x, y in (("crank", "crank.phi", 0.0, 0.0), ("coupler", "coupler.phi", None, None)):
+        shifts = dict(rows(path, f"/linkage/bodies/{entity}", "Transform3D:translation"))
+        turns = dict(rows(path, f"/linkage/bodies/{entity}", "Transform3D:quaternion"))
+        assert len(shifts) == len(turns) == len(run)
+        x, y = (run["coupler.x"][60], run["coupler.y"][60]) if x is None else (x, y)
+        np.testing.assert_allclose(shifts[60 * 10**9], [[x, y, 0]], atol=1e-6)
+        half = run[angle][60] / 2
+        np.testing.assert_allclose(turns[60 * 10**9], [[0, 0, np.sin(half), np.cos(half)]], atol=1e-6)
 
 
 def test_a_gap_breaks_the_curves_and_turns_the_linkage_grey(run_with_gap: Run, tmp_path: Path) -> None:
@@ -88,7 +94,7 @@ def test_a_gap_breaks_the_curves_and_turns_the_linkage_grey(run_with_gap: Run, t
     write_rrd(run_with_gap, path)
     broken = [time // 10**9 for time, value in rows(path, "/position/angle", SCALARS) if np.isnan(value).all()]
     assert broken == list(range(100, 121))
-    drawn = {time // 10**9 for time, _ in rows(path, "/linkage/bodies/crank", STRIPS) if _ is not None}
+    drawn = {time // 10**9 for time, turn in rows(path, "/linkage/bodies/crank", "Transform3D:quaternion") if turn}
     assert drawn == set(range(181)) - set(range(100, 121))
     colours = [time // 10**9 for time, value in rows(path, "/linkage/bodies/crank", "LineStrips2D:colors") if value]
     assert colours == [0, 100, 121]

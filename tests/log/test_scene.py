@@ -7,9 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.log.scene import Scene, drawable
 from kinfmu.run import Run
 from kinfmu.shapes.placing import world
+from kinfmu.sweep import run_times
 from tests.log.runs import DEGREE
 
 
@@ -40,8 +42,9 @@ def test_supports_are_the_points_of_the_ground_that_joints_use(fourbar_scene: Sc
     assert fourbar_scene.supports == {"O": (0.0, 0.0), "C": (1.0, 0.0), "B": (2.0, 0.0)}
 
 
-def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene, run: Run) -> None:
-    assert fourbar_scene.pins.shape == (len(run), 6, 2)
+def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene) -> None:
+    pins = [*fourbar_scene.pins, *(pin for body in fourbar_scene.bodies for pin in body.pins)]
+    assert sorted(name for name, _ in pins) == ["AB", "AB", "C", "O", "P", "Q"]
 
 
 def test_the_path_is_that_of_the_point_of_interest(fourbar_scene: Scene, run: Run) -> None:
@@ -76,3 +79,72 @@ def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
     found, note = drawable(dataclasses.replace(run, mechanism_text="name = ["))
     assert found is None
     assert note.startswith("Not drawn: the run's mechanism: not valid TOML")
+
+
+def solved(name: str) -> Run:
+    mechanism = kinfmu.load(name)
+    return kinfmu.solve(mechanism, run_times(mechanism.run)[::4])
+
+
+def drawn(name: str) -> tuple[Scene, Run]:
+    run = solved(name)
+    found, note = drawable(run)
+    assert found
+    assert not note
+    return found, run
+
+
+def placed(scene: Scene, body: str, stroke: str) -> np.ndarray:
+    """World coordinates (n, k, 2) of a stroke of a body."""
+    (found,) = (one for one in scene.bodies if one.name == body)
+    (line,) = (one.points for one in found.strokes if one.name == stroke)
+    return np.stack([world(found.pose, (x, y)) for x, y in line], axis=1)
+
+
+def test_the_roller_touches_the_cam_over_the_whole_run() -> None:
+    found, _ = drawn("cam_roller")
+    (lever,) = (body for body in found.bodies if body.name == "lever")
+    profile, roller = placed(found, "cam", "cam/pitch"), placed(found, "lever", "roller/pitch")
+    centre = roller[:, :-1].mean(axis=1)
+    radius = np.hypot(*(roller[0, 0] - centre[0]))
+    assert np.isfinite(lever.pose).all()
+    gaps = np.hypot(*np.moveaxis(profile - centre[:, None], 2, 0)).min(axis=1) - radius
+    assert np.abs(gaps).max() < 0.02 * radius  # the profile has a corner each degree
+
+
+def test_wheels_touch_while_they_turn() -> None:
+    found, _ = drawn("geared_five_bar")
+    (name,) = (stroke.name for stroke in found.bodies[0].strokes if stroke.name.startswith("wheel/"))
+    rims = [placed(found, body.name, name) for body in found.bodies[:2]]
+    centres = [rim[:, :-1].mean(axis=1) for rim in rims]
+    radii = [np.hypot(*(rim[:, 0] - centre).T) for rim, centre in zip(rims, centres, strict=True)]
+    np.testing.assert_allclose(np.hypot(*(centres[1] - centres[0]).T), sum(radii), rtol=1e-9)
+
+
+def test_cylinders_span_their_points_and_hold_their_rods() -> None:
+    found, run = drawn("excavator")
+    assert [cylinder.shape.driver for cylinder in found.cylinders] == [
+        "boom_cylinder",
+        "stick_cylinder",
+        "bucket_cylinder",
+    ]
+    for cylinder in found.cylinders:
+        lengths = np.hypot(*(cylinder.ends[:, 1] - cylinder.ends[:, 0]).T)
+        np.testing.assert_allclose(lengths, run[f"{cylinder.shape.driver}_length"], rtol=1e-12)
+        within = lengths - cylinder.shape.rod  # where the rod begins, from the barrel's end
+        assert within.min() > 0.0
+        assert within.max() < cylinder.shape.barrel < lengths.min()
+    assert {"O", "boom_foot"} == set(found.supports)
+
+
+def test_slides_have_rails_blocks_and_slots_but_no_pin_on_their_line() -> None:
+    found, _ = drawn("inverted_slider_crank")
+    names = [stroke.name for body in found.bodies for stroke in body.strokes] + [stroke.name for stroke in found.ground]
+    kinds = {name.partition("/")[0] for name in names}
+    assert kinds == {"rod", "block", "rail"}
+    assert "way" not in found.supports
+    assert {stroke.name.partition("/")[0] for body in drawn("scotch_yoke")[0].bodies for stroke in body.strokes} == {
+        "rod",
+        "slot",
+        "block",
+    }
