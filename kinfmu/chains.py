@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from kinfmu.drivers import AngleDriver
-from kinfmu.errors import MechanismError
+from kinfmu.errors import RequestError
 from kinfmu.joints import Joint, RelativeAngle, Revolute
 from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
@@ -76,5 +76,5 @@ CHAINS: dict[str, Callable[[int], Mechanism]] = {"fourbar_chain": fourbar_chain,
 def chain(name: str, count: str) -> Mechanism:
     """The chain that `fourbar_chain:1000` names, given as 'fourbar_chain' and '1000'."""
     if not count.isdecimal() or not 1 <= int(count) <= LONGEST_CHAIN:
-        raise MechanismError(f"{name}:{count}: the count must be a whole number from 1 to {LONGEST_CHAIN}")
+        raise RequestError(f"{name}:{count}: the count must be a whole number from 1 to {LONGEST_CHAIN}")
     return CHAINS[name](int(count))

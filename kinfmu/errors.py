@@ -1,6 +1,7 @@
 """Everything that kinfmu raises on purpose.
 
     KinfmuError
+    |-- RequestError            what a caller asked for is not there or cannot be meant: a name, a value, a span of time
     |-- MechanismError          the mechanism as written cannot be used: file, table, key and what would be valid
     |   |-- InconsistentError   a constraint contradicts the others: the gap says by how much
     |   |-- MobilityError       drivers and degrees of freedom do not match
@@ -33,6 +34,10 @@ class KinfmuError(Exception):
         if name in data:
             return data[name]
         raise AttributeError(name)
+
+
+class RequestError(KinfmuError):
+    """What a caller asked for is not there or cannot be meant; on the command line that is wrong usage."""
 
 
 class MechanismError(KinfmuError):

@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from kinfmu.chains import CHAINS, chain
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read, text
 
@@ -36,7 +36,7 @@ def load(mechanism: str | Path) -> Mechanism:
             return chain(name, count)
         known = names()
         if mechanism not in known:
-            raise MechanismError(
+            raise RequestError(
                 f"'{mechanism}' is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
                 f"files end in .toml"
             )

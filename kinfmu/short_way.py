@@ -21,3 +21,8 @@ def short_way(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     back = np.sign(steps) * np.ceil(np.abs(steps) - _HALF)  # [turns]
     turns = -np.concatenate([[0.0], np.cumsum(back)])[: len(angles)]
     return np.array([turned(angle, n) for angle, n in zip(angles.tolist(), turns.tolist(), strict=True)])  # (n,)
+
+
+def is_long(steps: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which steps between angles [rad] are longer than half a turn, so that the short way is another one."""
+    return np.abs(steps) > _HALF * TURN

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.backends.python import load_model, load_module
-from kinfmu.errors import CompilerError, KinfmuError, listed, suggestion
+from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
@@ -55,7 +55,7 @@ def solve(
     last good sample.
     """
     if engine not in ENGINES:
-        raise KinfmuError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
     plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
     plan, bound, solver = _with_geometry(plan, geometry, tolerance)
@@ -65,9 +65,9 @@ def solve(
         times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
         driven = (u, ud, udd)
     elif wrap:
-        raise KinfmuError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
+        raise RequestError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
     elif inputs:
-        raise KinfmuError(f"give times or inputs, not both: t and {listed(inputs)}")
+        raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     else:
         times, driven = _column("t", t), None
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
@@ -98,10 +98,10 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
             continue
         known = [*plan.mechanism.parameters, *constants]
         if name not in constants:
-            raise KinfmuError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
+            raise RequestError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
         constants[name] = measured(f"parameter '{name}'", value, quantities[name], plan.mechanism.length_unit)
         if name in positive and not constants[name] > 0.0:
-            raise KinfmuError(f"parameter '{name}' = {value!r} must be positive")
+            raise RequestError(f"parameter '{name}' = {value!r} must be positive")
     return constants, geometry
 
 
@@ -148,21 +148,21 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
     known = [name for driver in plan.drivers for name in driver.inputs]
     for name in inputs:
         if name not in known:
-            raise KinfmuError(
+            raise RequestError(
                 f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
             )
     for driver in plan.drivers:
         if driver.inputs[0] not in inputs:
-            raise KinfmuError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
+            raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
     columns = {name: _column(name, value) for name, value in inputs.items()}
     angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
     if wrap and not angles:
-        raise KinfmuError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
+        raise RequestError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
     columns |= {name: short_way(columns[name]) for name in angles if wrap}
     lengths = {len(column) for column in columns.values() if len(column) > 1}
     if len(lengths) > 1:
         sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())
-        raise KinfmuError(f"inputs must have equal lengths or be single numbers: {sizes}")
+        raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
     n = lengths.pop() if lengths else min((len(column) for column in columns.values()), default=1)
     tables = []
     for order, default in enumerate((0.0, 1.0, 0.0)):
@@ -175,11 +175,11 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     try:
         column = np.atleast_1d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):
-        raise KinfmuError(f"{name} must be numbers") from None
+        raise RequestError(f"{name} must be numbers") from None
     if column.ndim != 1:
-        raise KinfmuError(f"{name} must be one-dimensional, not of shape {column.shape}")
+        raise RequestError(f"{name} must be one-dimensional, not of shape {column.shape}")
     if not np.isfinite(column).all():
-        raise KinfmuError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
+        raise RequestError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
     return column
 
 
@@ -231,7 +231,7 @@ def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]
         return tuple(np.empty(shape, order=order) for _ in range(3))  # type: ignore[return-value]  # three of them
     for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
         if array.shape != shape or array.dtype != np.float64:
-            raise KinfmuError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+            raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
         if not array.flags.writeable:
-            raise KinfmuError(f"out: {name} is read-only")
+            raise RequestError(f"out: {name} is read-only")
     return out

@@ -28,6 +28,16 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 HIGHEST_ORDER = 7  # of a derivative that units are written for
 
 
+def like_degrees(angle: float) -> bool:
+    """True for a number of radians that looks as if degrees were meant: a multiple of 45 other than 0."""
+    return angle != 0.0 and angle % 45.0 == 0.0
+
+
+def in_turns(angle: float) -> str:
+    """An angle [rad] as messages tell it beside its number: '57.3 turns' of 360 rad."""
+    return f"{abs(angle) / ANGLES['rev']:.3g} turns"
+
+
 def unit_of(quantity: Quantity, length_unit: str) -> str:
     """The unit a variable of this quantity declares, such as `rad/s` or `mm/s2`."""
     units = {"length": length_unit, "angle": "rad", "time": "s", "number": "1"}

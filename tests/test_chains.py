@@ -13,7 +13,7 @@ from kinfmu import gallery
 from kinfmu.backends.python import emit
 from kinfmu.chains import fourbar_chain, open_chain
 from kinfmu.equations import System
-from kinfmu.errors import AssemblyError, MechanismError
+from kinfmu.errors import AssemblyError, RequestError
 from kinfmu.joints import Distance
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import compile_plan
@@ -100,7 +100,7 @@ def test_the_gallery_gives_a_chain_of_any_length() -> None:
     assert kinfmu.load("fourbar_chain:5") == fourbar_chain(5)
     assert kinfmu.load("open_chain:3") == open_chain(3)
     assert kinfmu.load("fourbar_chain") == fourbar_chain(4)
-    with pytest.raises(MechanismError, match="whole number from 1 to 10000"):
+    with pytest.raises(RequestError, match="whole number from 1 to 10000"):
         kinfmu.load("fourbar_chain:many")
 
 

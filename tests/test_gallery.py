@@ -8,7 +8,7 @@ import pytest
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.errors import MechanismError
+from kinfmu.errors import MechanismError, RequestError
 
 
 def test_the_two_reference_mechanisms_are_in_the_gallery() -> None:
@@ -25,13 +25,13 @@ def test_a_mechanism_of_the_gallery_has_its_folders_name_a_title_and_a_comment(n
 
 
 def test_a_name_that_is_not_there_suggests_one_that_is() -> None:
-    with pytest.raises(MechanismError) as caught:
+    with pytest.raises(RequestError) as caught:
         kinfmu.load("forbar")
     assert str(caught.value) == (
         "'forbar' is not in the gallery; did you mean 'fourbar'?; "
         f"gallery: {', '.join(gallery.names())}; files end in .toml"
     )
-    with pytest.raises(MechanismError, match=r"^'' is not in the gallery; gallery: "):
+    with pytest.raises(RequestError, match=r"^'' is not in the gallery; gallery: "):
         kinfmu.load("")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kinfmu import gallery
+from kinfmu.cli.files import exists, missing
 from kinfmu.errors import listed, suggestion
 from kinfmu.units import Quantity, factors
 
@@ -19,14 +20,26 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
     name = "MECH"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        known = gallery.names()
-        if gallery.has(str(value)) or (str(value).endswith(".toml") and exists(Path(value))):
-            return str(value)
-        if str(value).endswith(".toml"):
-            self.fail(f"{value}: there is no such file", param, ctx)
-        hint = suggestion(str(value), known)
-        message = f"'{value}' is not in the gallery{hint}; gallery: {listed(known)}; files end in .toml"
+        name, known = str(value), gallery.names()
+        if name.endswith(".toml"):
+            return name if exists(Path(name)) else self.fail(missing(Path(name)), param, ctx)
+        if gallery.has(name):
+            return name
+        files = (f"{name}.toml", str(Path(name) / "mechanism.toml"))
+        near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), suggestion(name, known))
+        message = f"'{name}' is not in the gallery{near}; gallery: {listed(known)}; files end in .toml"
         return self.fail(message, param, ctx)
+
+
+class ModelName(MechanismName):
+    """An .fmu file, or a mechanism."""
+
+    name = "FMU|MECH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if str(value).endswith(".fmu"):
+            return str(value) if exists(Path(value)) else self.fail(missing(Path(value)), param, ctx)
+        return super().convert(value, param, ctx)
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
@@ -96,12 +109,9 @@ class Time(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
             return self.fail(str(error), param, ctx)
 
 
-def exists(path: Path) -> bool:
-    """True if something other than a folder is there; a name that no file can have is not there."""
-    try:
-        return path.exists() and not path.is_dir()
-    except (OSError, ValueError):
-        return False
+def names_in(text: str | None) -> list[str] | None:
+    """Names parted by commas; None if there are none."""
+    return [name.strip() for name in text.split(",")] if text else None
 
 
 def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
@@ -122,6 +132,16 @@ def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
     return number
 
 
+OUTPUTS_HELP = "Only these outputs, such as coupler.x,rocker.phi (rates come along)"
 MECHANISM = MechanismName()
+MODEL = ModelName()
 SETTING = Setting()
 TIME = Time()
+set_option = click.option(
+    "--set",
+    "settings",
+    type=SETTING,
+    multiple=True,
+    help="Another value of a parameter or of a law's constant, such as crank=40mm or crank.speed=30rpm; "
+    "may be given again.",
+)

@@ -3,46 +3,55 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kinfmu.cli.arguments import MECHANISM, SETTING
+from kinfmu import gallery
+from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, names_in, set_option
 from kinfmu.cli.group import about, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import with_parameters
-
-if TYPE_CHECKING:
-    from kinfmu.mechanism import Mechanism
+from kinfmu.cli.settings import settled
 
 
-@main.command()
+@main.command(epilog="Example: kinfmu build fourbar --flavour native --fmi 3 -o fourbar.fmu")
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
-@click.option("-o", "output", type=click.Path(path_type=Path), help="Where to; <name>.fmu if nothing is said.")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    help="The .fmu to write, or a folder for it. If nothing is said: <name>.fmu in the current folder; for a mechanism "
+    "of the gallery in fmus/<name>/ where the current folder has that.",
+)
 @click.option(
     "--flavour",
     type=click.Choice(["python", "native"]),
     default="python",
     show_default=True,
-    help="What the FMU is made of: Python, for hosts that are Python processes, or C, for all hosts.",
+    help="python: for hosts that are Python processes, such as fmpy; native: C, for every host.",
 )
 @click.option(
-    "--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version of FMI; 3: native only."
+    "--fmi",
+    type=click.Choice(["2", "3"]),
+    default="2",
+    show_default=True,
+    help="Version of FMI; 3 needs --flavour native.",
 )
 @click.option(
     "--platforms",
     type=click.Choice(["host", "all"]),
     default="host",
     show_default=True,
-    help="Of native FMUs: this platform, by the system's compiler, or all, by zig.",
+    help="host: this machine's, by its own compiler; all: Linux, Windows and macOS, by zig; needs --flavour native.",
 )
 @click.option(
     "--drive",
     type=click.Choice(["time", "inputs"]),
-    help="What drives at first: the file's laws or the inputs; time, unless a law is external.",
+    help="What moves the drivers at first: time, by the laws of the file, or inputs such as crank_angle; "
+    "time if nothing is said, unless a law is external. The FMU's parameter driven_by_time changes it.",
 )
-@click.option("--outputs", help="Coordinates that the FMU shall have, with commas; all if nothing is said.")
-@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank=40mm.")
+@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; what they do not need is not solved.")
+@set_option
 def build(
     mechanism: str,
     output: Path | None,
@@ -53,20 +62,22 @@ def build(
     outputs: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
-    """Build the FMU of a mechanism."""
+    """Build the FMU of a mechanism, for co-simulation and, if native, for model exchange."""
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive
 
-    mech = with_parameters(mechanism, settings)
+    for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
+        if flavour == "python" and value != plain:
+            raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
+    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism
     drive = drive or default_drive(mech)
-    wanted = [name.strip() for name in outputs.split(",")] if outputs else None
     with about(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(
             mech,
-            output or _own_folder(mech),
+            output or _place(mechanism, mech.name),
             flavour=flavour,
             drive=drive,
-            outputs=wanted,
+            outputs=names_in(outputs),
             fmi=int(fmi),
             platforms=platforms,
             progress=progress,
@@ -75,7 +86,7 @@ def build(
     click.echo(f"{path}: {path.stat().st_size / 1000.0:.0f} kB, FMI {fmi}.0 {kinds}, driven by {drive}")
 
 
-def _own_folder(mechanism: Mechanism) -> Path:
-    """fmus/<name>/<name>.fmu where this is a checkout with that folder, else <name>.fmu here."""
-    own = Path("fmus") / mechanism.name
-    return (own if own.is_dir() else Path()) / f"{mechanism.name}.fmu"
+def _place(given: str, name: str) -> Path:
+    """<name>.fmu here; in fmus/<name>/ of a checkout for a mechanism of the gallery, given by its name."""
+    own = Path("fmus") / name
+    return (own if given in gallery.names() and own.is_dir() else Path()) / f"{name}.fmu"

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import MECHANISM, SETTING
+from kinfmu import gallery
+from kinfmu.cli.arguments import MECHANISM, set_option
+from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import with_parameters
-from kinfmu.errors import KinfmuError, listed
+from kinfmu.cli.settings import settled
+from kinfmu.errors import KinfmuError
 
 if TYPE_CHECKING:
     from kinfmu.analysis import Assemblies, Report
@@ -19,18 +21,13 @@ if TYPE_CHECKING:
 FIGURES = (".svg", ".png")
 
 
-@main.command()
+@main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
-@click.option("--json", "as_json", is_flag=True, help="Findings for programs.")
-@click.option("--matrices", is_flag=True, help="Jacobians at the start pose and singular points.")
-@click.option("--assemblies", is_flag=True, help="The ways of putting it together, and how to choose one.")
-@click.option(
-    "--figure",
-    "picture",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Draw the mechanism with names: .svg or .png.",
-)
-@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank=40mm.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
+@click.option("--matrices", is_flag=True, help="Print the Jacobians at the start pose and at singular points, too.")
+@click.option("--assemblies", is_flag=True, help="List the ways of putting it together, and how to choose one.")
+@click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg or .png.")
+@set_option
 def check(
     mechanism: str,
     as_json: bool,
@@ -39,12 +36,13 @@ def check(
     picture: Path | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
-    """Mobility, redundant and contradicting constraints, drivers, plan, ranges and singular points."""
+    """Check a mechanism and tell what it can do.
+
+    Mobility, redundant and contradicting constraints, the order of solving, ranges of the drivers, singular points.
+    """
     from kinfmu.analysis import check as checked
 
-    if picture is not None and picture.suffix.lower() not in FIGURES:
-        raise click.UsageError(f"--figure {picture}: a figure ends in one of {listed(FIGURES)}")
-    mech = with_parameters(mechanism, settings)
+    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism
     with about(mechanism):
         report = checked(mech)
     if as_json:

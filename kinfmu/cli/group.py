@@ -9,17 +9,29 @@ from typing import Any
 import click
 
 from kinfmu import VERSION
-from kinfmu.errors import AssemblyError, KinfmuError, MechanismError
+from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
+
+
+class _Command(click.Command):
+    """Tells what was asked for and is not there as wrong usage."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except RequestError as error:
+            raise click.UsageError(one_line(error), ctx) from None
 
 
 class _Group(click.Group):
     """Turns what kinfmu raises on purpose into one line on stderr and exit status 1."""
 
+    command_class = _Command
+
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
         except KinfmuError as error:
-            click.echo("kinfmu: " + " ".join(str(error).splitlines()), err=True)
+            click.echo(f"kinfmu: {one_line(error)}", err=True)
             ctx.exit(1)
         except MemoryError:
             click.echo("kinfmu: there is not enough memory for so large a mechanism", err=True)
@@ -36,12 +48,17 @@ def main() -> None:
     """
 
 
+def one_line(error: KinfmuError) -> str:
+    """The message on a single line."""
+    return " ".join(str(error).splitlines())
+
+
 @contextmanager
 def about(mechanism: str) -> Iterator[None]:
     """What is found wrong in a mechanism after its file was read is told with the file's name in front."""
     try:
         yield
-    except (MechanismError, AssemblyError) as error:
+    except (RequestError, MechanismError, AssemblyError) as error:
         raise type(error)(f"{mechanism}: {error}", **error.data) from None
 
 

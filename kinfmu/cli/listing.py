@@ -8,9 +8,9 @@ from kinfmu import gallery
 from kinfmu.cli.group import main
 
 
-@main.command("list")
+@main.command("list", epilog="Example: kinfmu list")
 def list_() -> None:
-    """The mechanisms of the gallery."""
+    """List the mechanisms of the gallery: names that stand for MECH in other commands."""
     names = gallery.names()
     width = max(map(len, names), default=0)
     for name in names:

@@ -7,25 +7,23 @@ from pathlib import Path
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, exists
+from kinfmu.cli.arguments import MECHANISM
+from kinfmu.cli.files import OutputFile, exists
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 
 
-@main.command()
-@click.argument("mechanism", metavar="MECH")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@main.command(epilog="Example: kinfmu new fourbar mine.toml")
+@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@click.argument("file", type=OutputFile(".toml"))
 def new(mechanism: str, file: Path) -> None:
-    """Write a commented starting FILE, from gallery mechanism MECH."""
-    if file.suffix != ".toml":
-        raise click.UsageError(f"{file}: a mechanism file ends in .toml")
+    """Write FILE (.toml), a commented mechanism file to start from: a copy of MECH."""
     if exists(file):
-        raise KinfmuError(f"{file}: is there already; nothing was written")
-    name = MECHANISM.convert(mechanism, None, None)
-    source = gallery.folder() / name / "mechanism.toml" if name in gallery.names() else Path(name)
+        raise click.UsageError(f"{file}: is there already; nothing was written")
+    source = gallery.folder() / mechanism / "mechanism.toml" if mechanism in gallery.names() else Path(mechanism)
     try:
-        if ":" in name and gallery.has(name):  # a chain, which no file holds
-            gallery.save(gallery.load(name), file)
+        if ":" in mechanism and gallery.has(mechanism):  # a chain, which no file holds
+            gallery.save(gallery.load(mechanism), file)
         else:
             file.write_bytes(source.read_bytes())
     except OSError as error:

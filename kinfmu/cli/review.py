@@ -7,26 +7,19 @@ from pathlib import Path
 import click
 
 from kinfmu.cli.arguments import TIME
+from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import listed
 
 
-@main.command()
-@click.argument("run", type=click.Path(dir_okay=False, path_type=Path))
-@click.argument("other", required=False, type=click.Path(dir_okay=False, path_type=Path))
-@click.option(
-    "--save",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Write the recording (.rrd) instead of opening the viewer.",
-)
-@click.option(
-    "--screenshot",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Take a picture (.png) with a viewer that needs no screen.",
-)
-@click.option("--at", type=TIME, help="Time of the picture [s].")
+@main.command(epilog="Example: kinfmu review logs/fourbar.mcap --screenshot fourbar.png --at 45")
+@click.argument("run", type=InputFile(".mcap", ".rrd"))
+@click.argument("other", required=False, type=InputFile(".mcap"))
+@click.option("--save", type=OutputFile(".rrd"), help="Write the recording (.rrd) and open no viewer.")
+@click.option("--screenshot", type=OutputFile(".png"), help="Take a picture (.png) with a viewer that needs no screen.")
+@click.option("--at", type=TIME, help="Time of the picture [s]; a third of the run if nothing is said.")
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
-    """Open the Rerun viewer on RUN (.mcap), or on two runs compared."""
+    """Look at RUN, an .mcap of simulate, in the Rerun viewer; at two runs compared if OTHER is given."""
     from kinfmu.log import review as reviewed
 
     recording = reviewed(run, other, save=save, screenshot=screenshot, at=at)

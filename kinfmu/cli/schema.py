@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
+from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 
 
-@main.command()
-@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), help="Where to; stdout if not said.")
+@main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")
+@click.option("-o", "output", type=OutputFile(), help="The file to write; printed if nothing is said.")
 def schema(output: Path | None) -> None:
-    """The JSON Schema of mechanism files, by which editors complete and check them."""
+    """Write the JSON Schema of mechanism files, by which editors complete and check them."""
     from kinfmu.mechanism.schema import schema_text
 
     if output is None:

@@ -1,44 +1,90 @@
-"""What --set says: parameters of a mechanism, and constants of its laws."""
+"""What --set says: parameters of a mechanism, constants of its laws, and what belongs to a run alone."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu import gallery
-from kinfmu.cli.group import about
-from kinfmu.errors import listed, suggestion
+from kinfmu.cli.tell import note
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.units import Quantity, in_turns, like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
 
+TOLERANCE = "solver.tolerance"
+DRIVEN_BY_TIME = "driven_by_time"
+_ELSEWHERE = {
+    TOLERANCE: "it belongs to a run: solve and simulate take it",
+    DRIVEN_BY_TIME: "it belongs to an FMU: simulate takes it, build --drive chooses its default",
+}
 
-def with_parameters(name: str, settings: tuple[tuple[str, str], ...]) -> Mechanism:
-    """The mechanism of this name with parameters as set on the command line."""
-    mechanism = gallery.load(name)
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings by name, each where it belongs.
+
+    mechanism: with its parameters and the constants of its laws in place; parameters, constants: the same as they were
+    set; of_run: what belongs to a run.
+    """
+
+    mechanism: Mechanism
+    parameters: Mapping[str, float | str]
+    constants: Mapping[str, float | str]
+    of_run: Mapping[str, float | str | bool]
+
+
+def settled(
+    name: str, mechanism: Mechanism, settings: Sequence[tuple[str, str]], of_run: Sequence[str] = ()
+) -> Settings:
+    """Settings of the command line, checked; the names of a mechanism are the same for every command.
+
+    name: as which the user knows the mechanism; of_run: names of a run that this command takes, too. Raises a
+    click.UsageError for what is not there, cannot be meant, or follows from something else.
+    """
+    constants = {constant.name: constant for constant in mechanism.law_constants}
+    known = [*mechanism.parameters, *constants, *of_run]
     for parameter, text in settings:
-        if parameter not in mechanism.parameters:
-            known = mechanism.parameters
-            law = "; constants of laws are set in solve and simulate" if "." in parameter else ""
-            raise click.UsageError(
-                f"--set {parameter}={text}: {name} has no parameter '{parameter}'{suggestion(parameter, known)}; "
-                f"parameters: {listed(known)}{law}"
-            )
-    with about(name):
-        return mechanism.with_parameters({parameter: _value(text) for parameter, text in settings})
-
-
-def refuse_what_follows(mechanism: Mechanism, settings: tuple[tuple[str, str], ...]) -> None:
-    """Raise a click.UsageError for a law constant that the file gives by an expression: that is to be set."""
-    for name, text in settings:
-        driver, _, key = name.rpartition(".")
+        where = f"--set {parameter}={text}"
+        driver, _, key = parameter.rpartition(".")
         expression = mechanism.expressions.get(("drivers", driver, "law", key))
         if expression is not None:
-            raise click.UsageError(f"--set {name}={text}: it follows from '{expression.text}'; set what stands there")
+            raise click.UsageError(f"{where}: it follows from '{expression.text}'; set what stands there")
+        if parameter not in known:
+            elsewhere = _ELSEWHERE.get(parameter)
+            hint = f"; {elsewhere}" if elsewhere else suggestion(parameter, known)
+            raise click.UsageError(f"{where}: {name} has no parameter '{parameter}'{hint}; parameters: {listed(known)}")
+        if parameter in constants and constants[parameter].quantity == Quantity("angle"):
+            _note_of_degrees(parameter, text)
+        if parameter == TOLERANCE:
+            value = _value(text)
+            if not isinstance(value, float) or not 0.0 < value < math.inf:
+                raise click.UsageError(f"{where}: it must be a positive number")
+    values = {parameter: _value(text) for parameter, text in settings if parameter not in of_run}
+    try:
+        changed = mechanism.with_parameters(values)
+    except MechanismError as error:
+        raise click.UsageError(f"--set: {error}") from None
+    return Settings(
+        changed,
+        {parameter: value for parameter, value in values.items() if parameter in mechanism.parameters},
+        {parameter: value for parameter, value in values.items() if parameter in constants},
+        as_values([(parameter, text) for parameter, text in settings if parameter in of_run]),
+    )
 
 
-def as_values(settings: tuple[tuple[str, str], ...]) -> dict[str, float | str | bool]:
+def tolerance_of(settings: Settings) -> float:
+    """The tolerance of a solve: what --set says, else the usual one."""
+    from kinfmu.solver.solver import TOLERANCE as USUAL
+
+    return float(settings.of_run.get(TOLERANCE, USUAL))
+
+
+def as_values(settings: Sequence[tuple[str, str]]) -> dict[str, float | str | bool]:
     """Settings by name: true or false, a number, or text that says a unit."""
     truths = {"true": True, "false": False}
     return {name: truths.get(text.lower(), _value(text)) for name, text in settings}
@@ -50,3 +96,9 @@ def _value(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
+
+
+def _note_of_degrees(name: str, text: str) -> None:
+    value = _value(text)
+    if isinstance(value, float) and like_degrees(value):
+        note(f"{name} = {text} rad, {in_turns(value)}; write {name}={text}deg for degrees")

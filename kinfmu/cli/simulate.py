@@ -7,36 +7,35 @@ from pathlib import Path
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, SETTING, TIME, exists
+from kinfmu.cli.arguments import MODEL, TIME, set_option
+from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import about, instead, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import as_values, refuse_what_follows
+from kinfmu.cli.settings import DRIVEN_BY_TIME, TOLERANCE, as_values, settled
+from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError
 
 
-@main.command()
-@click.argument("model", metavar="FMU|MECH")
-@click.option("--start", type=TIME, help="[s]; from the model if nothing is said, like stop and step.")
-@click.option("--stop", type=TIME, help="[s]")
-@click.option("--step", type=TIME, help="Communication step [s].")
+@main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
+@click.argument("model", metavar="FMU|MECH", type=MODEL)
+@click.option("--start", type=TIME, help="Where the run starts [s]; if nothing is said as --input, else as the model.")
+@click.option("--stop", type=TIME, help="Where it stops [s]; alike.")
+@click.option("--step", type=TIME, help="Communication step [s]; the model's if nothing is said.")
 @click.option(
     "--input",
     "inputs",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="CSV with columns time and inputs, such as crank_angle or crank_angle [deg].",
+    type=InputFile(),
+    help="A CSV that drives in place of time: columns time and inputs, such as crank_angle or 'crank_angle [deg]'; "
+    "straight from row to row.",
 )
 @click.option(
     "--wrap", is_flag=True, help="Angles of --input were wrapped, from 360 to 0 deg, say: follow them the short way."
 )
-@click.option("--set", "settings", type=SETTING, multiple=True, help="A parameter, such as crank.speed=30rpm.")
+@set_option
+@click.option("--mcap", type=OutputFile(".mcap"), help="The record to write; logs/<name>.mcap if nothing is said.")
 @click.option(
-    "--mcap", type=click.Path(dir_okay=False, path_type=Path), help="Record; logs/<name>.mcap if nothing is said."
-)
-@click.option(
-    "--rrd",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Rerun recording; logs/<name>.rrd if nothing is said.",
+    "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; logs/<name>.rrd if nothing is said."
 )
 def simulate(
     model: str,
@@ -49,31 +48,25 @@ def simulate(
     mcap: Path | None,
     rrd: Path | None,
 ) -> None:
-    """Step an FMU with fmpy (a mechanism is built first), and log the run to MCAP and Rerun."""
+    """Step an FMU that kinfmu built, by fmpy, and log the run; the FMU of a MECH is built first."""
     from tempfile import TemporaryDirectory
 
     from kinfmu.fmu import build as built
     from kinfmu.fmu import simulate as simulated
+    from kinfmu.fmu.build import default_drive
     from kinfmu.log import write_mcap, write_rrd
 
-    for path, suffix in ((mcap, ".mcap"), (rrd, ".rrd")):
-        if path is not None and path.suffix.lower() != suffix:
-            raise click.UsageError(f"--{suffix[1:]} {path}: such a file ends in {suffix}")
     if wrap and inputs is None:
         raise click.UsageError("--wrap follows the angles of --input, which is not given")
-    parameters = as_values(settings)
     with TemporaryDirectory(prefix="kinfmu_") as folder:
-        fmu = Path(model)
+        fmu, parameters = Path(model), as_values(settings)
         if fmu.suffix != ".fmu":
-            mech = gallery.load(MECHANISM.convert(model, None, None))
+            mech = gallery.load(model)
+            given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
+            parameters = {**given.constants, **given.of_run}
             with about(model):
-                refuse_what_follows(mech, settings)
-                geometry = {name: value for name, value in parameters.items() if name in mech.parameters}
-                mech = mech.with_parameters(geometry)
-                parameters = {name: value for name, value in parameters.items() if name not in geometry}
-                fmu = built(mech, Path(folder), drive="inputs" if inputs else "time")
-        elif not exists(fmu):
-            raise click.UsageError(f"{fmu}: there is no such file")
+                mech = mech.with_parameters(given.parameters)
+                fmu = built(mech, Path(folder), drive="inputs" if inputs else default_drive(mech))
         with Progress() as progress, instead(str(fmu), model):
             run = simulated(
                 fmu,
@@ -95,6 +88,7 @@ def simulate(
     record, recording = mcap or logs / f"{name}.mcap", rrd or logs / f"{name}.rrd"
     write_mcap(run, record)
     write_rrd(run, recording)
+    tell_of(run)
     click.echo(f"{verdict(run)}; written to {record} and {recording}")
     click.echo(f"to look at it: kinfmu review {record}")
     fail_if_failed(run)

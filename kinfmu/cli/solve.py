@@ -2,42 +2,56 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, SETTING, Range
+from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, names_in, set_option
+from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import as_values, refuse_what_follows
+from kinfmu.cli.settings import TOLERANCE, settled, tolerance_of
+from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
-from kinfmu.units import Quantity
+from kinfmu.units import Quantity, in_turns, like_degrees
+
+if TYPE_CHECKING:
+    from kinfmu.drivers import Driver
 
 TABLES = (".csv", ".parquet", ".npz")
+HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn that was not meant
 
 
-@main.command()
+@main.command(epilog="Example: kinfmu solve fourbar -o run.csv --angle 0deg:360deg:361")
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@click.option("-o", "output", type=OutputFile(*TABLES), required=True, help="The table to write: .csv, .parquet, .npz.")
 @click.option(
-    "-o", "output", type=click.Path(dir_okay=False, path_type=Path), required=True, help=".csv, .parquet or .npz."
+    "--times",
+    type=Range(Quantity("time"), "STEP"),
+    help="Times from A to B, such as 0:2:0.01 [s] or 0s:2s:10ms, at which the laws of the file drive; "
+    "the file's run if nothing is said.",
 )
-@click.option("--times", type=Range(Quantity("time"), "STEP"), help="Times [s]; the file's run if nothing is said.")
 @click.option(
     "--angle",
     "--position",
     "angle",
     metavar="A:B:N",
-    help="N values of the driver [rad, or the file's unit of length], or such as 0deg:360deg:361 or 0mm:50mm:101; "
-    "rates are for a driver's speed of 1, time counts the samples.",
+    help="N values of the driver from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101; bare numbers "
+    "are rad, or the file's unit of length. Rates are those at a driver's speed of 1; time counts the samples.",
 )
 @click.option("--wrap", is_flag=True, help="Follow --angle the short way: no step is more than half a turn.")
+@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; what they do not need is not solved.")
 @click.option(
-    "--set", "settings", type=SETTING, multiple=True, help="A parameter or law constant, such as crank.speed=30rpm."
+    "--engine",
+    type=click.Choice(["auto", "python", "native"]),
+    default="auto",
+    show_default=True,
+    help="native: generated C, compiled first, for long sweeps; auto chooses by the number of samples.",
 )
-@click.option("--outputs", help="Names to solve for, with commas; all if nothing is said.")
-@click.option("--engine", type=click.Choice(["auto", "python", "native"]), default="auto", show_default=True)
+@set_option
 def solve(
     mechanism: str,
     output: Path,
@@ -49,42 +63,83 @@ def solve(
     engine: str,
 ) -> None:
     """Solve position, velocity and acceleration at times or at driver values, into a table."""
-    import numpy as np
-
     from kinfmu.log import write_table
     from kinfmu.mechanism import RunSettings
     from kinfmu.sweep import run_times
     from kinfmu.sweep import solve as solved
 
-    if output.suffix.lower() not in TABLES:
-        raise click.UsageError(f"-o {output}: a table ends in one of {listed(TABLES)}")
     if times and angle:
         raise click.UsageError("--times and --angle cannot both drive")
     if wrap and not angle:
         raise click.UsageError("--wrap follows --angle the short way, which is not given")
     mech = gallery.load(mechanism)
-    wanted = [name.strip() for name in outputs.split(",")] if outputs else None
-    refuse_what_follows(mech, settings)
-    parameters = as_values(settings)
+    given = settled(mechanism, mech, settings, (TOLERANCE,))
+    t, samples = None, {}
     if angle:
         if len(mech.drivers) != 1:
             raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
-        t = None
-        for name in (name for name in parameters if name not in mech.parameters):
+        for name in given.constants:
             raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
-        first, last, count = _driver_values(angle, mech.drivers[0].quantity, mech.length_unit)
-        samples: dict[str, Any] = {mech.drivers[0].inputs()[0]: np.linspace(first, last, int(count))}
+        samples = _driver_values(angle, mech.drivers[0], mech.length_unit, wrap)
     else:
-        t, samples = (run_times(RunSettings(*times)) if times else None), {}
+        t = run_times(RunSettings(*times)) if times else None
+        _warn_of_external(mech.drivers)
     with about(mechanism):
-        run = solved(mech, t, parameters=parameters, outputs=wanted, engine=engine, wrap=wrap, **samples)
+        run = solved(
+            mech,
+            t,
+            parameters={**given.parameters, **given.constants},
+            outputs=names_in(outputs),
+            engine=engine,
+            wrap=wrap,
+            tolerance=tolerance_of(given),
+            **samples,
+        )
     write_table(run, output)
+    tell_of(run)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run, by_samples=angle is not None)
 
 
-def _driver_values(text: str, quantity: Quantity, length_unit: str) -> tuple[float, float, float]:
-    """First, last and number of a driver's values: what their units may be is known once the mechanism is read."""
+def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> dict[str, Any]:
+    """The driver's input with its values: what their units may be is known once the mechanism is read."""
+    import numpy as np
+
     context = click.get_current_context()
     option = next(option for option in context.command.params if option.name == "angle")
-    return Range(quantity, "N", length_unit).convert(text, option, context)
+    first, last, n = Range(driver.quantity, "N", length_unit).convert(text, option, context)
+    if driver.quantity.kind == "angle":
+        _tell_of_angles(text, first, last, int(n), wrap)
+    return {driver.inputs()[0]: np.linspace(first, last, int(n))}
+
+
+def _tell_of_angles(text: str, first: float, last: float, n: int, wrap: bool) -> None:
+    """Say what bare numbers that look like degrees mean; warn of steps of more than half a turn."""
+    a, b, _ = text.split(":")
+    if _is_bare(a) and _is_bare(b) and (like_degrees(first) or like_degrees(last)):
+        turns = in_turns(last - first)
+        note(f"--angle {text}: {first:g} to {last:g} rad, {turns}; write {a}deg:{b}deg:{n} for degrees")
+    elif n > 1 and not wrap and abs(last - first) / (n - 1) > HALF_TURN * (1.0 + 1e-9):
+        step = abs(last - first) / (n - 1)
+        warn(f"--angle {text}: steps of {in_turns(step)} between samples; --wrap takes each the short way")
+
+
+def _is_bare(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _warn_of_external(drivers: tuple[Driver, ...]) -> None:
+    """Warn of drivers that time does not move."""
+    from kinfmu.joints.laws import External
+
+    still = [driver.name for driver in drivers if isinstance(driver.law, External)]
+    if still:
+        one = len(still) == 1
+        warn(
+            f"{'driver' if one else 'drivers'} {listed(still)} {'has' if one else 'have'} no law, so nothing moves "
+            f"{'it' if one else 'them'} by time; --angle drives a single one, simulate --input any number"
+        )

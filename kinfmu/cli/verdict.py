@@ -22,7 +22,9 @@ def verdict(run: Run) -> str:
 
 
 def fail_if_failed(run: Run, *, by_samples: bool = False) -> None:
-    """Raise what a run failed at first; by_samples: its times count the samples, from 0."""
+    """Raise a KinfmuError with the first event of level "error" and when that was, in [s]; by_samples: times of the run
+    count the samples, from 0.
+    """
     for event in run.events:
         if event.level == "error":
             told = event.text.startswith("at t = ")  # an FMU says itself when

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.joints.laws import External
@@ -40,18 +40,21 @@ def build(
     The same mechanism, compiled by the same compiler, gives the same bytes. CompilerError if there is no compiler.
     """
     if flavour not in FLAVOURS:
-        raise FmuError(f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}")
+        raise RequestError(
+            f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"
+        )
     drive = default_drive(mechanism) if drive is None else drive
     if drive not in DRIVES:
-        raise FmuError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
+        raise RequestError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
     if fmi not in FMI_VERSIONS:
-        raise FmuError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
+        raise RequestError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
     if platforms not in PLATFORMS:
-        raise FmuError(
+        raise RequestError(
             f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
         )
     if flavour == "python" and (fmi != 2 or platforms != "host"):
-        raise FmuError("the python flavour is FMI 2.0 on pythonfmu's platforms; flavour 'native' has fmi and platforms")
+        said = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
+        raise RequestError(f"{said} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")
     from kinfmu import VERSION
     from kinfmu.plan import compile_plan
 
@@ -86,5 +89,5 @@ def _file(path: str | Path | None, name: str) -> Path:
     if path.is_dir():
         return path / f"{name}.fmu"
     if path.suffix != ".fmu":
-        raise FmuError(f"{path}: the file of an FMU ends in .fmu")
+        raise RequestError(f"{path}: the file of an FMU ends in .fmu")
     return path

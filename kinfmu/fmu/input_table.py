@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinfmu.errors import FmuError, listed, suggestion
+from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.short_way import short_way
@@ -27,19 +27,38 @@ ROUNDING = 1e-9  # of the range: how far times may lie beyond the table by round
 
 @dataclass(frozen=True, eq=False)
 class InputTable:
-    """Values of inputs at given times. t: (r,) [s], increasing; names: the k inputs; values: (r, k)."""
+    """Values of inputs at given times.
+
+    t: (r,) [s], increasing; names: the k inputs; values: (r, k); source: as messages name it; unitless: names of
+    columns of a file that say no unit.
+    """
 
     t: NDArray[np.float64]
     names: tuple[str, ...]
     values: NDArray[np.float64]
     source: str
+    unitless: tuple[str, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """Time of the first row [s]."""
+        return float(self.t[0])
+
+    @property
+    def stop(self) -> float:
+        """Time of the last row [s]."""
+        return float(self.t[-1])
 
     def at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, k) values at times (n,): those of a row where one matches, linear between rows."""
-        slack = ROUNDING * max(abs(self.t[0]), abs(self.t[-1]), self.t[-1] - self.t[0])
-        if t[0] < self.t[0] - slack or t[-1] > self.t[-1] + slack:
-            raise FmuError(
-                f"{self.source}: holds {self.t[0]:g} to {self.t[-1]:g} s, the run goes from {t[0]:g} to {t[-1]:g} s"
+        """(n, k) values at times (n,): those of a row where one matches, linear between rows.
+
+        Raises a RequestError for times before the first row or after the last: inputs are not made up there.
+        """
+        slack = ROUNDING * max(abs(self.start), abs(self.stop), self.stop - self.start)
+        if t[0] < self.start - slack or t[-1] > self.stop + slack:
+            raise RequestError(
+                f"{self.source}: holds {self.start:g} to {self.stop:g} s, the run goes from {t[0]:g} to {t[-1]:g} s; "
+                "let it end with the rows, or give rows up to its ends"
             )
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
 
@@ -66,7 +85,7 @@ def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTa
     """The table with its angles followed the short way from row to row."""
     angles = [quantities[name] == Quantity("angle") for name in table.names]
     if not any(angles):
-        raise FmuError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
+        raise RequestError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
     columns = [
         short_way(column) if is_angle else column for column, is_angle in zip(table.values.T, angles, strict=True)
     ]
@@ -95,7 +114,7 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
     except UnicodeDecodeError:
         raise FmuError(f"{path}: is not a text file") from None
     except OSError as error:
-        raise FmuError(f"{path}: cannot be read ({error.strerror})") from None
+        raise RequestError(f"{path}: cannot be read ({error.strerror})") from None
     if not rows:
         raise FmuError(f"{path}: is empty; its first line must name the columns: {listed((TIME, *known))}")
     titles = [_title(name) for name in rows[0][1]]
@@ -113,7 +132,8 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             except ValueError:
                 raise FmuError(f"{path}, line {line}: {name} = '{cell.strip()}' is not a number") from None
     arrays = {name: np.array(values) for name, values in columns.items()}
-    return _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
+    table = _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
+    return replace(table, unitless=tuple(name for name, unit in titles if not unit))
 
 
 def _title(cell: str) -> tuple[str, str]:

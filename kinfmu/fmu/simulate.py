@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MechanismError, listed, suggestion
+from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
+from kinfmu.fmu.input_notes import input_notes, undriven
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interrupt import interruptible
 from kinfmu.fmu.slaves import Slave, slave
+from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.solver.status import Status
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
-_WARNING, _DISCARD, _ERROR = 1, 2, 3
+_DISCARD, _ERROR = 2, 3
 
 
 def simulate(
@@ -49,14 +51,18 @@ def simulate(
 ) -> Run:
     """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
 
-    start, stop, step: [s], from the FMU's default experiment where not given; samples at t_k = start + k step, a last
-    shorter step ends at stop. inputs: a CSV file with the columns `time` and inputs such as `crank_angle`, or
-    `crank_angle [deg]` with a unit, or a mapping of arrays by name; linear between rows. Inputs drive then, unless
-    parameters say otherwise. parameters: by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap:
-    angles among the inputs are followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump
-    is a turn back. progress: called with (samples done, samples in all).
+    start, stop, step: [s]; where not given those of the FMU's default experiment, but start and stop of the first and
+    the last row where there are inputs; samples at t_k = start + k step, a last shorter step ends at stop. inputs: a
+    CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit, or a mapping
+    of arrays by name; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name,
+    such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap: angles among the inputs are followed the short way
+    where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. progress: called with (samples
+    done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
+
+    What is probably not meant (inputs that nothing drives, angles that jump by more than half a turn, radians that look
+    like degrees) is told by events of level "warning" and "info".
 
     Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
     of level "error" names driver, value and limit.
@@ -65,15 +71,17 @@ def simulate(
     with _unpacked(path) as folder:
         about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))
         interface = about.interface
-        t = _times(interface, start, stop, step)
         if wrap and inputs is None:
-            raise FmuError("wrap follows angles among the inputs, and no inputs are given")
+            raise RequestError("wrap follows angles among the inputs, and no inputs are given")
         table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
+        experiment = interface.experiment
+        t = _times(table or experiment, start, stop, experiment.step if step is None else step)
         chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
         samples = _Samples(interface, len(t))
-        if table is None and not _time_drives(interface, chosen):
-            samples.now = float(t[0])
-            samples.log(_WARNING, "driven by inputs, and none are given: the drivers stay at their start values")
+        if not _time_drives(interface, chosen):
+            samples.extend(undriven(interface, table, float(t[0])))
+        if table is not None:
+            samples.extend(input_notes(interface, table, start, stop))
         with interruptible() as interrupted, slave(about, folder, samples.log) as one:
             _initialize(one, chosen, t, samples.said)
             samples.read_fixed(one)
@@ -98,19 +106,18 @@ def _unpacked(path: Path) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _times(interface: Interface, start: float | None, stop: float | None, step: float | None) -> NDArray[np.float64]:
-    """(n,) t_k = start + k step up to stop, which is always the last."""
-    experiment = interface.experiment
-    first = experiment.start if start is None else float(start)
-    last = experiment.stop if stop is None else float(stop)
-    h = experiment.step if step is None else float(step)
+def _times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
+    """(n,) t_k = start + k step up to stop, which is always the last; start and stop of `span` where not given."""
+    first = span.start if start is None else float(start)
+    last = span.stop if stop is None else float(stop)
+    h = float(step)
     if not np.isfinite([first, last, h]).all() or h <= 0.0 or last < first:
-        raise FmuError(
+        raise RequestError(
             f"start = {first:g} s, stop = {last:g} s, step = {h:g} s: "
             "a run needs finite times, start <= stop and a positive step"
         )
     if (last - first) / h > MOST_SAMPLES:
-        raise FmuError(f"{first:g} to {last:g} s in steps of {h:g} s: more than {MOST_SAMPLES} samples")
+        raise RequestError(f"{first:g} to {last:g} s in steps of {h:g} s: more than {MOST_SAMPLES} samples")
     count = int((last - first) / h + LAST_STEP)
     t: NDArray[np.float64] = first + h * np.arange(count + 1, dtype=np.float64)
     if last - t[-1] > LAST_STEP * h:
@@ -127,19 +134,19 @@ def _parameters(
     chosen: dict[str, float | bool] = {}
     for name, value in parameters.items():
         if name not in known:
-            raise FmuError(
+            raise RequestError(
                 f"{where}: '{name}' is no parameter of this FMU{suggestion(name, known)}; parameters: {listed(known)}"
             )
         if known[name].type == "Boolean":
             if value not in (False, True):
-                raise FmuError(f"{where}: {name} = {value!r} must be true or false")
+                raise RequestError(f"{where}: {name} = {value!r} must be true or false")
             chosen[name] = bool(value)
         else:
             quantity = quantity_in(known[name].unit or "1", interface.length_unit)
             try:
                 chosen[name] = measured(f"{where}: {name}", value, quantity, interface.length_unit)
             except MechanismError as error:
-                raise FmuError(str(error)) from None
+                raise RequestError(str(error)) from None
     if has_inputs:
         chosen.setdefault("driven_by_time", False)
     return chosen
@@ -218,6 +225,10 @@ class _Samples:
         event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
         if not self._events or self._events[-1] != event:
             self._events.append(event)
+
+    def extend(self, events: Iterable[Event]) -> None:
+        """Events of their own times."""
+        self._events.extend(events)
 
     def said(self) -> str:
         """The last message."""

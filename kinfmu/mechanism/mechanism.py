@@ -8,12 +8,14 @@ from types import MappingProxyType
 from typing import Any
 
 from kinfmu.drivers import Driver
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints import Joint
 from kinfmu.joints.arithmetic import Value
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.law_constant import LawConstant, law_constants, with_law_constants
+from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.parameters import Parameter, evaluated
 from kinfmu.mechanism.places import Members, Place
 from kinfmu.mechanism.quoted import quoted
@@ -117,17 +119,30 @@ class Mechanism:
 
         return self.members.changed(computed)
 
+    @property
+    def law_constants(self) -> tuple[LawConstant, ...]:
+        """Constants of the drivers' laws; those that expressions give follow from parameters and are not among them."""
+        return tuple(law_constants(self.drivers, self.expressions))
+
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with other values of some parameters: numbers, text with a unit, or expressions.
 
-        Raises a MechanismError for a name that is no parameter and for values with which the mechanism cannot be meant.
+        Constants of laws go by their names, too, such as "crank.speed", as numbers or text with a unit. Raises a
+        RequestError for a name that is neither, a MechanismError for values with which the mechanism cannot be meant.
         """
         parameters = dict(self.parameters)
+        settable = {constant.name: constant for constant in self.law_constants}
+        constants: dict[str, float] = {}
         for name, value in values.items():
+            if name in settable:
+                constants[name] = measured(name, value, settable[name].quantity, self.length_unit)
+                continue
             if name not in parameters:
-                near = suggestion(name, parameters)
-                raise MechanismError(f"there is no parameter {quoted(name)}{near}; parameters: {listed(parameters)}")
+                known = [*parameters, *settable]
+                raise RequestError(
+                    f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
+                )
             old = parameters[name]
             quantity = None if old.kind == "number" else old.quantity  # a pure number, or nobody could know
             parameters[name] = Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved
-        return replace(self, parameters=parameters)
+        return replace(self, parameters=parameters, drivers=with_law_constants(self.drivers, constants))

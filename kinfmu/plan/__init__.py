@@ -5,12 +5,11 @@ from __future__ import annotations
 from kinfmu.plan.block import Block
 from kinfmu.plan.determinant import determinant_formula
 from kinfmu.plan.origin import localized
-from kinfmu.plan.plan import DriverInfo, LawConstant, Motion, SolvePlan, compile_plan, plan_from
+from kinfmu.plan.plan import DriverInfo, Motion, SolvePlan, compile_plan, plan_from
 
 __all__ = [
     "Block",
     "DriverInfo",
-    "LawConstant",
     "Motion",
     "SolvePlan",
     "compile_plan",

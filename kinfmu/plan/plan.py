@@ -11,8 +11,8 @@ from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rou
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
-from kinfmu.errors import InconsistentError, MechanismError, MobilityError, listed, suggestion
-from kinfmu.mechanism import Mechanism, Point
+from kinfmu.errors import InconsistentError, MobilityError, RequestError, listed, suggestion
+from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
 from kinfmu.plan.conditions import PlanCondition, find_conditions
@@ -29,15 +29,6 @@ class DriverInfo(NamedTuple):
     name: str
     inputs: tuple[str, str, str]
     quantity: Quantity
-
-
-class LawConstant(NamedTuple):
-    """A constant of a law of motion, settable under its name `<driver>.<key>`."""
-
-    name: str
-    value: float
-    quantity: Quantity
-    is_positive: bool = False  # other values are refused
 
 
 class PlanParameter(NamedTuple):
@@ -246,7 +237,7 @@ def plan_from(
         size=system.size,
         origin=origin,
         drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
-        law_constants=_law_constants(mechanism),
+        law_constants=mechanism.law_constants,
         parameters=parameters,
         laws=_laws(mechanism, tracer),
         blocks=tuple(blocks),
@@ -349,7 +340,7 @@ def _chosen(motions: Sequence[Motion], coordinate_count: int, outputs: Sequence[
     known = [motion.name for motion in motions]
     for name in outputs:
         if name not in known:
-            raise MechanismError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
+            raise RequestError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
     chosen = [(k, motion) for k, motion in enumerate(motions) if motion.name in outputs]
     return [motion for _, motion in chosen], sum(k < coordinate_count for k, _ in chosen)
 
@@ -363,15 +354,6 @@ def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
             wanted |= {symbol.name for symbol in symbols(_nodes(block)[: _position_count(block)])}
             needed.append(block)
     return needed[::-1]
-
-
-def _law_constants(mechanism: Mechanism) -> tuple[LawConstant, ...]:
-    return tuple(
-        LawConstant(f"{driver.name}.{key}", float(value), said.quantity(*driver.law_kinds), said.is_positive)
-        for driver in mechanism.drivers
-        for key, (value, said) in driver.law.constants().items()
-        if ("drivers", driver.name, "law", key) not in mechanism.expressions  # those follow from parameters
-    )
 
 
 def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:

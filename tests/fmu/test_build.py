@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu.errors import FmuError
+from kinfmu.errors import RequestError
 from kinfmu.fmu import build
 from tests.fmu.conftest import GALLERY, mechanism
 
@@ -96,11 +96,13 @@ def test_outputs_can_be_chosen(tmp_path: Path) -> None:
     [
         ({"flavour": "natve"}, "flavour 'natve' is not known; did you mean 'native'.*flavours: python, native"),
         ({"drive": "input"}, "drive = 'input' is not known; did you mean 'inputs'"),
+        ({"fmi": 3}, "fmi = 3 needs flavour = 'native'; the python flavour is FMI 2.0"),
+        ({"platforms": "all"}, "platforms = 'all' needs flavour = 'native'"),
         ({"path": "fourbar.zip"}, r"fourbar\.zip: the file of an FMU ends in \.fmu"),
     ],
 )
 def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, str], words: str) -> None:
-    with pytest.raises(FmuError, match=words):
+    with pytest.raises(RequestError, match=words):
         build(mechanism("fourbar"), **arguments)  # type: ignore[arg-type]
 
 

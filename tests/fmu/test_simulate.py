@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.errors import FmuError
+from kinfmu.errors import FmuError, RequestError
 from kinfmu.fmu import simulate
 from kinfmu.mechanism import toml_file
 from kinfmu.solver.status import Status
@@ -113,7 +113,6 @@ def test_columns_of_a_csv_may_name_their_units(fourbar: Path, tmp_path: Path, de
         ("time,crank_angle\n0,1\n5,nan\n", "line 3: crank_angle = nan is not a finite number"),
         ("time,crank_angle\n0,1\n5,x\n", "line 3: crank_angle = 'x' is not a number"),
         ("time,crank_angle\n0,1\n5\n", "line 3: 1 values, the header names 2 columns"),
-        ("time,crank_angle\n0,1\n2,1\n", "holds 0 to 2 s, the run goes from 0 to 3 s"),
         ("time,crank_angle\n", "holds no samples"),
         ("time,crank_angle [mm]\n0,1\n5,1\n", r"unit 'mm' of crank_angle must be one of rad, deg, rev"),
         ("time [deg],crank_angle\n0,1\n5,1\n", r"unit 'deg' of time must be one of s, ms, min, h"),
@@ -153,10 +152,19 @@ def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
         ({"step": 0.0}, "a positive step"),
         ({"start": 9.0, "stop": 1.0}, "start <= stop"),
         ({"inputs": "nowhere.csv"}, r"nowhere\.csv: cannot be read"),
+        ({"wrap": True}, "wrap follows angles among the inputs, and no inputs are given"),
+        (
+            {"inputs": {"time": [0.0, 2.0], "crank_angle": [1.0, 2.0]}, "stop": 3.0},
+            "inputs: holds 0 to 2 s, the run goes from 0 to 3 s; let it end with the rows",
+        ),
+        (
+            {"inputs": {"time": [1.0, 2.0], "crank_angle": [1.0, 2.0]}, "start": 0.0},
+            "inputs: holds 1 to 2 s, the run goes from 0 to 2 s; let it end with the rows",
+        ),
     ],
 )
 def test_faults_of_a_call_are_named(fourbar: Path, arguments: dict[str, object], words: str) -> None:
-    with pytest.raises(FmuError, match=words):
+    with pytest.raises(RequestError, match=words):
         simulate(fourbar, **arguments)  # type: ignore[arg-type]
 
 
@@ -181,8 +189,8 @@ def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     before = list(sys.path)
     simulate(pendulum, stop=3.0)
-    with pytest.raises(FmuError, match="holds"):
-        simulate(pendulum, inputs={"time": [0.0], "crank_angle": [5.0]})
+    with pytest.raises(RequestError, match="holds"):
+        simulate(pendulum, stop=1.0, inputs={"time": [0.0], "crank_angle": [5.0]})
     assert list(folder.iterdir()) == []
     assert sys.path == before
     assert capfd.readouterr() == ("", "")
@@ -193,7 +201,10 @@ def test_fmu_driven_by_inputs_stays_at_its_start_without_any_and_says_so(built: 
     assert run["upper.phi"] == pytest.approx(np.full(4, np.radians(300.0)))
     assert run["upper.omega"] == pytest.approx(np.zeros(4))
     assert [event.level for event in run.events] == ["warning"]
-    assert "none are given" in run.events[0].text
+    assert run.events[0].text == (
+        "no inputs are given: crank_angle stays at 5.23599 rad; a CSV with the columns time, crank_angle "
+        "drives (--input)"
+    )
 
 
 def test_ctrl_c_ends_the_run_and_keeps_what_was_reached(fourbar: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from kinfmu.drivers import AngleDriver
 from kinfmu.equations.graph import Graph, evaluate
-from kinfmu.errors import MechanismError
+from kinfmu.errors import MechanismError, RequestError
 from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute
 from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
@@ -354,7 +354,7 @@ def test_other_values_that_cannot_be_meant_are_told() -> None:
     mechanism = parse(FOURBAR)
 
     def changed(**values: Any) -> str:
-        with pytest.raises(MechanismError) as caught:
+        with pytest.raises((RequestError, MechanismError)) as caught:
             mechanism.with_parameters(values)
         return str(caught.value)
 
@@ -369,6 +369,20 @@ def test_other_values_that_cannot_be_meant_are_told() -> None:
         "[joints.rod] length = -1.0 must be a positive number, 1e-30 or more (length = 'rod', rod = -1.0)"
     )
     assert changed(ratio="10 mm") == "[bodies.rocker] points.Q = '70 mm * ratio' is length^2 and must be a length"
+
+
+def test_constants_of_laws_are_changed_by_their_names_and_what_follows_is_not() -> None:
+    fixed = FOURBAR.replace('start = "2*tilt"', "start = 0.25")
+    mechanism = parse(fixed)
+    assert [constant.name for constant in mechanism.law_constants] == ["crank.start"]
+    (driver,) = mechanism.with_parameters({"crank.start": "45 deg"}).drivers
+    assert driver.law.start == math.pi / 4  # type: ignore[attr-defined]
+    assert driver.law.speed == mechanism.drivers[0].law.speed  # type: ignore[attr-defined]
+    assert mechanism.with_parameters({"crank.start": 0.25}) == mechanism
+    with pytest.raises(RequestError, match=r"there is no parameter 'crank\.speed'; .*, turn, crank\.start$"):
+        mechanism.with_parameters({"crank.speed": 1.0})
+    with pytest.raises(MechanismError, match=r"^crank\.start = '2 mm': unit 'mm' must be one of rad, deg, rev"):
+        mechanism.with_parameters({"crank.start": "2 mm"})
 
 
 def test_a_table_of_a_parameter_is_checked() -> None:

@@ -187,8 +187,8 @@ def test_the_command_writes_it(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == schema_text() == CliRunner().invoke(main, ["schema"]).stdout
     assert json.loads(schema_text()) == schema()
     result = CliRunner().invoke(main, ["schema", "-o", str(tmp_path / "none" / "a.json")])
-    assert result.exit_code == 1
-    assert result.stderr.endswith("cannot be written (No such file or directory)\n")
+    assert result.exit_code == 2
+    assert result.stderr.endswith(f"there is no folder '{tmp_path / 'none'}'\n")
 
 
 def test_the_line_that_names_the_schema_is_a_comment() -> None:

@@ -1,0 +1,143 @@
+"""Exit status of every command, and what is told: 1 the mechanism or the run is at fault, 2 wrong usage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.cli import main
+from tests.cli.conftest import Command
+
+FILES = {
+    "broken.toml": "name = 'broken'\n[bodies.crank]\nponts = {}\n",
+    "folder.toml": None,
+    "text.fmu": "no archive",
+    "damaged.mcap": "no record",
+    "no_time.csv": "crank_angle\n0\n",
+    "words.csv": "time,crank_angle\n0,0\n1,far\n",
+    "short.csv": "time,crank_angle\n0,0\n1,0.5\n",
+    "past.csv": "time,crank_angle [deg]\n0,300\n2,380\n",
+}
+
+# arguments, and words of what is told
+WRONG_USAGE = [
+    ("list fourbar", "unexpected extra argument"),
+    ("check", "Missing argument 'MECH'"),
+    ("check forbar", "did you mean 'fourbar'?"),
+    ("check contradicting", "did you mean 'contradicting.toml'?"),
+    ("check none.toml", "none.toml: there is no such file"),
+    ("check contradictin.toml", "did you mean 'contradicting.toml'?"),
+    ("check folder.toml", "folder.toml: is a folder"),
+    ("check fourbar_chain:0", "the count must be a whole number from 1 to"),
+    ("check fourbar --figure four.gif", "four.gif: its name must end in one of .svg, .png"),
+    ("check fourbar --figure none/four.svg", "none/four.svg: there is no folder 'none'"),
+    ("check fourbar --set a=1", "fourbar has no parameter 'a'"),
+    ("check fourbar --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),
+    ("new forbar mine.toml", "did you mean 'fourbar'?"),
+    ("new fourbar mine.txt", "mine.txt: its name must end in .toml"),
+    ("new fourbar broken.toml", "broken.toml: is there already"),
+    ("new fourbar none/mine.toml", "there is no folder 'none'"),
+    ("schema -o none/schema.json", "there is no folder 'none'"),
+    ("solve fourbar", "Missing option '-o'"),
+    ("solve forbar -o run.csv", "did you mean 'fourbar'?"),
+    ("solve fourbar -o run.xls", "run.xls: its name must end in one of .csv, .parquet, .npz"),
+    ("solve fourbar -o none/run.csv", "there is no folder 'none'"),
+    ("solve fourbar -o run.csv --set crank.sped=1", "did you mean 'crank.speed'?"),
+    ("solve fourbar -o run.csv --outputs roker.phi", "did you mean 'rocker.phi'?"),
+    ("solve fourbar -o run.csv --times 0:1", "must be A:B:STEP"),
+    ("solve fourbar -o run.csv --angle 0:1:2 --times 0:1:1", "cannot both drive"),
+    ("solve five_bar -o run.csv --angle 0:1:2", "this mechanism has 2"),
+    ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
+    ("build forbar", "did you mean 'fourbar'?"),
+    ("build fourbar -o four.zip", "four.zip: the file of an FMU ends in .fmu"),
+    ("build fourbar --fmi 3", "--fmi 3 needs --flavour native"),
+    ("build fourbar --platforms all", "--platforms all needs --flavour native"),
+    ("build fourbar --set crank.sped=1", "did you mean 'crank.speed'?"),
+    ("build fourbar --outputs roker.phi", "did you mean 'rocker.phi'?"),
+    ("simulate none.fmu", "none.fmu: there is no such file"),
+    ("simulate forbar", "did you mean 'fourbar'?"),
+    ("simulate fourbar --input none.csv", "none.csv: there is no such file"),
+    ("simulate fourbar --mcap none/run.mcap", "there is no folder 'none'"),
+    ("simulate fourbar --rrd run.txt", "run.txt: its name must end in .rrd"),
+    ("simulate fourbar --set crank.sped=1", "did you mean 'crank.speed'?"),
+    ("simulate fourbar.fmu --set crank.sped=1", "did you mean 'crank.speed'?"),
+    ("simulate fourbar.fmu --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),
+    ("simulate fourbar --step 0", "a positive step"),
+    ("simulate fourbar --start 3 --stop 1", "start <= stop"),
+    ("simulate fourbar --wrap", "--wrap follows the angles of --input"),
+    ("simulate fourbar --input short.csv --stop 2", "holds 0 to 1 s, the run goes from 0 to 2 s"),
+    ("review none.mcap", "none.mcap: there is no such file"),
+    ("review short.csv", "short.csv: its name must end in one of .mcap, .rrd"),
+    ("review damaged.mcap none.mcap", "none.mcap: there is no such file"),
+    ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
+    ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
+    ("bench speed", "'speed' is not a measurement"),
+    ("bench --mechanism forbar", "did you mean 'fourbar'?"),
+]
+AT_FAULT = [
+    ("check broken.toml", "broken.toml: [bodies.crank] ponts: unknown key"),
+    ("check contradicting.toml", "contradicts the other joints"),
+    ("solve broken.toml -o run.csv", "broken.toml: [bodies.crank] ponts: unknown key"),
+    ("solve contradicting.toml -o run.csv", "contradicts the other joints"),
+    ("solve double_pendulum -o run.csv --times 0:3:1", "cannot be reached"),
+    ("build broken.toml", "broken.toml: [bodies.crank] ponts: unknown key"),
+    ("build contradicting.toml", "contradicts the other joints"),
+    ("simulate broken.toml", "broken.toml: [bodies.crank] ponts: unknown key"),
+    ("simulate text.fmu", "text.fmu: is no FMU"),
+    ("simulate double_pendulum --stop 3 --step 1", "cannot be reached"),
+    ("simulate double_pendulum --step 1 --input past.csv", "cannot be reached"),
+    ("simulate fourbar --input no_time.csv", "the column 'time' is missing"),
+    ("simulate fourbar --input words.csv", "line 3: crank_angle = 'far' is not a number"),
+    ("review damaged.mcap --save run.rrd", "damaged.mcap"),
+]
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return kinfmu.build(kinfmu.load("fourbar"), tmp_path_factory.mktemp("fmu") / "fourbar.fmu").read_bytes()
+
+
+@pytest.fixture
+def folder(tmp_path: Path, fmu: bytes) -> Path:
+    """What is there: files with and without faults."""
+    for name, text in FILES.items():
+        if text is None:
+            (tmp_path / name).mkdir()
+        else:
+            (tmp_path / name).write_text(text, encoding="utf-8")
+    fourbar = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")
+    assert "length = 1\n" in fourbar
+    (tmp_path / "contradicting.toml").write_text(fourbar.replace("length = 1\n", "length = 1.01\n"), encoding="utf-8")
+    (tmp_path / "fourbar.fmu").write_bytes(fmu)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("arguments", "told"), WRONG_USAGE, ids=[arguments for arguments, _ in WRONG_USAGE])
+def test_wrong_usage_is_told_with_status_two_and_leaves_nothing_behind(
+    arguments: str, told: str, refuses: Callable[..., str], folder: Path
+) -> None:
+    before = sorted(folder.iterdir())
+    assert told in refuses(*arguments.split())
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(("arguments", "told"), AT_FAULT, ids=[arguments for arguments, _ in AT_FAULT])
+def test_a_fault_of_the_mechanism_or_of_the_run_is_told_with_status_one(
+    arguments: str, told: str, command: Command, folder: Path
+) -> None:
+    assert folder.is_dir()
+    result = command(*arguments.split())
+    assert result.exit_code == 1
+    *_, last = result.stderr.splitlines()
+    assert last.startswith("kinfmu: ")
+    assert told in last
+
+
+def test_every_command_that_can_be_at_fault_is_in_the_tables() -> None:
+    refused, at_fault = ({arguments.split()[0] for arguments, _ in table} for table in (WRONG_USAGE, AT_FAULT))
+    assert refused >= set(main.commands)
+    assert at_fault >= set(main.commands) - {"bench", "list", "new", "schema"}

@@ -1,0 +1,137 @@
+"""What is told beside results: notes of what was understood, warnings of what is probably not meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import log
+from tests.cli.conftest import Command, read_csv
+
+
+@pytest.fixture
+def notes(command: Command) -> Callable[..., list[str]]:
+    """`notes("solve", ...)`: the lines on stderr of a command that ends well, without their `kinfmu: `."""
+
+    def run(*arguments: object) -> list[str]:
+        result = command(*arguments)
+        assert result.exit_code == 0, result.stderr
+        lines = result.stderr.splitlines()
+        assert all(line.startswith("kinfmu: ") for line in lines)
+        return [line.removeprefix("kinfmu: ") for line in lines]
+
+    return run
+
+
+def test_a_run_takes_its_ends_from_the_rows_of_its_input(notes: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n2,30\n4,32\n5,33\n")
+    assert notes("simulate", "fourbar", "--input", "in.csv") == [
+        "note: the run goes from 2 to 5 s, as the rows of in.csv"
+    ]
+    run = log.read(tmp_path / "logs" / "fourbar.mcap")
+    assert run.t.tolist() == [2.0, 3.0, 4.0, 5.0]
+    assert np.degrees(run["crank.phi"]) == pytest.approx([30.0, 31.0, 32.0, 33.0])
+    assert notes("simulate", "fourbar", "--input", "in.csv", "--stop", 3) == [
+        "note: the run goes from 2 to 3 s, one end as the rows of in.csv"
+    ]
+    assert log.read(tmp_path / "logs" / "fourbar.mcap").t.tolist() == [2.0, 3.0]
+    assert notes("simulate", "fourbar", "--input", "in.csv", "--start", 3, "--stop", 4) == []
+
+
+def test_a_table_as_long_as_the_models_run_needs_no_word(notes: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("time,crank_angle\n0,0.5\n180,1.5\n")
+    assert notes("simulate", "fourbar", "--input", "in.csv") == []
+
+
+def test_an_fmu_driven_by_inputs_says_that_it_stands_still_and_how_to_drive_it(
+    notes: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    kinfmu.build(kinfmu.load("five_bar"), tmp_path / "five.fmu", drive="inputs")
+    (told,) = notes("simulate", "five.fmu")
+    start = {driver.name: driver.law.at(0.0) for driver in kinfmu.load("five_bar").drivers}
+    values = ", ".join(f"{name}_angle stays at {value:.6g} rad" for name, value in start.items())
+    names = ", ".join(f"{name}_angle" for name in start)
+    assert told == (f"warning: no inputs are given: {values}; a CSV with the columns time, {names} drives (--input)")
+    first, second = names.split(", ")
+    (tmp_path / "one.csv").write_text(f"time,{first}\n0,{start['left']}\n0.1,{start['left'] + 0.01}\n")
+    *_, told = notes("simulate", "five.fmu", "--input", "one.csv", "--stop", "0.1", "--start", "0")
+    assert told.startswith(f"warning: one.csv does not drive all inputs: {second} stays at ")
+
+
+def test_a_mechanism_without_a_law_is_driven_by_inputs_and_says_so(
+    notes: Callable[..., list[str]], fourbar_file: Callable[..., Path]
+) -> None:
+    path = fourbar_file('law = "constant_speed"\nstart = 0\nspeed = "1 deg/s"', 'law = "external"\nstart = "60 deg"')
+    (told,) = notes("simulate", path)
+    assert told.startswith("warning: no inputs are given: crank_angle stays at 1.0472 rad; a CSV")
+    (told,) = notes("solve", path, "-o", "run.csv")
+    assert told == (
+        "warning: driver crank has no law, so nothing moves it by time; --angle drives a single one, simulate --input "
+        "any number"
+    )
+    assert notes("solve", path, "-o", "run.csv", "--angle", "0:1:3") == []
+
+
+def test_an_input_that_jumps_by_a_turn_is_warned_of_unless_wrap_follows_it(
+    notes: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n0,340\n10,350\n20,0\n30,10\n")
+    call = ("simulate", "fourbar", "--input", "in.csv", "--stop", 30)
+    assert notes(*call) == [
+        "warning: in.csv: crank_angle jumps by -350 deg from 10 to 20 s; followed as given; --wrap follows wrapped "
+        "angles, from 360 to 0 deg, say, the short way"
+    ]
+    assert notes(*call, "--wrap") == []
+    speed = log.read(tmp_path / "logs" / "fourbar.mcap")["crank.omega"]
+    assert np.degrees(speed[1:]) == pytest.approx(np.ones(30))
+
+
+def test_every_jump_is_counted_and_half_a_turn_is_none(notes: Callable[..., list[str]], tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n0,0\n60,180\n120,361\n180,0\n")
+    (told,) = notes("simulate", "fourbar", "--input", "in.csv")
+    assert told.startswith(
+        "warning: in.csv: crank_angle jumps by 181 deg from 60 to 120 s, and 1 more such jump; followed"
+    )
+
+
+def test_angles_of_an_input_without_unit_that_look_like_degrees_are_told(
+    notes: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    (tmp_path / "in.csv").write_text("time,crank_angle\n0,0\n180,360\n")
+    assert notes("simulate", "fourbar", "--input", "in.csv") == [
+        "note: in.csv: crank_angle has no unit, so it is in rad: 0 to 360 rad, 57.3 turns; 'crank_angle [deg]' in the "
+        "header says degrees"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("angle", "told"),
+    [
+        ("0:360:3", "note: --angle 0:360:3: 0 to 360 rad, 57.3 turns; write 0deg:360deg:3 for degrees"),
+        ("-45:30:2", "note: --angle -45:30:2: -45 to 30 rad, 11.9 turns; write -45deg:30deg:2 for degrees"),
+        ("0deg:720deg:3", "warning: --angle 0deg:720deg:3: steps of 1 turns between samples; --wrap takes each the"),
+        ("0deg:360deg:3", None),
+        ("0:6.3:7", None),
+        ("0deg:360:361", None),
+    ],
+)
+def test_driver_values_that_are_hardly_meant_are_told(
+    angle: str, told: str | None, notes: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    lines = notes("solve", "crank_rocker", "-o", "run.csv", "--angle", angle)
+    assert len(lines) == (told is not None)
+    assert all(line.startswith(str(told)) for line in lines)
+    assert read_csv(tmp_path / "run.csv")["solver.status"].max() < 3
+
+
+def test_a_constant_of_an_angle_that_looks_like_degrees_is_told(notes: Callable[..., list[str]]) -> None:
+    call = ("solve", "fourbar", "-o", "run.csv", "--times", "0:1:1")
+    assert notes(*call, "--set", "crank.start=90") == [
+        "note: crank.start = 90 rad, 14.3 turns; write crank.start=90deg for degrees"
+    ]
+    assert notes(*call, "--set", "crank.start=90deg") == []
+    assert notes(*call, "--set", "crank.speed=90") == []
