@@ -1,5 +1,4 @@
-"""The command line: kinfmu list | new | schema | check | solve | build | simulate | review | export |
-bench.
+"""The command line: kinfmu list | new | schema | check | solve | build | simulate | review | export | bench.
 
 A command a file, which puts itself into the group `main` when it is imported.
 """

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import listed
 
@@ -24,17 +25,18 @@ def _table(run: Run, path: Path) -> None:
 FORMATS: dict[str, Callable[[Run, Path], None]] = {".csv": _table, ".parquet": _table, ".npz": _table}
 
 
-@main.command()
-@click.argument("run", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.csv")
+@click.argument("run", type=InputFile())
 @click.option(
-    "-o", "output", type=click.Path(dir_okay=False, path_type=Path), required=True, help=f"{listed(FORMATS)}."
+    "-o",
+    "output",
+    type=OutputFile(*FORMATS),
+    required=True,
+    help=f"The file to write: {listed(FORMATS)}.",
 )
 def export(run: Path, output: Path) -> None:
-    """Write RUN (.mcap) as a table; Parquet and npz hold the units too."""
+    """Write RUN, an .mcap of simulate, as a table; Parquet and npz hold the units, too."""
     from kinfmu.log import read
 
-    suffix = output.suffix.lower()
-    if suffix not in FORMATS:
-        raise click.UsageError(f"-o {output}: nothing is exported as '{suffix}'; endings: {listed(FORMATS)}")
-    FORMATS[suffix](read(run), output)
+    FORMATS[output.suffix.lower()](read(run), output)
     click.echo(f"written: {output}")

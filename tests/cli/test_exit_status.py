@@ -75,6 +75,10 @@ WRONG_USAGE = [
     ("review damaged.mcap none.mcap", "none.mcap: there is no such file"),
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
+    ("export none.mcap -o run.csv", "none.mcap: there is no such file"),
+    ("export damaged.mcap", "Missing option '-o'"),
+    ("export damaged.mcap -o run.xls", "run.xls: its name must end in one of .csv"),
+    ("export damaged.mcap -o none/run.csv", "there is no folder 'none'"),
     ("bench speed", "'speed' is not a measurement"),
     ("bench --mechanism forbar", "did you mean 'fourbar'?"),
 ]
@@ -93,6 +97,7 @@ AT_FAULT = [
     ("simulate fourbar --input no_time.csv", "the column 'time' is missing"),
     ("simulate fourbar --input words.csv", "line 3: crank_angle = 'far' is not a number"),
     ("review damaged.mcap --save run.rrd", "damaged.mcap"),
+    ("export damaged.mcap -o run.csv", "damaged.mcap"),
 ]
 
 
