@@ -51,6 +51,12 @@ def test_every_room_of_the_house_is_on_the_map_and_every_room_on_the_map_exists(
     assert mapped == rooms
 
 
+def test_every_module_beside_the_rooms_is_on_the_map_and_every_module_on_the_map_exists() -> None:
+    modules = {path.name for path in (ROOT / "kinfmu").glob("*.py")} - {"__init__.py"}
+    rows = [line for line in README.splitlines() if line.startswith("| `kinfmu/")]
+    assert set(re.findall(r"(\w+\.py)`", " ".join(rows))) == modules
+
+
 def test_the_readme_lists_the_gallery_by_name_and_title() -> None:
     listed = re.findall(r"^\| \[`(\w+)`\]\(fmus/(\w+)/README\.md\) \| (.+?) \| .+ \|$", README, re.MULTILINE)
     assert listed == [(name, name, kinfmu.load(name).title) for name in gallery.names()]

@@ -16,7 +16,7 @@ import pytest
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.backends.c import compiler, emit
+from kinfmu.backends.c import compiler, emit, library
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import CompilerError
 from kinfmu.plan import SolvePlan, compile_plan
@@ -181,6 +181,11 @@ def test_without_a_compiler_one_line_says_what_would_bring_one(fresh: Callable[[
 def test_what_a_compiler_complains_of_is_told() -> None:
     with pytest.raises(CompilerError, match=r"cannot compile the generated C: .*error"):
         compiler.shared_library({"a.c": "int f(void) { return x; }\n"})
+
+
+def test_messages_have_the_room_in_python_that_c_gives_them() -> None:
+    (room,) = re.findall(r"#define KF_MESSAGE (\d+)", compiler.sources(("solver.h",))["solver.h"])
+    assert int(room) == library.MESSAGE
 
 
 def test_a_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,7 @@ def array(declaration: str, items: Iterable[object]) -> list[str]:
 
 
 def booleans(values: Iterable[object]) -> list[str]:
+    """C's words for what counts as true or false in Python."""
     return ["true" if value else "false" for value in values]
 
 

@@ -34,6 +34,7 @@ def text(value: float | bool) -> str:
 
 
 def number(value: str | None) -> float | None:
+    """The number that an attribute says; None if it is not there."""
     return None if value is None else float(value)
 
 
@@ -80,6 +81,7 @@ def statuses(enumeration: Element) -> None:
 
 
 def log_categories(root: Element) -> None:
+    """LogCategories, with what they mean."""
     categories = SubElement(root, "LogCategories")
     for name, meaning in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=meaning)
