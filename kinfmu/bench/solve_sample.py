@@ -27,15 +27,15 @@ def run(rounds: int = ROUNDS) -> str:
     u = np.radians(DEGREES)
     ways = {
         "dense numpy Newton, 9 coordinates, warm start": _reference(u),
-        "python engine, q, qd, qdd": _engine(u),
-        "kinfmu.solve: writes its code, runs it, status": _solve(u),
+        "python engine, ready: q, qd, qdd": _engine(u),
+        "kinfmu.solve, which writes its code first": _solve(u),
         "the same, error estimates and margin read": _solve(u, read=True),
     }
     base, *_ = times = [
         spread([value / len(u) * 1e6 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
     ]
-    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us of processor time a sample"]
+    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us of processor time a sample, absolute errors"]
     lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
     for (name, way), of in zip(ways.items(), times, strict=True):
         faster, error = base.median / of.median, _error(way())
