@@ -35,7 +35,7 @@ def run(rounds: int = ROUNDS) -> str:
         spread([value / len(u) * 1e6 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
     ]
-    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds in turn; us of processor time a sample, absolute errors"]
+    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds; processor time a sample [us], absolute errors"]
     lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
     for (name, way), of in zip(ways.items(), times, strict=True):
         faster, error = base.median / of.median, _error(way())

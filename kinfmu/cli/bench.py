@@ -39,7 +39,7 @@ def _with_reference() -> list[str]:
     return [name for name in gallery.names() if (gallery.folder() / name / "reference.csv").is_file()]
 
 
-@main.command()
+@main.command(epilog="Example: kinfmu bench sample")
 @click.argument("what", nargs=-1, type=Named("WHAT", "a measurement", lambda: [*MEASUREMENTS, ALL]))
 @click.option(
     "--mechanism",
@@ -58,11 +58,13 @@ def _with_reference() -> list[str]:
     "there is none or with --mechanism.",
 )
 def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
-    """Measure on this machine, side by side with other ways; accuracy if nothing is said.
+    """Measure kinfmu on this machine, beside other ways.
+
+    WHAT is one or more of these; accuracy if nothing is said.
 
     \b
     accuracy  run time against error of every engine in every setting, and past
-              singular points: tables and charts as in docs/accuracy.md
+              singular points: tables and charts as in docs/accuracy.md; minutes
     sample    a sample of solve beside a dense numpy Newton
     sweep     a sweep by the native engine beside a closed form written by hand
     step      a step of the FMU beside the smallest pythonfmu FMU

@@ -62,7 +62,10 @@ def build(
     outputs: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
-    """Build the FMU of a mechanism, for co-simulation and, if native, for model exchange."""
+    """Build the FMU of a mechanism.
+
+    It is for co-simulation; a native one for model exchange, too.
+    """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive
 

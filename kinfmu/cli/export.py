@@ -35,7 +35,10 @@ FORMATS: dict[str, Callable[[Run, Path], None]] = {".csv": _table, ".parquet": _
     help=f"The file to write: {listed(FORMATS)}.",
 )
 def export(run: Path, output: Path) -> None:
-    """Write RUN, an .mcap of simulate, as a table; Parquet and npz hold the units, too."""
+    """Write a run as a table.
+
+    RUN is a record (.mcap) of simulate. Parquet and npz hold the units, too.
+    """
     from kinfmu.log import read
 
     FORMATS[output.suffix.lower()](read(run), output)

@@ -10,7 +10,10 @@ from kinfmu.cli.group import main
 
 @main.command("list", epilog="Example: kinfmu list")
 def list_() -> None:
-    """List the mechanisms of the gallery: names that stand for MECH in other commands."""
+    """List the mechanisms of the gallery.
+
+    Their names stand for MECH in other commands.
+    """
     names = gallery.names()
     width = max(map(len, names), default=0)
     for name in names:

@@ -17,7 +17,10 @@ from kinfmu.errors import KinfmuError
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.argument("file", type=OutputFile(".toml"))
 def new(mechanism: str, file: Path) -> None:
-    """Write FILE (.toml), a commented mechanism file to start from: a copy of MECH."""
+    """Write a commented mechanism file to start from.
+
+    FILE (.toml) becomes a copy of MECH.
+    """
     if exists(file):
         raise click.UsageError(f"{file}: is there already; nothing was written")
     source = gallery.folder() / mechanism / "mechanism.toml" if mechanism in gallery.names() else Path(mechanism)

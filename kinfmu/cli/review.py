@@ -19,7 +19,10 @@ from kinfmu.errors import listed
 @click.option("--screenshot", type=OutputFile(".png"), help="Take a picture (.png) with a viewer that needs no screen.")
 @click.option("--at", type=TIME, help="Time of the picture [s]; a third of the run if nothing is said.")
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
-    """Look at RUN, an .mcap of simulate, in the Rerun viewer; at two runs compared if OTHER is given."""
+    """Look at a run in the Rerun viewer, or at two compared.
+
+    RUN and OTHER are records (.mcap) of simulate; RUN may be a recording (.rrd).
+    """
     from kinfmu.log import review as reviewed
 
     recording = reviewed(run, other, save=save, screenshot=screenshot, at=at)

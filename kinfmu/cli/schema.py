@@ -14,7 +14,10 @@ from kinfmu.errors import KinfmuError
 @main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")
 @click.option("-o", "output", type=OutputFile(), help="The file to write; printed if nothing is said.")
 def schema(output: Path | None) -> None:
-    """Write the JSON Schema of mechanism files, by which editors complete and check them."""
+    """Write the JSON Schema of mechanism files.
+
+    Editors complete and check mechanism files by it.
+    """
     from kinfmu.mechanism.schema import schema_text
 
     if output is None:

@@ -19,9 +19,9 @@ from kinfmu.errors import KinfmuError
 
 @main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
 @click.argument("model", metavar="FMU|MECH", type=MODEL)
-@click.option("--start", type=TIME, help="Where the run starts [s]; if nothing is said as --input, else as the model.")
-@click.option("--stop", type=TIME, help="Where it stops [s]; alike.")
-@click.option("--step", type=TIME, help="Communication step [s]; the model's if nothing is said.")
+@click.option("--start", type=TIME, help="When it starts [s]; if nothing is said with --input, else as the model says.")
+@click.option("--stop", type=TIME, help="When it ends [s]; if nothing is said with --input, else as the model says.")
+@click.option("--step", type=TIME, help="Communication step [s]; if nothing is said as the model says.")
 @click.option(
     "--input",
     "inputs",
@@ -48,7 +48,10 @@ def simulate(
     mcap: Path | None,
     rrd: Path | None,
 ) -> None:
-    """Step an FMU that kinfmu built, by fmpy, and log the run; the FMU of a MECH is built first."""
+    """Step an FMU and log the run; of a MECH it is built first.
+
+    Steps an FMU that kinfmu built, with fmpy, and writes an MCAP record and a Rerun recording.
+    """
     from tempfile import TemporaryDirectory
 
     from kinfmu.fmu import build as built

@@ -62,7 +62,11 @@ def solve(
     outputs: str | None,
     engine: str,
 ) -> None:
-    """Solve position, velocity and acceleration at times or at driver values, into a table."""
+    """Solve a mechanism at times or driver values, into a table.
+
+    The table has a row for each sample: positions, velocities and accelerations of all outputs, status and error
+    estimates.
+    """
     from kinfmu.log import write_table
     from kinfmu.mechanism import RunSettings
     from kinfmu.sweep import run_times

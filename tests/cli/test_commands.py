@@ -10,11 +10,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import pytest
 
 import kinfmu
 from kinfmu import gallery, log
 from kinfmu.cli import main
+from kinfmu.cli.group import ORDER
 from tests.cli.conftest import Command, read_csv
 
 ROOT = Path(__file__).parents[2]
@@ -170,6 +172,20 @@ def test_every_command_explains_itself(command: Command) -> None:
         explained = command(name, "--help")
         assert explained.exit_code == 0
         assert (one.help or "").split("\n")[0][:60] in " ".join(explained.stdout.split())
+        assert re.search(rf"^  Example: kinfmu {name}\b.*$", explained.stdout, re.MULTILINE)
+        assert not [option.name for option in one.params if isinstance(option, click.Option) and not option.help]
+
+
+def test_commands_are_listed_in_the_order_of_work(command: Command) -> None:
+    told = re.findall(r"^  (\w+)  ", command("-h").stdout.split("Commands:\n")[1], re.MULTILINE)
+    assert told == [name for name in ORDER if name in main.commands]
+
+
+@pytest.mark.parametrize("name", [name for name in main.commands if name != "bench"])
+def test_examples_of_the_help_are_of_the_commands_own_options(name: str) -> None:
+    one = main.commands[name]
+    used = re.findall(r" (--?[a-z]+)", one.epilog or "")
+    assert set(used) <= {option for parameter in one.params for option in parameter.opts}
 
 
 def test_an_unknown_command_is_wrong_usage(refuses: Callable[..., str]) -> None:
