@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +46,15 @@ class Column(NamedTuple):
     values: NDArray[Any]  # (n,)
 
 
+class Place(NamedTuple):
+    """Where a column stands: in a table of the run, by the name of the field."""
+
+    name: str
+    unit: str
+    table: str
+    column: int | None  # None in tables of one column
+
+
 class Event(NamedTuple):
     """Something that happened at a time of a run, such as a pose that could not be reached."""
 
@@ -66,6 +75,7 @@ class Run:
     size; watch: (n, w) residual of the rows set aside as redundant, relative to the size. margin and error may be given
     as functions that compute them when they are first read.
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
+    absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
     """
 
     t: FloatArray
@@ -86,8 +96,10 @@ class Run:
     watch: FloatArray
     length_unit: str = "m"
     mechanism_text: str = ""  # the mechanism as TOML
+    model_description: str = ""  # of the FMU that was stepped, as XML
     info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
     events: tuple[Event, ...] = ()
+    absent: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,23 +139,46 @@ class Run:
     def __len__(self) -> int:
         return len(self.t)
 
+    def part(self, rows: slice | NDArray[Any]) -> Run:
+        """Some of the samples, without the events; what was not computed yet is not computed for it."""
+
+        def late(name: str) -> Any:
+            table = self.__dict__[name]
+            return (lambda: getattr(self, name)[rows]) if callable(table) else table[rows]
+
+        tables = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "watch")
+        parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
+        return replace(self, **parts, margin=late("margin"), error=late("error"), events=())
+
     def columns(self) -> Iterator[Column]:
-        """Every column in file order: time, inputs, values, rates, accelerations, diagnostics, watches."""
-        yield Column("time", "s", self.t)
+        """Every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
+        for place in self.places():
+            yield Column(place.name, place.unit, self._column(place))
+
+    def places(self, *, kept: bool = True) -> Iterator[Place]:
+        """Names, units and places of the columns, in their order; kept=False: those that were not kept, too."""
+        for place in self._places():
+            if not (kept and place.name in self.absent):
+                yield place
+
+    def _places(self) -> Iterator[Place]:
+        yield Place("time", "s", "t", None)
         for k, name in enumerate(self.input_names):
-            yield Column(name, self.input_unit(name), self.inputs[:, k])
-        for order, table in enumerate((self.values, self.rates, self.accelerations)):
+            yield Place(name, self.input_unit(name), "inputs", k)
+        for order, table in enumerate(("values", "rates", "accelerations")):
             for k, name in enumerate(self.outputs):
                 unit = unit_of(quantity_of(name, order), self.length_unit)
-                yield Column(derivative_name(name, order), unit, table[:, k])
-        yield Column("solver.status", "1", self.status)
-        yield Column("solver.residual", "1", self.residual)
-        yield Column("solver.iterations", "1", self.iterations)
-        yield Column("solver.margin", "1", self.margin)
+                yield Place(derivative_name(name, order), unit, table, k)
+        for name in ("status", "residual", "iterations", "margin"):
+            yield Place(f"solver.{name}", "1", name, None)
         for k, name in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
-            yield Column(name, "1", self.error[:, k])
+            yield Place(name, "1", "error", k)
         for k, name in enumerate(self.watch_names):
-            yield Column(f"watch.{name}", "1", self.watch[:, k])
+            yield Place(f"watch.{name}", "1", "watch", k)
+
+    def _column(self, place: Place) -> NDArray[Any]:
+        table: NDArray[Any] = getattr(self, place.table)
+        return table if place.column is None else table[:, place.column]
 
     def input_unit(self, name: str) -> str:
         """Unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
@@ -161,8 +196,10 @@ class Run:
                 if name == derivative_name(fixed, order):
                     return np.full(len(self.t), value if order == 0 else 0.0)
         names = []
-        for column in self.columns():
-            if column.name == name:
-                return column.values
-            names.append(column.name)
+        for place in self.places(kept=False):
+            if place.name == name:
+                if name in self.absent:
+                    raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
+                return self._column(place)
+            names.append(place.name)
         raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")

@@ -9,15 +9,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kinfmu.log.mcap_file import read, write_mcap
+    from kinfmu.log.mcap_file import write_mcap
+    from kinfmu.log.reading import read, recover
     from kinfmu.log.rerun_file import write_rrd
     from kinfmu.log.reviewing import review
     from kinfmu.log.table import write_table
 
-__all__ = ["read", "review", "write_mcap", "write_rrd", "write_table"]
+__all__ = ["read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
 
 _HOME = {
-    "read": "mcap_file",
+    "read": "reading",
+    "recover": "reading",
     "review": "reviewing",
     "write_mcap": "mcap_file",
     "write_rrd": "rerun_file",

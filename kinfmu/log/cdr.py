@@ -6,6 +6,8 @@ CDR version 1).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +23,7 @@ class Template:
     def __init__(self) -> None:
         self._bytes = bytearray(HEADER)
         self._stamps: list[int] = []
-        self._words: list[int] = []
+        self._words: list[tuple[int, int]] = []  # where slots stand side by side, and how many
 
     def uint8(self, value: int) -> Template:
         self._bytes.append(value)
@@ -55,29 +57,36 @@ class Template:
         """Slots for `count` numbers of 8 bytes."""
         if count:
             self._align(8)
-        self._words += range(len(self._bytes), len(self._bytes) + 8 * count, 8)
-        self._bytes += bytes(8 * count)
+            self._words.append((len(self._bytes), count))
+            self._bytes += bytes(8 * count)
         return self
 
     def sequence(self, count: int) -> Template:
         """A sequence of `count` 8-byte numbers: its length, then the slots."""
         return self.uint32(count).words(count)
 
-    def fill(self, stamps: NDArray[np.int64], words: NDArray[np.generic] | None = None) -> Bytes:
-        """Messages (n, L): stamps (n,) [ns] fill every time slot, words (n, slots), 8-byte items, the others."""
-        out = np.tile(np.frombuffer(bytes(self._bytes), np.uint8), (len(stamps), 1))
-        times = _bytes_of(np.column_stack([stamps // NANOSECONDS, stamps % NANOSECONDS]).astype("<u4"))
+    def fill(self, out: Bytes, stamps: NDArray[np.int64], tables: Iterable[NDArray[np.generic]] = ()) -> None:
+        """Messages into out (n, L): stamps (n,) [ns] into every time slot, into the others tables (n, k) of 8-byte
+        items, one after the other; none needs to end where slots side by side end.
+        """
+        out[:] = np.frombuffer(self._bytes, np.uint8)
+        times = np.column_stack([stamps // NANOSECONDS, stamps % NANOSECONDS]).astype("<u4")
         for place in self._stamps:
-            out[:, place : place + 8] = times
-        if words is not None:
-            numbers = _bytes_of(words)
-            for column, place in enumerate(self._words):
-                out[:, place : place + 8] = numbers[:, 8 * column : 8 * column + 8]
-        return out
+            out[:, place : place + 8].view("<u4")[:] = times
+        slots = [out[:, place : place + 8 * count].view("<u8") for place, count in self._words]
+        k = filled = 0
+        for table in tables:
+            taken = 0
+            while taken < table.shape[1]:
+                count = min(slots[k].shape[1] - filled, table.shape[1] - taken)
+                slots[k][:, filled : filled + count] = _words(table[:, taken : taken + count])
+                taken, filled = taken + count, filled + count
+                if filled == slots[k].shape[1]:
+                    k, filled = k + 1, 0
 
     def read(self, messages: Bytes) -> NDArray[np.uint64]:
         """The 8-byte items (n, slots) of messages (n, L): the inverse of `fill`."""
-        return np.hstack([messages[:, place : place + 8] for place in self._words]).view("<u8")
+        return np.hstack([messages[:, place : place + 8 * count].view("<u8") for place, count in self._words])
 
     @property
     def length(self) -> int:
@@ -88,7 +97,6 @@ class Template:
         self._bytes += bytes(-(len(self._bytes) - len(HEADER)) % size)
 
 
-def _bytes_of(table: NDArray[np.generic]) -> Bytes:
-    """The bytes (n, row bytes) of a table (n, k)."""
-    table = np.ascontiguousarray(table.astype(table.dtype.newbyteorder("<"), copy=False))
-    return table.view(np.uint8).reshape(len(table), table.shape[1] * table.itemsize)
+def _words(table: NDArray[np.generic]) -> NDArray[np.uint64]:
+    """A table of 8-byte items as their bits, so that nothing looks at what they mean."""
+    return table.astype(table.dtype.newbyteorder("<"), copy=False).view("<u8")

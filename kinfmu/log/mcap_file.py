@@ -1,242 +1,167 @@
 """MCAP: the durable record of a run, which viewers of ROS 2 draw with no set-up.
 
-    /robot_description    std_msgs/msg/String, URDF              the links, once
-    /tf                   tf2_msgs/msg/TFMessage                 where they are [m]
+    /sample               kinfmu_msgs/msg/Sample                 the full record, in the mechanism's own units
     /joint_states         sensor_msgs/msg/JointState             positions and speeds [m, rad, s]
     /joint_accelerations  sensor_msgs/msg/JointState             accelerations, in `position` [m, rad, s]
+    /robot_description    std_msgs/msg/String, URDF              the links, once
+    /tf                   tf2_msgs/msg/TFMessage                 where they are [m]
     /log                  rcl_interfaces/msg/Log                 changes of status and events
-    /sample               kinfmu_msgs/msg/Sample                 the full record, in the mechanism's own units
 
 Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full record keeps every sample as it is, so
-`read` gives back the same run, bit for bit. The mechanism file is an attachment; names, units, constants are metadata.
+`read` gives back the same run, bit for bit. The mechanism file and the FMU's model description are attachments.
+Metadata: kinfmu.record (names, units, constants), kinfmu.info (of the run: token, parameters), kinfmu.about (versions,
+what the times mean), and at the end kinfmu.end (number of samples, events, verdict, why a run ended early).
 """
 
 from __future__ import annotations
 
+import platform
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from io import FileIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.errors import LogError, listed
+from kinfmu import VERSION
+from kinfmu.errors import MechanismError
 from kinfmu.log import ros2
-from kinfmu.log.cdr import Bytes, Template
+from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds, zero_of
-from kinfmu.log.record import column_names, description, dtype_of, run_of, words
-from kinfmu.log.scene import Scene, drawable
+from kinfmu.log.container import McapWriter, Messages
+from kinfmu.log.drawn import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, joint_topics
+from kinfmu.log.record import description, ending, is_integer, tables
 from kinfmu.log.target import replacing
-from kinfmu.log.verdict import happenings, sentence
-from kinfmu.naming import quantity_of
-from kinfmu.run import Run
-from kinfmu.units import METRES
+from kinfmu.log.verdict import sentence, status_events
+from kinfmu.mechanism import toml_file
+from kinfmu.run import Event, Run
 
-if TYPE_CHECKING:
-    from mcap.reader import McapReader
-    from mcap.writer import Writer
-
-CHUNK_SIZE = 64 * 1024  # [bytes]; a truncated file loses at most its last chunk
-MOST_REASON = 160  # characters of a foreign error in a message
+ROWS = 4096  # samples in a chunk of a run that is there as a whole; more take memory, fewer time
 SAMPLE_TOPIC = "/sample"
 MECHANISM_FILE = "mechanism.toml"
-_RECORD, _INFO = "kinfmu.record", "kinfmu.info"  # names of metadata records
-_CHECKSUM = "checksum"  # in the record; readers of MCAP check the chunks, but neither metadata nor attachments
+MODEL_DESCRIPTION = "modelDescription.xml"
+RECORD, INFO, ABOUT, END = "kinfmu.record", "kinfmu.info", "kinfmu.about", "kinfmu.end"  # metadata
+CHECKSUM = "checksum"  # of metadata and attachments; chunks have their own
 
 
-def write_mcap(run: Run, path: str | Path) -> None:
-    """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time."""
-    from mcap.writer import CompressionType, Writer
+def write_mcap(run: Run, path: str | Path, *, drawn: bool = True) -> None:
+    """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time.
 
-    times = nanoseconds(run.t)
-    zero = zero_of(run.t)
-    stamps = times - zero * NANOSECONDS  # (n,)
-    scene, reason = drawable(run)
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="kinfmu")
-        about = {"verdict": sentence(run), "time_base": "simulation", "time_zero_s": str(zero)}
+    drawn: with the topics that viewers of ROS 2 draw; without them the file is a third as large.
+    """
+    nanoseconds(run.t)  # says what is wrong with a time before a file is begun
+    with replacing(path) as temporary, FileIO(temporary, "w") as file:
+        content = Content(file, run, zero_of(run.t), drawn=drawn)
+        try:
+            for start in range(0, len(run), ROWS):
+                content.add(run.part(slice(start, start + ROWS)))
+            content.log(status_events(run), run.events)
+            content.end(run)
+        finally:
+            content.close()
+
+
+class Content:
+    """What an MCAP file holds, while it is being written.
+
+    run: as it is when it begins, with or without samples; zero: where log times are counted from [s]; at_once: what is
+    added is in the file at once.
+    """
+
+    def __init__(self, file: FileIO, run: Run, zero: int, *, drawn: bool = True, at_once: bool = False) -> None:
+        writer = self._writer = McapWriter(file, profile="ros2", library=f"kinfmu {VERSION}", at_once=at_once)
+        self._zero = zero
         texts, info = description(run), dict(run.info)
-        writer.add_metadata(_RECORD, texts | {_CHECKSUM: _checksum(texts, info, run.mechanism_text)})
-        writer.add_metadata(_INFO, info)
-        writer.add_metadata("kinfmu.about", about | ({"linkage": reason} if reason else {}))
-        if run.mechanism_text:
-            writer.add_attachment(0, 0, MECHANISM_FILE, "application/toml", run.mechanism_text.encode())
-        topics = _Topics(writer)
-        first = int(stamps[0]) if len(stamps) else 0
-        metres = METRES[run.length_unit]
-        tracks = [_sample_track(topics, run, stamps), *_joint_tracks(topics, run, stamps, metres)]
-        if scene and (scene.bodies or scene.bars):
-            urdf = ros2.robot_description(_name(run), scene, metres)
-            topic = topics.add("/robot_description", "std_msgs/msg/String", ros2.STRING)
-            topics.write(topic, first, Template().string(urdf).fill(stamps[:1] if len(stamps) else np.zeros(1, int))[0])
-            tracks.append(_tf_track(topics, scene, stamps, metres))
-        _write_in_order(topics, len(run), tracks)
-        _write_log(topics, run, zero)
-        writer.finish()
+        attachments = {MECHANISM_FILE: run.mechanism_text, MODEL_DESCRIPTION: run.model_description}
+        writer.metadata(RECORD, texts | {CHECKSUM: checksum(texts, info, attachments)})
+        writer.metadata(INFO, info)
+        for (name, text), kind in zip(attachments.items(), ("toml", "xml"), strict=True):
+            if text:
+                writer.attachment(name, f"application/{kind}", text.encode())
+        about = {"time_base": "simulation", "time_zero_s": str(zero), **_versions()}
+        self._topics: list[_SampleTopic | JointTopic | LinkTopic] = [_SampleTopic(writer, run)]
+        self._log: LogTopic | None = None
+        if drawn:
+            self._topics += joint_topics(writer, run)
+            if run.mechanism_text:
+                try:
+                    mechanism = toml_file.parse(run.mechanism_text, "the run's mechanism")
+                    self._topics.append(LinkTopic(writer, run, mechanism))
+                except MechanismError as error:
+                    about["linkage"] = f"not drawn: {error}"
+            self._log = LogTopic(writer, zero)
+        writer.metadata(ABOUT, about)
+
+    @property
+    def length(self) -> int:
+        """Bytes of the whole records in the file."""
+        return self._writer.length
+
+    def add(self, run: Run) -> None:
+        """The next samples."""
+        stamps = nanoseconds(run.t) - self._zero * NANOSECONDS
+        if len(run):
+            for topic in self._topics:
+                topic.add(run, stamps)
+
+    def log(self, changes: Iterable[Event], events: Iterable[Event]) -> None:
+        """Changes of status and the run's own events."""
+        entries = [(STATUS_SOURCE, event) for event in changes] + [(SOURCE, event) for event in events]
+        if self._log:
+            self._log.add(sorted(entries, key=lambda entry: entry[1].t))
+
+    def end(self, run: Run, outcome: str = "") -> None:
+        """Say how the run went, and finish the file. outcome: why it ended early, as far as no event says so."""
+        failures = [event.text for event in run.events if event.level == "error"]
+        texts = ending(run) | {"verdict": sentence(run), "outcome": outcome or (failures or ["completed"])[0]}
+        self._writer.metadata(END, texts | {CHECKSUM: checksum(texts)})
+        self._writer.finish()
+
+    def close(self) -> None:
+        """Give up what is not in the file yet."""
+        self._writer.close()
 
 
-def read(path: str | Path) -> Run:
-    """The run that `write_mcap` wrote to `path`, equal in every bit."""
-    from mcap.reader import make_reader
+class _SampleTopic:
+    """The full record, every sample, in the mechanism's own units."""
 
-    try:
-        with Path(path).open("rb") as file:
-            reader = make_reader(file, validate_crcs=True)
-            return _run_in(reader, str(path))
-    except LogError:
-        raise
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except Exception as error:  # damaged bytes make readers, decompressors and decoders raise whatever they meet
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:MOST_REASON]
-        raise LogError(
-            f"{path}: not a whole MCAP file ({reason}); it was cut off or damaged, or is something else"
-        ) from error
+    def __init__(self, writer: McapWriter, run: Run) -> None:
+        places = list(run.places())
+        names = ros2.field_names(place.name for place in places)
+        kinds = ["int64" if is_integer(place.table) else "float64" for place in places]
+        comments = [f"{place.name} [{place.unit}]" for place in places]
+        metadata = {f"unit.{name}": place.unit for name, place in zip(names, places, strict=True)}
+        metadata |= {f"column.{name}": place.name for name, place in zip(names, places, strict=True)}
+        definition = ros2.sample_definition(zip(kinds, names, comments, strict=True))
+        self._writer, self._template = writer, sample_template(len(places))
+        self._channel = writer.channel(SAMPLE_TOPIC, "cdr", "kinfmu_msgs/msg/Sample", definition, metadata)
 
-
-def _run_in(reader: McapReader, where: str) -> Run:
-    summary = reader.get_summary()
-    channels = summary.channels.values() if summary else ()
-    if not any(channel.topic == SAMPLE_TOPIC for channel in channels):
-        topics = listed(sorted(channel.topic for channel in channels))
-        raise LogError(f"{where}: no topic {SAMPLE_TOPIC}, so this is no run of kinfmu; topics: {topics}")
-    metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-    if _RECORD not in metadata:
-        raise LogError(f"{where}: metadata record {_RECORD} is missing; records: {listed(metadata)}")
-    mechanisms = [one.data.decode() for one in reader.iter_attachments() if one.name == MECHANISM_FILE]
-    payloads, order = [], []
-    for _, _, message in reader.iter_messages(topics=[SAMPLE_TOPIC], log_time_order=False):
-        payloads.append(message.data)
-        order.append(message.sequence)
-    texts, info = metadata[_RECORD], metadata.get(_INFO, {})
-    mechanism_text = mechanisms[0] if mechanisms else ""
-    if texts.pop(_CHECKSUM, "") != _checksum(texts, info, mechanism_text):
-        raise LogError(f"{where}: metadata or mechanism are damaged (their checksum does not fit)")
-    template = _sample_template(len(column_names(texts)))
-    messages = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), template.length)
-    table = template.read(messages[np.argsort(order, kind="stable")])
-    return run_of(texts, table, info, mechanism_text, where)
+    def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
+        """The next samples."""
+        template, numbers = self._template, tables(run)
+        self._writer.write(
+            self._channel,
+            Messages(np.arange(len(run)), stamps, template.length, lambda out: template.fill(out, stamps, numbers)),
+        )
 
 
-def _checksum(texts: Mapping[str, str], info: Mapping[str, str], mechanism_text: str) -> str:
-    """CRC-32 of all names and texts, in hexadecimal."""
-    parts = [part for table in (texts, info) for entry in table.items() for part in entry]
-    return f"{zlib.crc32(chr(0).join([*parts, mechanism_text]).encode()):08x}"
-
-
-class _Topics:
-    """Channels of an MCAP file that is being written, and the number of messages in each."""
-
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
-        self._counts: dict[int, int] = {}
-
-    def add(self, topic: str, schema: str, definition: str, metadata: dict[str, str] | None = None) -> int:
-        schema_id = self._writer.register_schema(schema, "ros2msg", definition.encode())
-        channel = self._writer.register_channel(topic, "cdr", schema_id, metadata or {})
-        self._counts[channel] = 0
-        return channel
-
-    def write(self, channel: int, stamp: int, payload: Bytes) -> None:
-        """One message at `stamp` [ns]."""
-        number = self._counts[channel]
-        self._writer.add_message(channel, stamp, payload.tobytes(), stamp, number)
-        self._counts[channel] = number + 1
-
-
-class _Track:
-    """Messages of one topic: payload k stands at sample rows[k] of the run."""
-
-    def __init__(self, channel: int, rows: NDArray[np.int64], stamps: NDArray[np.int64], payloads: Bytes) -> None:
-        self.channel, self.rows, self.stamps, self.payloads = channel, rows, stamps, payloads
-
-
-def _write_in_order(topics: _Topics, count: int, tracks: list[_Track]) -> None:
-    """All tracks sample by sample, so that a stretch of time lies in neighbouring chunks."""
-    places = [0] * len(tracks)
-    for row in range(count):
-        for k, track in enumerate(tracks):
-            while places[k] < len(track.rows) and track.rows[places[k]] == row:
-                topics.write(track.channel, int(track.stamps[places[k]]), track.payloads[places[k]])
-                places[k] += 1
-
-
-def _sample_template(columns: int) -> Template:
+def sample_template(columns: int) -> Template:
+    """The layout of /sample: a stamp, then the columns."""
     return Template().stamp().words(columns)
 
 
-def _sample_track(topics: _Topics, run: Run, stamps: NDArray[np.int64]) -> _Track:
-    """The full record, every sample, in the mechanism's own units."""
-    columns = list(run.columns())
-    names = ros2.field_names(column.name for column in columns)
-    kinds = ["int64" if dtype_of(column.name) == "<i8" else "float64" for column in columns]
-    comments = [f"{column.name} [{column.unit}]" for column in columns]
-    metadata = {f"unit.{name}": column.unit for name, column in zip(names, columns, strict=True)}
-    metadata |= {f"column.{name}": column.name for name, column in zip(names, columns, strict=True)}
-    definition = ros2.sample_definition(zip(kinds, names, comments, strict=True))
-    channel = topics.add(SAMPLE_TOPIC, "kinfmu_msgs/msg/Sample", definition, metadata)
-    payloads = _sample_template(len(columns)).fill(stamps, words(run))
-    return _Track(channel, np.arange(len(run)), stamps, payloads)
+def checksum(*texts: Mapping[str, str]) -> str:
+    """CRC-32 of all names and texts, in hexadecimal."""
+    parts = [part for table in texts for entry in table.items() for part in entry]
+    return f"{zlib.crc32(chr(0).join(parts).encode()):08x}"
 
 
-def _joint_tracks(topics: _Topics, run: Run, stamps: NDArray[np.int64], metres: float) -> list[_Track]:
-    """Positions and speeds, and accelerations, each with an empty message where a gap begins: it ends the curve."""
-    to_si = np.array([1.0 if quantity_of(name).kind == "angle" else metres for name in run.outputs])
-    rows = np.flatnonzero(run.good)
-    gaps = np.flatnonzero(np.diff(run.good.astype(int)) == -1) + 1
-    tracks = []
-    for topic, tables in (
-        ("/joint_states", (run.values, run.rates)),
-        ("/joint_accelerations", (run.accelerations,)),
-    ):
-        units = {"units": f"position: {_si_units(run, 2 * (len(tables) == 1))}"}
-        if len(tables) == 2:
-            units["units"] += f"; velocity: {_si_units(run, 1)}"
-        channel = topics.add(topic, "sensor_msgs/msg/JointState", ros2.JOINT_STATE, units)
-        numbers = np.hstack([table[rows] * to_si for table in tables])
-        template = _joint_state(run.outputs, len(tables) == 2)
-        tracks.append(_Track(channel, rows, stamps[rows], template.fill(stamps[rows], numbers)))
-        tracks.append(_Track(channel, gaps, stamps[gaps], _joint_state((), False).fill(stamps[gaps])))
-    return tracks
-
-
-def _joint_state(names: tuple[str, ...], with_velocity: bool) -> Template:
-    template = Template().stamp().string(ros2.ROOT).strings(names).sequence(len(names))
-    return template.sequence(len(names) if with_velocity else 0).sequence(0)
-
-
-def _si_units(run: Run, order: int) -> str:
-    kinds = {quantity_of(name).kind for name in run.outputs}
-    per_time = ("", "/s", "/s2")[order]
-    return ", ".join(unit + per_time for kind, unit in (("angle", "rad"), ("length", "m")) if kind in kinds)
-
-
-def _tf_track(topics: _Topics, scene: Scene, stamps: NDArray[np.int64], metres: float) -> _Track:
-    """Poses of all links [m, quaternion about z] where every one of them is known."""
-    frames = ros2.frames(scene)
-    template = Template().uint32(len(frames))
-    for name in frames:
-        template.stamp().string(ros2.ROOT).string(name).words(7)
-    numbers = []
-    for x, y, phi in (pose.T for pose in frames.values()):
-        nothing = np.zeros(len(x))
-        numbers += [metres * x, metres * y, nothing, nothing, nothing, np.sin(phi / 2), np.cos(phi / 2)]
-    table = np.column_stack(numbers)
-    rows = np.flatnonzero(np.isfinite(table).all(axis=1))
-    channel = topics.add("/tf", "tf2_msgs/msg/TFMessage", ros2.TF_MESSAGE, {"units": "m"})
-    return _Track(channel, rows, stamps[rows], template.fill(stamps[rows], table[rows]))
-
-
-def _write_log(topics: _Topics, run: Run, zero: int) -> None:
-    channel = topics.add("/log", "rcl_interfaces/msg/Log", ros2.LOG)
-    for event in happenings(run):
-        stamp = nanoseconds(np.array([max(event.t, float(zero))])) - zero * NANOSECONDS
-        level = ros2.LOG_LEVELS.get(event.level, ros2.LOG_LEVELS["info"])
-        template = Template().stamp().uint8(level).string("kinfmu").string(event.text).string("").string("").uint32(0)
-        topics.write(channel, int(stamp[0]), template.fill(stamp)[0])
-
-
-def _name(run: Run) -> str:
-    return run.info.get("name") or "mechanism"
+def _versions() -> dict[str, str]:
+    """What wrote a file."""
+    return {
+        "kinfmu": VERSION,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "platform": f"{platform.system()} {platform.machine()}",
+    }

@@ -1,13 +1,14 @@
-"""A run as text and one table of columns, and back: what every file that keeps a whole run stores.
+"""A run as texts and rows of 8-byte items, and back: what every file that keeps a whole run stores.
 
-The text holds what the columns do not say: names, units, constants, events. Floats are written so that they read back
-to the same bits.
+The texts hold what the columns do not say: names, units, constants when the run begins, how many samples and which
+events when it has ended. Floats are written so that they read back to the same bits.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -16,86 +17,117 @@ from numpy.typing import NDArray
 from kinfmu.errors import LogError
 from kinfmu.run import Event, Run
 
-FORMAT = "1"  # raised when files written before can no longer be read the same way
-_INTEGERS = ("solver.status", "solver.iterations")
-_DIAGNOSTICS = 7  # columns of Run.columns() between the accelerations and the watches
+FORMAT = "2"  # raised when files written before can no longer be read the same way
+_INTEGERS = ("status", "iterations")
+_TABLES = ("inputs", "values", "rates", "accelerations", "error", "watch")  # of several columns
 
 
 def description(run: Run) -> dict[str, str]:
-    """The run without its columns, its info and its mechanism, as texts."""
+    """What is known of a run when it begins, without its info and its mechanism, as texts."""
     lists: dict[str, Any] = {
-        "samples": len(run),
-        "columns": [column.name for column in run.columns()],
-        "units": {column.name: column.unit for column in run.columns()},
+        "columns": [place.name for place in run.places()],
+        "units": {place.name: place.unit for place in run.places()},
+        "absent": sorted(run.absent),
         "outputs": run.outputs,
         "coordinate_count": run.coordinate_count,
         "fixed": {name: float(value) for name, value in run.fixed.items()},
         "input_names": run.input_names,
         "watch_names": run.watch_names,
         "length_unit": run.length_unit,
-        "events": run.events,
     }
     return {"format": FORMAT} | {key: json.dumps(value, ensure_ascii=False) for key, value in lists.items()}
 
 
-def column_names(texts: Mapping[str, str]) -> list[str]:
-    """Names of the columns that a description tells of."""
-    return list(json.loads(texts.get("columns", "[]")))
+def ending(run: Run) -> dict[str, str]:
+    """What is known only when it has ended, as texts."""
+    return {"samples": json.dumps(len(run)), "events": json.dumps(run.events, ensure_ascii=False)}
 
 
-def words(run: Run) -> NDArray[np.uint64]:
-    """All columns side by side as raw 8-byte items, (n, columns): float64, but int64 for status and iterations."""
-    columns = [np.asarray(column.values, dtype_of(column.name)).view("<u8") for column in run.columns()]
-    return np.column_stack(columns)
+def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
+    """The events in the texts of `ending`."""
+    return tuple(Event(float(t), level, text) for t, level, text in json.loads(texts["events"]))
 
 
-def dtype_of(column: str) -> str:
-    """'<i8' for columns that count, '<f8' for those that measure."""
-    return "<i8" if column in _INTEGERS else "<f8"
+def column_count(texts: Mapping[str, str]) -> int:
+    """Number of columns that a description tells of."""
+    return len(json.loads(texts.get("columns", "[]")))
+
+
+def is_integer(table: str) -> bool:
+    """True for tables that count, which hold int64; the others hold float64."""
+    return table in _INTEGERS
+
+
+def tables(run: Run) -> list[NDArray[np.generic]]:
+    """All columns that were kept, side by side, as tables (n, k) of 8-byte items."""
+    found = []
+    for name, places in groupby(run.places(), key=lambda place: place.table):
+        table = np.asarray(getattr(run, name), "<i8" if is_integer(name) else "<f8")
+        table = _of_columns(table)
+        columns = [place.column or 0 for place in places]
+        found.append(table if len(columns) == table.shape[1] else table[:, columns])
+    return found
+
+
+def _of_columns(table: NDArray[Any]) -> NDArray[Any]:
+    """A column as a table of one."""
+    return table[:, None] if table.ndim == 1 else table
 
 
 def run_of(
-    texts: Mapping[str, str], table: NDArray[np.uint64], info: Mapping[str, str], mechanism_text: str, where: str
+    texts: Mapping[str, str],
+    blocks: Sequence[NDArray[np.uint64]],
+    events: Sequence[Event],
+    info: Mapping[str, str],
+    mechanism_text: str,
+    model_description: str,
 ) -> Run:
-    """The run that `description` and `words` were made of; `where` names the file in messages."""
+    """The run that `description` and the rows of `tables`, in blocks (k, columns), were made of."""
     if texts.get("format") != FORMAT:
-        raise LogError(f"{where}: format {texts.get('format')!r} of the record; this kinfmu reads {FORMAT!r}")
+        raise LogError(f"format {texts.get('format')!r} of the record; this kinfmu reads {FORMAT!r}")
     about = {key: json.loads(text) for key, text in texts.items() if key != "format"}
-    if table.shape[1] != len(about["columns"]):
-        raise LogError(f"{where}: {table.shape[1]} columns of data, but {len(about['columns'])} names")
-    if len(table) != about["samples"]:
-        raise LogError(f"{where}: holds {len(table)} of {about['samples']} samples; it was cut off or damaged")
+    n = sum(map(len, blocks))
     outputs, inputs, watches = (tuple(about[key]) for key in ("outputs", "input_names", "watch_names"))
-
-    def block(start: int, count: int, dtype: str = "<f8") -> NDArray[Any]:
-        return np.ascontiguousarray(table[:, start : start + count]).view(dtype).astype(dtype[1:], copy=False)
-
-    first = 1 + len(inputs)
-    values, rates, accelerations = (block(first + k * len(outputs), len(outputs)) for k in range(3))
-    at = first + 3 * len(outputs)
-    return Run(
-        t=block(0, 1)[:, 0],
+    widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
+    widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
+    blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
+    blank |= {name: np.empty(n) for name in ("residual", "margin")}
+    blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
+    empty = Run(
+        t=np.empty(n),
         outputs=outputs,
         coordinate_count=about["coordinate_count"],
-        values=values,
-        rates=rates,
-        accelerations=accelerations,
         fixed=about["fixed"],
         input_names=inputs,
-        inputs=block(1, len(inputs)),
-        status=block(at, 1, "<i8")[:, 0],
-        residual=block(at + 1, 1)[:, 0],
-        iterations=block(at + 2, 1, "<i8")[:, 0],
-        margin=block(at + 3, 1)[:, 0],
-        error=block(at + 4, 3),
         watch_names=watches,
-        watch=block(at + _DIAGNOSTICS, len(watches)),
         length_unit=about["length_unit"],
         mechanism_text=mechanism_text,
+        model_description=model_description,
         info=dict(info),
-        events=_events(about["events"]),
+        events=tuple(events),
+        absent=frozenset(about["absent"]),
+        **blank,
     )
+    for place in empty.places(kept=False):
+        if place.name in empty.absent and not is_integer(place.table):
+            _of_columns(getattr(empty, place.table))[:, place.column or 0] = np.nan
+    _fill(empty, blocks)
+    return empty
 
 
-def _events(entries: Sequence[Sequence[Any]]) -> tuple[Event, ...]:
-    return tuple(Event(float(t), level, text) for t, level, text in entries)
+def _fill(run: Run, blocks: Sequence[NDArray[np.uint64]]) -> None:
+    """Rows into the tables of a run, block by block while they are in the processor's cache."""
+    moves = []
+    at = 0
+    for name, places in groupby(run.places(), key=lambda place: place.table):
+        table = _of_columns(getattr(run, name)).view("<u8")
+        columns = [place.column or 0 for place in places]
+        whole = columns == list(range(columns[0], columns[0] + len(columns)))
+        target = slice(columns[0], columns[0] + len(columns)) if whole else columns
+        moves.append((table, target, slice(at, at + len(columns))))
+        at += len(columns)
+    row = 0
+    for block in blocks:
+        for table, target, source in moves:
+            table[row : row + len(block), target] = block[:, source]
+        row += len(block)

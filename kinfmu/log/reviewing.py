@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 
 from kinfmu.errors import LogError
 from kinfmu.log.headless import executable, last_words, shoot
-from kinfmu.log.mcap_file import read
+from kinfmu.log.reading import read
 from kinfmu.log.rerun_file import write_rrd
 from kinfmu.log.target import replacing
 

@@ -11,9 +11,13 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from kinfmu.joints import Distance
 from kinfmu.log.scene import Scene
-from kinfmu.run import FloatArray
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.mechanism import Mechanism
+from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
+from kinfmu.shapes.placing import poses_of, world
 
 _LINE = "=" * 80
 _TIME = f"{_LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
@@ -60,12 +64,22 @@ def field_names(columns: Iterable[str]) -> list[str]:
     return names
 
 
-def frames(scene: Scene) -> dict[str, FloatArray]:
+def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
     """Pose (n, 3) of x, y [length], phi [rad] of every link of the robot description: bodies, then bars."""
-    placed = {body.name: body.pose for body in scene.bodies}
-    for bar in scene.bars:
-        along = bar.ends[:, 1] - bar.ends[:, 0]
-        placed[_bar_frame(bar.name)] = np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])])
+    poses, _ = poses_of(run, mechanism)
+    placed = {body.name: poses[body.name] for body in mechanism.moving_bodies if body.name in poses}
+    points = mechanism.body_points
+    for joint in mechanism.joints:
+        if isinstance(joint, Distance):
+            bodies = [point.partition(".")[0] for point in joint.between]
+            if all(body in poses or body == GROUND_NAME for body in bodies):
+                a, b = (
+                    np.broadcast_to(points[point], (len(run), 2))
+                    if body == GROUND_NAME
+                    else world(poses[body], points[point])
+                    for body, point in zip(bodies, joint.between, strict=True)
+                )
+                placed[_bar_frame(joint.name)] = np.column_stack([a, np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])])
     return placed
 
 
@@ -86,7 +100,7 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     joints = [
         f'<joint name={quoteattr(link + "_floats")} type="floating">'
         f"<parent link={quoteattr(ROOT)}/><child link={quoteattr(link)}/></joint>"
-        for link in frames(scene)
+        for link in (*(body.name for body in scene.bodies), *(_bar_frame(bar.name) for bar in scene.bars))
     ]
     body_lines = "\n".join([*links, *joints])
     return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n{body_lines}\n</robot>\n'

@@ -63,14 +63,18 @@ def changes(run: Run) -> Iterator[Change]:
         yield Change(int(row), float(run.t[row]), Status(int(run.status[row])))
 
 
-def happenings(run: Run) -> list[Event]:
-    """Changes of status and the run's own events, by time; a run that begins well begins without an entry."""
-    found = [
+def status_events(run: Run, before: Status = Status.OK) -> list[Event]:
+    """Changes of status as events; `before` is that of the sample before the first, ok if there is none."""
+    return [
         Event(change.t, _LEVELS.get(change.status, "error"), MEANINGS[change.status])
         for change in changes(run)
-        if change.row or change.status is not Status.OK
+        if change.row or change.status is not before
     ]
-    return sorted([*found, *run.events], key=lambda event: event.t)
+
+
+def happenings(run: Run) -> list[Event]:
+    """Changes of status and the run's own events, by time; a run that begins well begins without an entry."""
+    return sorted([*status_events(run), *run.events], key=lambda event: event.t)
 
 
 def sentence(run: Run) -> str:

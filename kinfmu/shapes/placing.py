@@ -10,7 +10,7 @@ from kinfmu.run import FloatArray, Run
 
 def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
     """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing."""
-    columns = {name: run.values[:, k] for k, name in enumerate(run.outputs)}
+    columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
     poses: dict[str, FloatArray] = {}
     left_out: dict[str, tuple[str, ...]] = {}

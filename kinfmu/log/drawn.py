@@ -1,0 +1,165 @@
+"""The topics of ROS 2 that viewers draw by themselves: joint states, transforms, the robot description, the log."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.log import ros2
+from kinfmu.log.cdr import Template
+from kinfmu.log.clock import NANOSECONDS, nanoseconds
+from kinfmu.log.container import McapWriter, Messages
+from kinfmu.log.scene import scene
+from kinfmu.mechanism.mechanism import Mechanism
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.run import Event, Run
+from kinfmu.units import METRES
+
+SOURCE = "kinfmu"  # who speaks in the log: the run's own events
+STATUS_SOURCE = "kinfmu.status"  # and what follows from the samples
+LOG_TOPIC = "/log"
+
+
+class JointTopic:
+    """Positions and speeds, or accelerations, of outputs; an empty message where a gap begins ends the curve."""
+
+    def __init__(self, writer: McapWriter, run: Run, topic: str, columns: Sequence[int], orders: Sequence[int]) -> None:
+        names = tuple(run.outputs[k] for k in columns)
+        metres = METRES[run.length_unit]
+        self._to_si = np.array([1.0 if quantity_of(name).kind == "angle" else metres for name in names])
+        self._columns = slice(None) if len(columns) == len(run.outputs) else list(columns)
+        self._orders = orders
+        self._writer = writer
+        self._template, self._empty = _joint_state(names, len(orders) == 2), _joint_state((), False)
+        self._was_good = False
+        fields = zip(("position", "velocity"), orders, strict=False)
+        units = "; ".join(f"{field}: {_si_units(names, order)}" for field, order in fields)
+        self._channel = writer.channel(topic, "cdr", "sensor_msgs/msg/JointState", ros2.JOINT_STATE, {"units": units})
+
+    def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
+        """The next samples."""
+        good = run.good
+        rows = np.flatnonzero(good)
+        gaps = np.flatnonzero(~good & np.append(self._was_good, good[:-1]))
+        self._was_good = bool(good[-1])
+        every = len(rows) == len(good)
+        tables = [(run.values, run.rates, run.accelerations)[order][:, self._columns] for order in self._orders]
+        numbers = [(table if every else table[rows]) * self._to_si for table in tables]
+        at = stamps[rows]
+        self._writer.write(
+            self._channel,
+            Messages(rows, at, self._template.length, lambda out: self._template.fill(out, at, numbers)),
+            Messages(gaps, stamps[gaps], self._empty.length, lambda out: self._empty.fill(out, stamps[gaps])),
+        )
+
+
+class LinkTopic:
+    """Poses of all links where every one of them is known, and what they look like, once."""
+
+    def __init__(self, writer: McapWriter, run: Run, mechanism: Mechanism) -> None:
+        self._writer, self._mechanism = writer, mechanism
+        self._metres = METRES[run.length_unit]
+        self._name = run.info.get("name") or "mechanism"
+        self._template: Template | None = None
+        self._channel = -1
+
+    def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
+        """The next samples."""
+        if self._template is None:
+            self._describe(run, stamps)
+        if self._template is None:
+            return
+        template, metres, numbers = self._template, self._metres, []
+        for pose in ros2.frames(run, self._mechanism).values():
+            x, y, phi = pose.T
+            nothing = np.zeros_like(x)
+            place = [metres * x, metres * y, nothing]
+            numbers.append(np.column_stack([*place, nothing, nothing, np.sin(phi / 2), np.cos(phi / 2)]))
+        rows = np.flatnonzero(run.good & np.isfinite(sum(table.sum(axis=1) for table in numbers)))
+        at = stamps[rows]
+        if len(rows) < len(run):
+            numbers = [table[rows] for table in numbers]
+        self._writer.write(
+            self._channel, Messages(rows, at, template.length, lambda out: template.fill(out, at, numbers))
+        )
+
+    def _describe(self, run: Run, stamps: NDArray[np.int64]) -> None:
+        """The robot description, of the size that the mechanism has in its first pose."""
+        first = int(np.argmax(run.good))
+        shown = scene(run.part(slice(first, first + 1)), self._mechanism)
+        frames = ros2.frames(run.part(slice(0, 0)), self._mechanism)
+        if not frames:
+            return
+        urdf = Template().string(ros2.robot_description(self._name, shown, self._metres))
+        channel = self._writer.channel("/robot_description", "cdr", "std_msgs/msg/String", ros2.STRING, {})
+        at = stamps[:1]
+        self._writer.write(channel, Messages(np.zeros(1, int), at, urdf.length, lambda out: urdf.fill(out, at)))
+        self._template = Template().uint32(len(frames))
+        for name in frames:
+            self._template.stamp().string(ros2.ROOT).string(name).words(7)
+        self._channel = self._writer.channel("/tf", "cdr", "tf2_msgs/msg/TFMessage", ros2.TF_MESSAGE, {"units": "m"})
+
+
+class LogTopic:
+    """What happened."""
+
+    def __init__(self, writer: McapWriter, zero: int) -> None:
+        self._writer, self._zero = writer, zero
+        self._channel = writer.channel(LOG_TOPIC, "cdr", "rcl_interfaces/msg/Log", ros2.LOG, {})
+
+    def add(self, entries: Sequence[tuple[str, Event]]) -> None:
+        """Events by time, each with who tells of it."""
+        alike: dict[tuple[str, str, str], list[int]] = {}
+        for place, (source, event) in enumerate(entries):
+            alike.setdefault((source, event.level, event.text), []).append(place)
+        times = np.array([max(event.t, float(self._zero)) for _, event in entries])
+        stamps = nanoseconds(times) - self._zero * NANOSECONDS
+        self._writer.write(self._channel, *(_entries(*key, np.array(places), stamps) for key, places in alike.items()))
+
+
+def _entries(source: str, level: str, text: str, places: NDArray[np.int64], stamps: NDArray[np.int64]) -> Messages:
+    """Messages of the log that say the same."""
+    number = ros2.LOG_LEVELS.get(level, ros2.LOG_LEVELS["info"])
+    template = Template().stamp().uint8(number).string(source).string(text).string("").string("").uint32(0)
+    at = stamps[places]
+    return Messages(places, at, template.length, lambda out: template.fill(out, at))
+
+
+def event_in(message: bytes, t: float) -> Event | None:
+    """The run's own event in a message of the log, at time t [s]; None for what follows from the samples."""
+    level = next((name for name, number in ros2.LOG_LEVELS.items() if number == message[12]), "info")
+    at, texts = 16, []
+    for _ in range(2):
+        (count,) = struct.unpack_from("<I", message, at)
+        texts.append(message[at + 4 : at + 3 + count].decode())
+        at += 4 + count + -count % 4
+    return Event(t, level, texts[1]) if texts[0] == SOURCE else None
+
+
+def joint_topics(writer: McapWriter, run: Run) -> list[JointTopic]:
+    """/joint_states and /joint_accelerations of the columns that are kept."""
+    kept = [
+        [k for k, name in enumerate(run.outputs) if derivative_name(name, order) not in run.absent]
+        for order in range(3)
+    ]
+    topics = []
+    if kept[0]:
+        orders = (0, 1) if kept[0] == kept[1] else (0,)
+        topics.append(JointTopic(writer, run, "/joint_states", kept[0], orders))
+    if kept[2]:
+        topics.append(JointTopic(writer, run, "/joint_accelerations", kept[2], (2,)))
+    return topics
+
+
+def _joint_state(names: tuple[str, ...], with_velocity: bool) -> Template:
+    template = Template().stamp().string(ros2.ROOT).strings(names).sequence(len(names))
+    return template.sequence(len(names) if with_velocity else 0).sequence(0)
+
+
+def _si_units(names: tuple[str, ...], order: int) -> str:
+    kinds = {quantity_of(name).kind for name in names}
+    per_time = ("", "/s", "/s2")[order]
+    return ", ".join(unit + per_time for kind, unit in (("angle", "rad"), ("length", "m")) if kind in kinds)

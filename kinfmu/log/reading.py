@@ -1,0 +1,148 @@
+"""The run in an MCAP file, read back: whole, or what is left of one that was cut off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.errors import LogError, listed
+from kinfmu.log.clock import NANOSECONDS, nanoseconds
+from kinfmu.log.drawn import LOG_TOPIC, event_in
+from kinfmu.log.mcap_file import (
+    ABOUT,
+    CHECKSUM,
+    END,
+    INFO,
+    MECHANISM_FILE,
+    MODEL_DESCRIPTION,
+    RECORD,
+    SAMPLE_TOPIC,
+    checksum,
+    sample_template,
+    write_mcap,
+)
+from kinfmu.log.record import column_count, events_of, run_of
+from kinfmu.log.scan import Block, Scan
+from kinfmu.run import Event, FloatArray, Run
+
+
+def read(path: str | Path) -> Run:
+    """The run that was written to `path`, equal in every bit."""
+    scan = _scan(path)
+    if scan.fault:
+        raise LogError(f"{path}: not a whole MCAP file: {scan.fault}{_advice(scan, path)}")
+    try:
+        run, _ = _run_in(scan)
+        return run
+    except LogError as error:
+        raise LogError(f"{path}: {error}{_advice(scan, path)}") from None
+
+
+def recover(path: str | Path, output: str | Path) -> Run:
+    """Write what is in a file that was cut off or damaged, up to there, as a whole file; returns that run.
+
+    An event of level "warning" says where the samples end and why.
+    """
+    scan = _scan(path)
+    try:
+        run, fault = _run_in(scan, is_cut=True)
+    except LogError as error:
+        raise LogError(f"{path}: nothing can be recovered: {scan.fault or error}") from None
+    run = _cut_off(run, fault)
+    write_mcap(run, output)
+    return run
+
+
+def _scan(path: str | Path) -> Scan:
+    try:
+        return Scan(Path(path))
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _advice(scan: Scan, path: str | Path) -> str:
+    """What helps where a run was begun."""
+    return f"; kinfmu recover {path} keeps what is there" if RECORD in scan.metadata else ""
+
+
+def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
+    """The run in a file; is_cut: as far as it goes, and why it goes no further."""
+    channel = scan.id_of(SAMPLE_TOPIC)
+    if RECORD not in scan.metadata or channel is None:
+        topics = listed(sorted(one.topic for one in scan.channels.values()))
+        raise LogError(f"no topic {SAMPLE_TOPIC}, so this is no run of kinfmu; topics: {topics}")
+    texts, info, end = (scan.metadata.get(name, {}) for name in (RECORD, INFO, END))
+    try:
+        attachments = {name: scan.attachments.get(name, b"").decode() for name in (MECHANISM_FILE, MODEL_DESCRIPTION)}
+    except UnicodeDecodeError:
+        attachments = {}
+    if texts.pop(CHECKSUM, "") != checksum(texts, info, attachments):
+        raise LogError("metadata or mechanism are damaged (their checksum does not fit)")
+    if end and end.pop(CHECKSUM, "") != checksum(end):
+        end = {}
+    if not (end or is_cut):
+        raise LogError("how the run ended is missing or damaged")
+    template = sample_template(column_count(texts))
+    found, fault = _samples(scan, channel, template.length, is_cut=is_cut)
+    blocks = [template.read(block.payloads) for block in found]
+    samples = sum(map(len, blocks))
+    if end and samples != int(end["samples"]):
+        fault = fault or f"holds {samples} of {end['samples']} samples"
+    if fault and not is_cut:
+        raise LogError(fault)
+    run = run_of(texts, blocks, (), info, attachments[MECHANISM_FILE], attachments[MODEL_DESCRIPTION])
+    events = events_of(end) if end else _logged_events(scan, run.t)
+    return replace(run, events=events), fault
+
+
+def _samples(scan: Scan, channel: int, length: int, *, is_cut: bool) -> tuple[list[Block], str]:
+    """Blocks of samples in the order of their numbers, and why there are no more."""
+    blocks: list[Block] = []
+    fault = scan.fault
+    try:
+        for block in scan.blocks(channel):
+            if block.payloads.shape[1] != length:
+                raise LogError(f"a sample has {block.payloads.shape[1]} bytes instead of {length}")
+            blocks.append(block)
+    except LogError as error:
+        if not is_cut:
+            raise
+        fault = str(error)
+    sequence = np.concatenate([block.sequence for block in blocks]) if blocks else np.empty(0)
+    if np.array_equal(sequence, np.arange(len(sequence))):
+        return blocks, fault
+    order = np.argsort(sequence, kind="stable")  # another program put them into another order, or some are missing
+    known = int(np.argmin(np.append(sequence[order] == np.arange(len(order)), False)))
+    kept = order[:known]
+    whole = Block(*(np.concatenate(parts)[kept] for parts in zip(*blocks, strict=True)))
+    return [whole], fault or ("" if known == len(order) else f"sample {known} is missing")
+
+
+def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
+    """The run's own events from the log, at the times of samples where they were logged with one."""
+    channel = scan.id_of(LOG_TOPIC)
+    about = scan.metadata.get(ABOUT, {})
+    if channel is None:
+        return ()
+    zero = int(about.get("time_zero_s", "0"))
+    events = []
+    times = dict(zip((nanoseconds(t) - zero * NANOSECONDS).tolist(), t.tolist(), strict=True))
+    try:
+        for block in scan.blocks(channel):
+            for stamp, payload in zip(block.times.tolist(), block.payloads, strict=True):
+                event = event_in(payload.tobytes(), times.get(stamp, zero + stamp / NANOSECONDS))
+                if event:
+                    events.append(event)
+    except LogError:
+        pass  # the samples say why the file ends there
+    return tuple(events)
+
+
+def _cut_off(run: Run, fault: str) -> Run:
+    """The run with an event that says where its samples end."""
+    if not fault:
+        return run
+    end = float(run.t[-1]) if len(run) else 0.0
+    return replace(run, events=(*run.events, Event(end, "warning", f"the record ends here: {fault}")))

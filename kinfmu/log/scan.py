@@ -1,0 +1,212 @@
+"""The container MCAP, read: record after record, as far as the file goes, whole or cut off."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.errors import LogError, MissingPackageError
+from kinfmu.log.container import MAGIC, MESSAGE, Bytes, Opcode
+
+
+class Channel(NamedTuple):
+    """A topic of the file."""
+
+    topic: str
+    metadata: dict[str, str]
+
+
+class Block(NamedTuple):
+    """Messages of one channel and of one length: sequence numbers (n,), log times (n,) [ns], payloads (n, length)."""
+
+    sequence: NDArray[np.uint32]
+    times: NDArray[np.uint64]
+    payloads: Bytes
+
+
+@dataclass
+class _Chunk:
+    """Where a chunk's record stands, and the channels that its index names; none if it has no index."""
+
+    place: int
+    length: int
+    channels: set[int] = field(default_factory=set)
+
+
+class Scan:
+    """What an MCAP file holds. fault: where and why its records end early, empty if the file is whole."""
+
+    def __init__(self, path: Path) -> None:
+        self.channels: dict[int, Channel] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.attachments: dict[str, bytes] = {}
+        self._path = path
+        self._chunks: list[_Chunk] = []
+        with path.open("rb") as file:
+            self.fault = self._read(file, path.stat().st_size)
+
+    def id_of(self, topic: str) -> int | None:
+        """The channel of a topic."""
+        return next((number for number, channel in self.channels.items() if channel.topic == topic), None)
+
+    def blocks(self, channel: int) -> Iterator[Block]:
+        """The messages of a channel in file order; LogError where a chunk is damaged."""
+        with self._path.open("rb") as file:
+            for chunk in self._chunks:
+                if not chunk.channels or channel in chunk.channels:
+                    file.seek(chunk.place)
+                    yield from _messages(_unpacked(file.read(chunk.length), chunk.place), channel)
+
+    def _read(self, file: BinaryIO, size: int) -> str:
+        if file.read(len(MAGIC)) != MAGIC:
+            return "it does not begin as one"
+        is_ended = False
+        while True:
+            place = file.tell()
+            if is_ended and size - place == len(MAGIC) and file.read(len(MAGIC)) == MAGIC:
+                return ""
+            head = file.read(9)
+            if len(head) < 9:
+                return f"it ends at byte {size}, within a record" if head else f"it ends at byte {size}"
+            kind, length = struct.unpack("<BQ", head)
+            if length > size - place - 9:
+                return f"the record at byte {place} goes beyond the end, byte {size}"
+            try:
+                is_ended = self._take(kind, file, length)
+            except (ValueError, struct.error) as error:
+                return f"the record at byte {place} is damaged: {error}"
+            file.seek(place + 9 + length)
+
+    def _take(self, kind: int, file: BinaryIO, length: int) -> bool:
+        """Look at a record; True for the last one."""
+        if kind == Opcode.CHUNK:
+            self._chunks.append(_Chunk(file.tell(), length))
+        elif kind == Opcode.MESSAGE_INDEX and self._chunks:
+            self._chunks[-1].channels.add(*struct.unpack("<H", file.read(2)))
+        elif kind == Opcode.CHANNEL:
+            body = _Body(file.read(length))
+            number, _ = body.numbers("<HH")
+            topic, _, metadata = body.text(), body.text(), body.table()
+            self.channels[number] = Channel(topic, metadata)
+        elif kind == Opcode.METADATA:
+            body = _Body(file.read(length))
+            name = body.text()
+            self.metadata[name] = body.table()
+        elif kind == Opcode.ATTACHMENT:
+            body = _Body(file.read(length))
+            body.numbers("<QQ")
+            name, _ = body.text(), body.text()
+            (count,) = body.numbers("<Q")
+            self.attachments[name] = body.taken(count)
+        elif kind not in Opcode._value2member_map_:
+            raise ValueError(f"{kind:#x} is no kind of record")
+        return kind == Opcode.FOOTER
+
+
+class _Body:
+    """The bytes of a record, taken one field after another."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._at = data, 0
+
+    def taken(self, count: int) -> bytes:
+        if count > len(self._data) - self._at:
+            raise ValueError("a field goes beyond its end")
+        self._at += count
+        return self._data[self._at - count : self._at]
+
+    def numbers(self, layout: str) -> tuple[int, ...]:
+        return struct.unpack(layout, self.taken(struct.calcsize(layout)))
+
+    def text(self) -> str:
+        (count,) = self.numbers("<I")
+        return self.taken(count).decode()
+
+    def table(self) -> dict[str, str]:
+        (count,) = self.numbers("<I")
+        entries = _Body(self.taken(count))
+        found = {}
+        while entries._at < count:
+            key = entries.text()
+            found[key] = entries.text()
+        return found
+
+
+def _unpacked(data: bytes, place: int) -> Bytes:
+    """The messages of a chunk, whose record has this body at this byte of the file."""
+    try:
+        body = _Body(data)
+        _, _, size = body.numbers("<QQQ")
+        (crc,) = body.numbers("<I")
+        compression = body.text()
+        (count,) = body.numbers("<Q")
+        raw = _decompressed(compression, body.taken(count), size)
+    except (ValueError, struct.error) as error:
+        raise LogError(f"the chunk at byte {place} is damaged: {error}") from None
+    if len(raw) != size or (crc and zlib.crc32(raw) != crc):
+        raise LogError(f"the chunk at byte {place} is damaged: its checksum does not fit")
+    return np.frombuffer(raw, np.uint8)
+
+
+def _decompressed(compression: str, data: bytes, size: int) -> bytes:
+    if compression == "":
+        return data
+    try:
+        if compression == "zstd":
+            import zstandard
+
+            try:
+                if zstandard.frame_content_size(data) not in (-1, size):
+                    raise ValueError("its sizes do not fit")
+                return zstandard.ZstdDecompressor().decompress(data, size)
+            except zstandard.ZstdError as error:
+                raise ValueError(str(error)) from None
+        if compression == "lz4":
+            import lz4.frame
+
+            try:
+                return bytes(lz4.frame.decompress(data))
+            except RuntimeError as error:
+                raise ValueError(str(error)) from None
+    except ImportError as error:
+        raise MissingPackageError(f"chunks of {compression} need {error.name}: pip install {error.name}") from None
+    raise ValueError(f"compression '{compression}' is not known")
+
+
+def _messages(raw: Bytes, channel: int) -> Iterator[Block]:
+    """Messages of a channel among the records of a chunk."""
+    length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
+    if length and len(raw) % length == 0:
+        table = raw.reshape(-1, length)
+        heads = table[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0] if length >= MESSAGE.itemsize else None
+        if heads is not None and _are_alike(heads):
+            if heads["channel"][0] == channel:
+                yield _block(table)
+            return
+    at = 0
+    while at + 9 <= len(raw):
+        length = 9 + int(raw[at + 1 : at + 9].view("<u8")[0])
+        record = raw[at : at + length].reshape(1, -1)
+        if raw[at] == Opcode.MESSAGE and record[0, 9:11].view("<u2")[0] == channel:
+            yield _block(record)
+        at += length
+
+
+def _are_alike(heads: NDArray[np.void]) -> bool:
+    """True if all records are messages of one channel and one length."""
+    first = heads[0]
+    return first["opcode"] == Opcode.MESSAGE and all(
+        bool((heads[name] == first[name]).all()) for name in ("opcode", "length", "channel")
+    )
+
+
+def _block(records: Bytes) -> Block:
+    heads = records[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0]
+    return Block(heads["sequence"], heads["log"], records[:, MESSAGE.itemsize :])
