@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,8 +140,8 @@ class Run:
     def __len__(self) -> int:
         return len(self.t)
 
-    def part(self, rows: slice | NDArray[Any]) -> Run:
-        """Some of the samples, without the events; what was not computed yet is not computed for it."""
+    def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
+        """Some of the samples, with these events; what was not computed yet is not computed for it."""
 
         def late(name: str) -> Any:
             table = self.__dict__[name]
@@ -148,7 +149,22 @@ class Run:
 
         tables = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "watch")
         parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
-        return replace(self, **parts, margin=late("margin"), error=late("error"), events=())
+        return replace(self, **parts, margin=late("margin"), error=late("error"), events=events)
+
+    def without(self, names: Iterable[str]) -> Run:
+        """The run without columns of these names: their places hold NaN, 0 where they count, and none is computed."""
+        absent = self.absent | frozenset(names)
+        tables: dict[str, Any] = {name: self.__dict__[name] for name in ("margin", "error")}
+        for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
+            places = list(group)
+            gone = [place.column or 0 for place in places if place.name in absent]
+            if len(gone) == len(places):
+                shape = len(self) if places[0].column is None else (len(self), len(places))
+                tables[name] = np.zeros(shape, np.int64) if name == "iterations" else np.full(shape, np.nan)
+            elif gone:
+                tables[name] = np.array(getattr(self, name))
+                tables[name][:, gone] = np.nan
+        return replace(self, **tables, absent=absent)
 
     def columns(self) -> Iterator[Column]:
         """Every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""

@@ -57,7 +57,7 @@ def main() -> None:
       kinfmu new fourbar mine.toml    a commented mechanism file to change
       kinfmu check mine.toml          what it can do
       kinfmu simulate mine.toml       its FMU, stepped and logged
-      kinfmu review logs/fourbar.mcap
+      kinfmu review logs/mine.mcap
 
     Exit status: 0 fine, 1 the mechanism or the run is at fault, 2 wrong usage.
     """  # noqa: D301  click leaves lines behind a backspace as they are

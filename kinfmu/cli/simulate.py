@@ -37,6 +37,13 @@ from kinfmu.errors import KinfmuError
 @click.option(
     "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; logs/<name>.rrd if nothing is said."
 )
+@click.option(
+    "--channels",
+    metavar="NAMES",
+    help="What to keep, with commas: q, qd, qdd, points, inputs, residual, iterations, margin, error, watch, columns "
+    "such as coupler.* and drawn, for viewers; -error,-margin: all but those; none: no logs. All if nothing is said.",
+)
+@click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to keep in a second of the run.")
 def simulate(
     model: str,
     start: float | None,
@@ -47,20 +54,29 @@ def simulate(
     settings: tuple[tuple[str, str], ...],
     mcap: Path | None,
     rrd: Path | None,
+    channels: str | None,
+    rate: float | None,
 ) -> None:
     """Step an FMU and log the run; of a MECH it is built first.
 
-    Steps an FMU that kinfmu built, with fmpy, and writes an MCAP record and a Rerun recording.
+    Steps an FMU that kinfmu built, with fmpy, and writes an MCAP record and a Rerun recording. The record grows with
+    the run: of one that is killed, kinfmu recover keeps all but the last moment.
     """
     from tempfile import TemporaryDirectory
 
+    from kinfmu.channels import is_drawn
     from kinfmu.fmu import build as built
     from kinfmu.fmu import simulate as simulated
     from kinfmu.fmu.build import default_drive
-    from kinfmu.log import write_mcap, write_rrd
+    from kinfmu.log import McapLog, write_rrd
 
     if wrap and inputs is None:
         raise click.UsageError("--wrap follows the angles of --input, which is not given")
+    names = None if channels is None else [name.strip() for name in channels.split(",")]
+    is_logged = names != ["none"]
+    for path in (mcap, rrd):
+        if path is not None and not is_logged:
+            raise click.UsageError(f"--channels none keeps nothing to write to {path}")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu, parameters = Path(model), as_values(settings)
         if fmu.suffix != ".fmu":
@@ -70,6 +86,8 @@ def simulate(
             with about(model):
                 mech = mech.with_parameters(given.parameters)
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else default_drive(mech))
+        record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
+        is_replaced = record is not None and record.exists()
         with Progress() as progress, instead(str(fmu), model):
             run = simulated(
                 fmu,
@@ -79,19 +97,29 @@ def simulate(
                 inputs=inputs,
                 parameters=parameters,
                 wrap=wrap,
+                channels=names,
+                rate=rate,
+                sink=McapLog(record, drawn=is_drawn(names)) if record else None,
                 progress=progress,
             )
-    name = run.info.get("name") or fmu.stem
-    logs = Path("logs")
+    if record and recording:
+        write_rrd(run, recording)
+    tell_of(run)
+    if record and recording:
+        replaced = " (an older run of that name was replaced)" if is_replaced else ""
+        click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}")
+        click.echo(f"to look at it: kinfmu review {record}")
+    else:
+        click.echo(verdict(run))
+    fail_if_failed(run)
+
+
+def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
+    """Where the logs go: into logs/, under the name of the file or of the gallery's mechanism, if nothing is said."""
+    folder, name = Path("logs"), Path(model.replace(":", "_")).name.removesuffix(".toml").removesuffix(".fmu")
     if mcap is None or rrd is None:
         try:
-            logs.mkdir(exist_ok=True)
+            folder.mkdir(exist_ok=True)
         except OSError as error:
-            raise KinfmuError(f"{logs}: cannot be made ({error.strerror})") from None
-    record, recording = mcap or logs / f"{name}.mcap", rrd or logs / f"{name}.rrd"
-    write_mcap(run, record)
-    write_rrd(run, recording)
-    tell_of(run)
-    click.echo(f"{verdict(run)}; written to {record} and {recording}")
-    click.echo(f"to look at it: kinfmu review {record}")
-    fail_if_failed(run)
+            raise KinfmuError(f"{folder}: cannot be made ({error.strerror})") from None
+    return mcap or folder / f"{name}.mcap", rrd or folder / f"{name}.rrd"

@@ -16,7 +16,7 @@ def verdict(run: Run) -> str:
 
     counts = [(status, int((run.status == status).sum())) for status in Status]
     said = listed(f"{count} {status.name.lower().replace('_', ' ')}" for status, count in counts if count)
-    residuals = run.residual[run.good]
+    residuals = run.residual[run.good & (run.residual == run.residual)]
     largest = f"; largest residual {residuals.max():.2g} of the size" if len(residuals) else ""
     return f"{len(run)} samples: {said}{largest}"
 

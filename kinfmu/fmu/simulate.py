@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinfmu.channels import absent_columns, kept_samples
 from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.description import Description
@@ -26,6 +28,7 @@ from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Event, Run
+from kinfmu.sink import Sink
 from kinfmu.solver.status import Status
 from kinfmu.units import quantity_in
 
@@ -36,6 +39,8 @@ LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this 
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _DISCARD, _ERROR = 2, 3
+PIECE = 64 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
+PERIOD = 0.5  # [s] by the clock
 
 
 def simulate(
@@ -47,6 +52,9 @@ def simulate(
     inputs: str | Path | Mapping[str, ArrayLike] | None = None,
     parameters: Mapping[str, float | str | bool] | None = None,
     wrap: bool = False,
+    channels: Sequence[str] | None = None,
+    rate: float | None = None,
+    sink: Sink | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
     """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
@@ -56,8 +64,10 @@ def simulate(
     CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit, or a mapping
     of arrays by name; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name,
     such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap: angles among the inputs are followed the short way
-    where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. progress: called with (samples
-    done, samples in all).
+    where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. channels: what to keep of every
+    sample, such as ["q", "qd"] or ["-error", "-margin"], as kinfmu.channels.absent_columns tells; the FMU is not asked
+    for the rest. rate: samples to keep in a second of the run, all if None. sink: takes the run while it goes on, such
+    as kinfmu.log.McapLog("run.mcap"). progress: called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
 
@@ -76,18 +86,28 @@ def simulate(
         table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
         experiment = interface.experiment
         t = _times(table or experiment, start, stop, experiment.step if step is None else step)
-        chosen = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-        samples = _Samples(interface, len(t))
-        if not _time_drives(interface, chosen):
+        kept = kept_samples(t, rate)
+        settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
+        text, xml = (_text_in(folder, name) for name in ("resources/mechanism.toml", "modelDescription.xml"))
+        samples = _Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
+        if not _time_drives(interface, settings):
             samples.extend(undriven(interface, table, float(t[0])))
         if table is not None:
             samples.extend(input_notes(interface, table, start, stop))
         with interruptible() as interrupted, slave(about, folder, samples.log) as one:
-            _initialize(one, chosen, t, samples.said)
+            _initialize(one, settings, t, samples.said)
             samples.read_fixed(one)
-            _step_through(one, samples, t, table, progress, interrupted)
-        mechanism_text = (folder / "resources" / "mechanism.toml").read_text(encoding="utf-8")
-    return samples.run(about, mechanism_text, chosen)
+            samples.begin(channels, sink)
+            try:
+                _step_through(one, samples, t, kept, table, progress, interrupted)
+            except BaseException as failure:
+                samples.end(str(failure) or type(failure).__name__)
+                raise
+    return samples.end()
+
+
+def _text_in(folder: Path, name: str) -> str:
+    return (folder / name).read_text(encoding="utf-8")
 
 
 @contextmanager
@@ -177,11 +197,13 @@ def _step_through(
     slave: Slave,
     samples: _Samples,
     t: NDArray[np.float64],
+    kept: NDArray[np.int64],
     table: InputTable | None,
     progress: Callable[[int, int], None] | None,
     interrupted: Callable[[], bool],
 ) -> None:
-    """The loop: set at t_k, get, record, step."""
+    """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step."""
+    is_kept = np.isin(np.arange(len(t)), kept).tolist()
     inputs = [] if table is None else [slave.references[name] for name in table.names]
     settings = np.empty((len(t), 0)) if table is None else table.at(t)
     for k, time in enumerate(t.tolist()):
@@ -191,7 +213,7 @@ def _step_through(
             return
         if inputs:
             slave.set(inputs, settings[k].tolist())
-        good = samples.read(time, slave)
+        good = samples.read(time, slave, is_kept=is_kept[k])
         if progress is not None:
             progress(k + 1, len(t))
         if not good:
@@ -206,25 +228,49 @@ def _step_through(
 class _Samples:
     """Rows of a run as they come, and what the FMU says meanwhile."""
 
-    def __init__(self, interface: Interface, count: int) -> None:
-        self._interface = interface
+    def __init__(
+        self,
+        about: Description,
+        count: int,
+        *,
+        settings: Mapping[str, float | bool],
+        mechanism_text: str,
+        model_description: str,
+    ) -> None:
+        interface = self._interface = about.interface
         self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
-        self._reals = np.empty((count, self._ends[-1]))
-        self._t = np.empty(count)
-        self._counts = np.empty((count, 2), dtype=np.int64)
+        most = count + 1  # and one without numbers
+        self._reals = np.full((most, self._ends[-1]), np.nan)
+        self._t = np.empty(most)
+        self._counts = np.empty((most, 2), dtype=np.int64)
         self._size = 0
-        references = interface.value_references()
-        self._references = {part: [references[v.name] for v in interface.part(part)] for part in _REALS}
-        self._every = [reference for part in _REALS for reference in self._references[part]]
+        self._names = [variable.name for part in _REALS for variable in interface.part(part)]
+        self._absent: frozenset[str] = frozenset()
+        self._mechanism_text, self._model_description = mechanism_text, model_description
+        self._info = {
+            "name": interface.name,
+            "title": interface.title,
+            "generation_tool": about.generation_tool,
+            "token": about.token,
+            "parameters": ", ".join(f"{name} = {value!r}" for name, value in settings.items()),
+        }
         self._events: list[Event] = []
         self.now = 0.0
         self.fixed: dict[str, float] = {}
+        self._sink: Sink | None = None
+        self._passed_on = self._events_passed_on = 0  # samples and events that the sink has
+        self._piece = 1  # samples that the sink gets at once
+        self._last_time = 0.0  # when it got some, by the clock
 
     def log(self, status: int, text: str) -> None:
         """A message of the FMU becomes an event at the current time."""
         event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
         if not self._events or self._events[-1] != event:
             self._events.append(event)
+
+    def extend(self, events: Iterable[Event]) -> None:
+        """Events of their own times."""
+        self._events.extend(events)
 
     def extend(self, events: Iterable[Event]) -> None:
         """Events of their own times."""
@@ -240,30 +286,75 @@ class _Samples:
         values = slave.get([slave.references[name] for name in names]) if names else []
         self.fixed = dict(zip(names, values, strict=True))
 
-    def read(self, t: float, slave: Slave) -> bool:
-        """Read a sample; False if it holds no numbers but the drivers' values asked for."""
+    def begin(self, channels: Sequence[str] | None, sink: Sink | None) -> None:
+        """Choose the variables to ask for, and begin the sink's run."""
+        run = self._run(slice(0, 0))
+        self._absent = absent_columns(run, channels)
+        references = self._interface.value_references()
+        columns = [name.removeprefix("driven.") for name in self._names]  # what a run calls them
+        self._asked = np.array([k for k, name in enumerate(columns) if name not in self._absent], dtype=np.int64)
+        first = _REALS.index("driven")
+        drives = (self._ends[first - 1] <= self._asked) & (self._asked < self._ends[first])
+        self._asked_of_drivers = self._asked[drives]
+        self._references, self._references_of_drivers = (
+            [references[self._names[k]] for k in asked] for asked in (self._asked, self._asked_of_drivers)
+        )
+        self._sink = sink
+        if sink is not None:
+            self._piece = max(1, PIECE // (8 * (len(self._asked) + 3)))
+            self._last_time = perf_counter()
+            sink.begin(self._run(slice(0, 0)))
+
+    def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
+        """Read a sample if it is to be kept; False if it holds no numbers but the drivers' values asked for."""
         status, iterations = slave.counts()
         good = status <= Status.BRIDGED
+        if good and not is_kept:
+            return True
         row = self._reals[self._size]
         if good:
-            row[:] = slave.get(self._every)
-        else:
-            row[:] = np.nan
-            first = _REALS.index("driven")
-            row[self._ends[first - 1] : self._ends[first]] = slave.get(self._references["driven"])
+            if self._references:
+                row[self._asked] = slave.get(self._references)
+        elif self._references_of_drivers:
+            row[self._asked_of_drivers] = slave.get(self._references_of_drivers)
         self._t[self._size] = t
         self._counts[self._size] = status, iterations
         self._size += 1
+        waiting = self._size - self._passed_on
+        if self._sink is not None and (waiting >= self._piece or perf_counter() - self._last_time > PERIOD):
+            self._pass_on()
         return good
 
-    def run(self, about: Description, mechanism_text: str, parameters: Mapping[str, float | bool]) -> Run:
-        """All rows as a Run."""
-        n = self._size
-        pieces = np.split(self._reals[:n].copy(), self._ends[:-1], axis=1)
+    def end(self, reason: str = "") -> Run:
+        """All rows as a Run; reason: why it ended by an error."""
+        if reason:
+            self.log(_ERROR, reason)
+        run = self._run(slice(0, self._size), tuple(self._events))
+        self._pass_on()
+        if self._sink is not None:
+            self._sink.end(run, reason)
+        return run
+
+    def _pass_on(self) -> None:
+        """The sink gets what it has not got yet."""
+        rows = slice(self._passed_on, self._size)
+        events = tuple(self._events[self._events_passed_on :])
+        self._passed_on, self._events_passed_on = self._size, len(self._events)
+        sink, self._sink = self._sink, None  # one that fails is not called again
+        if sink is not None and (events or rows.start < rows.stop):
+            sink.add(self._run(rows, events))
+        self._sink = sink
+        self._last_time = perf_counter()
+
+    def _run(self, rows: slice, events: tuple[Event, ...] = ()) -> Run:
+        pieces = np.split(self._reals[rows].copy(), self._ends[:-1], axis=1)
         part = dict(zip(_REALS, pieces, strict=True))
+        counts = self._counts[rows].copy()
+        if "solver.iterations" in self._absent:
+            counts[:, 1] = 0
         interface = self._interface
         return Run(
-            t=self._t[:n],
+            t=self._t[rows].copy(),
             outputs=tuple(variable.name for variable in interface.part("values")),
             coordinate_count=interface.coordinate_count,
             values=part["values"],
@@ -272,21 +363,17 @@ class _Samples:
             fixed=self.fixed,
             input_names=tuple(variable.name for variable in interface.part("inputs")),
             inputs=part["driven"],
-            status=self._counts[:n, 0],
-            iterations=self._counts[:n, 1],
+            status=counts[:, 0],
+            iterations=counts[:, 1],
             residual=part["residual"][:, 0],
             margin=part["margin"][:, 0],
             error=part["errors"],
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],
             length_unit=interface.length_unit,
-            mechanism_text=mechanism_text,
-            info={
-                "name": interface.name,
-                "title": interface.title,
-                "generation_tool": about.generation_tool,
-                "token": about.token,
-                "parameters": ", ".join(f"{name} = {value!r}" for name, value in parameters.items()),
-            },
-            events=tuple(self._events),
+            mechanism_text=self._mechanism_text,
+            model_description=self._model_description,
+            info=self._info,
+            events=events,
+            absent=self._absent,
         )

@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from kinfmu.log.mcap_file import write_mcap
+    from kinfmu.log.mcap_log import McapLog
     from kinfmu.log.reading import read, recover
     from kinfmu.log.rerun_file import write_rrd
     from kinfmu.log.reviewing import review
     from kinfmu.log.table import write_table
 
-__all__ = ["read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
+__all__ = ["McapLog", "read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
 
 _HOME = {
+    "McapLog": "mcap_log",
     "read": "reading",
     "recover": "reading",
     "review": "reviewing",

@@ -28,7 +28,7 @@ Bytes = NDArray[np.uint8]
 
 MAGIC = b"\x89MCAP0\r\n"
 ZSTD = "zstd"
-LEVEL = 1  # of zstd: higher ones take twice the time for 1 % of the size
+LEVEL = -1  # of zstd: 1 takes a quarter more time for 2 % of the size, 3 twice the time
 MOST_PENDING = 4  # chunks that are being compressed
 MESSAGE = np.dtype(
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
@@ -105,6 +105,10 @@ class McapWriter:
         self._pending: deque[_Chunk] = deque()
         self._pool = None if at_once else ThreadPoolExecutor(min(2, os.cpu_count() or 1))
         self._put(MAGIC + _record(Opcode.HEADER, _text(profile) + _text(library)))
+
+    def go_on_in(self, file: RawIOBase) -> None:
+        """Write on at the end of this file, which is the same under another name."""
+        self._file = file
 
     def channel(self, topic: str, encoding: str, schema: str, definition: str, metadata: Mapping[str, str]) -> int:
         """Id of a new channel, whose messages are of a schema (ros2msg) by name and definition."""

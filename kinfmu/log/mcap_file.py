@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import platform
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from io import FileIO
 from pathlib import Path
 
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu import VERSION
+from kinfmu.channels import is_drawn, select
 from kinfmu.errors import MechanismError
 from kinfmu.log import ros2
 from kinfmu.log.cdr import Template
@@ -45,14 +46,16 @@ RECORD, INFO, ABOUT, END = "kinfmu.record", "kinfmu.info", "kinfmu.about", "kinf
 CHECKSUM = "checksum"  # of metadata and attachments; chunks have their own
 
 
-def write_mcap(run: Run, path: str | Path, *, drawn: bool = True) -> None:
+def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = None, rate: float | None = None) -> None:
     """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time.
 
-    drawn: with the topics that viewers of ROS 2 draw; without them the file is a third as large.
+    channels: what to keep of every sample, all if None, such as ["q", "drawn"] or ["-error"]; ["-drawn"]: the record
+    alone, less than half as large. rate: samples to keep in a second of the run. Both as kinfmu.channels tells.
     """
+    run = select(run, channels, rate)
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
-        content = Content(file, run, zero_of(run.t), drawn=drawn)
+        content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
         try:
             for start in range(0, len(run), ROWS):
                 content.add(run.part(slice(start, start + ROWS)))
@@ -80,7 +83,9 @@ class Content:
             if text:
                 writer.attachment(name, f"application/{kind}", text.encode())
         about = {"time_base": "simulation", "time_zero_s": str(zero), **_versions()}
-        self._topics: list[_SampleTopic | JointTopic | LinkTopic] = [_SampleTopic(writer, run)]
+        self.until = 0.0  # time of the last sample [s]
+        self._sample = _SampleTopic(writer, run)
+        self._topics: list[JointTopic | LinkTopic] = []
         self._log: LogTopic | None = None
         if drawn:
             self._topics += joint_topics(writer, run)
@@ -101,9 +106,12 @@ class Content:
     def add(self, run: Run) -> None:
         """The next samples."""
         stamps = nanoseconds(run.t) - self._zero * NANOSECONDS
-        if len(run):
-            for topic in self._topics:
-                topic.add(run, stamps)
+        if not len(run):
+            return
+        self._sample.add(run, stamps)
+        self.until = float(run.t[-1])
+        for topic in self._topics:
+            topic.add(run, stamps)
 
     def log(self, changes: Iterable[Event], events: Iterable[Event]) -> None:
         """Changes of status and the run's own events."""
@@ -117,6 +125,10 @@ class Content:
         texts = ending(run) | {"verdict": sentence(run), "outcome": outcome or (failures or ["completed"])[0]}
         self._writer.metadata(END, texts | {CHECKSUM: checksum(texts)})
         self._writer.finish()
+
+    def go_on_in(self, file: FileIO) -> None:
+        """Write on at the end of this file, which is the same under another name."""
+        self._writer.go_on_in(file)
 
     def close(self) -> None:
         """Give up what is not in the file yet."""

@@ -15,22 +15,48 @@ from kinfmu.errors import LogError
 def replacing(path: str | Path) -> Iterator[Path]:
     """An empty file beside `path` to write into; it takes the place of `path` when the block ends without an error.
 
-    The run is in memory until then, so a failure loses nothing: what stood at `path` before still stands there. A
-    folder that is missing or cannot be written is a LogError.
+    A failure loses nothing: what stood at `path` before still stands there. A folder that is missing or cannot be
+    written is a LogError.
     """
-    path = Path(path)
-    target = Path(os.path.realpath(path))  # a link stays a link
-    if target.is_dir():
-        raise LogError(f"{path}: is a folder; the name of a file is needed")
-    if not target.parent.is_dir():
-        raise LogError(f"{path}: the folder '{target.parent}' does not exist")
-    temporary = target.with_name(f".{target.stem}.{uuid4().hex[:8]}{target.suffix}")
+    target = checked(path)
+    temporary = _beside(target)
     try:
         temporary.open("xb").close()  # not tempfile: its files are readable by nobody else
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        raise LogError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise unwritable(path, error) from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def checked(path: str | Path) -> Path:
+    """Where a file of that name is, or is to be: the end of a link; LogError if none can be there."""
+    target = Path(os.path.realpath(path))  # a link stays a link
+    if target.is_dir():
+        raise LogError(f"{path}: is a folder; the name of a file is needed")
+    if not target.parent.is_dir():
+        raise LogError(f"{path}: the folder '{target.parent}' does not exist")
+    if target.exists() and not target.is_file():
+        raise LogError(f"{path}: is a device or a pipe, which a file would replace; the name of a file is needed")
+    return target
+
+
+def check_room(path: str | Path) -> None:
+    """LogError if no file can be made where `path` is to be."""
+    temporary = _beside(checked(path))
+    try:
+        temporary.open("xb").close()
+        temporary.unlink()
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: str | Path, error: OSError, more: str = "") -> LogError:
+    """What is told when a file cannot be written."""
+    return LogError(f"{path}: cannot be written ({error.strerror or error}){more}")
+
+
+def _beside(target: Path) -> Path:
+    return target.with_name(f".{target.stem}.{uuid4().hex[:8]}{target.suffix}")

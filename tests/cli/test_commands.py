@@ -94,8 +94,11 @@ def test_simulate_builds_a_mechanism_first_and_logs_beside_it(
 ) -> None:
     result = command("simulate", fourbar_file(), "--stop", "2", "--set", "crank.speed=0.5", "--set", "crank.start=0.25")
     assert result.exit_code == 0
-    assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == ["fourbar.mcap", "fourbar.rrd"]
-    assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.25, 0.75, 1.25])
+    assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == ["mine.mcap", "mine.rrd"]
+    assert log.read(tmp_path / "logs" / "mine.mcap")["crank.phi"] == pytest.approx([0.25, 0.75, 1.25])
+    assert "replaced" not in result.stdout
+    again = command("simulate", "mine.toml", "--stop", "2")
+    assert again.stdout.splitlines()[0].endswith("logs/mine.rrd (an older run of that name was replaced)")
 
 
 def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log import headless, write_rrd
 from kinfmu.run import Run
@@ -26,6 +30,17 @@ def run_with_gap(run: Run) -> Run:
 def any_run(request: pytest.FixtureRequest) -> Run:
     """Each kind of run in turn."""
     return KINDS[request.param]()
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
+    """`fmu()`: the four-bar as an FMU driven by time, built when first asked for."""
+    path = tmp_path_factory.mktemp("fmu") / "fourbar.fmu"
+
+    def built() -> Path:
+        return path if path.exists() else kinfmu.build(kinfmu.load("fourbar"), path)
+
+    return built
 
 
 @pytest.fixture(scope="session")

@@ -6,12 +6,14 @@ import dataclasses
 import struct
 import subprocess
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+from kinfmu.channels import select
 from kinfmu.errors import LogError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.container import McapWriter
@@ -103,6 +105,43 @@ def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
     write_mcap(run, tmp_path / "a.mcap")
     write_mcap(run, tmp_path / "b.mcap")
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "channels",
+    [["-drawn"], ["q", "qd", "drawn"], ["coupler.*", "drawn"], ["-qd", "-iterations", "-coupler.x"], ["none"]],
+    ids=" ".join,
+)
+def test_a_part_of_a_run_reads_back_bit_for_bit(channels: list[str], run_with_gap: Run, tmp_path: Path) -> None:
+    write_mcap(run_with_gap, tmp_path / "run.mcap", channels=channels, rate=0.5)
+    part = select(run_with_gap, channels, 0.5)
+    assert len(part) == 91
+    assert_same(part, read(tmp_path / "run.mcap"))
+
+
+def test_what_is_not_logged_is_not_in_the_file(run: Run, tmp_path: Path) -> None:
+    write_mcap(run, tmp_path / "run.mcap", channels=["coupler.*", "drawn"])
+    with (tmp_path / "run.mcap").open("rb") as file:
+        channels = {one.topic: one for one in make_reader(file).get_summary().channels.values()}
+    assert set(channels) == {"/sample", "/joint_states", "/joint_accelerations", "/robot_description", "/tf", "/log"}
+    assert "column.crank_phi" not in channels["/sample"].metadata
+    names, _ = numbers_of_joint_state(messages(tmp_path / "run.mcap", "/joint_states")[0][1])
+    assert names == ["coupler.x", "coupler.y", "coupler.phi"]
+    write_mcap(run, tmp_path / "record.mcap", channels=["-drawn"])
+    with (tmp_path / "record.mcap").open("rb") as file:
+        assert [one.topic for one in make_reader(file).get_summary().channels.values()] == ["/sample"]
+    write_mcap(run, tmp_path / "state.mcap", channels=["q", "drawn"])
+    _, (position, velocity, _) = numbers_of_joint_state(messages(tmp_path / "state.mcap", "/joint_states")[0][1])
+    assert (len(position), len(velocity)) == (5, 0)
+
+
+def test_margins_and_errors_that_are_not_logged_are_not_computed(run: Run, tmp_path: Path) -> None:
+    def never() -> NoReturn:
+        raise AssertionError("this was not to be computed")
+
+    late = dataclasses.replace(run, margin=never, error=never)
+    write_mcap(late, tmp_path / "run.mcap", channels=["-error", "-margin"])
+    assert read(tmp_path / "run.mcap").absent == {"solver.margin", *(f"solver.error_{q}" for q in ("q", "qd", "qdd"))}
 
 
 def test_rerun_finds_no_fault_with_the_file(any_run: Run, tmp_path: Path) -> None:

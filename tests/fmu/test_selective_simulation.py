@@ -1,0 +1,131 @@
+"""`simulate` asks an FMU for what is to be kept, and for nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu.errors import RequestError
+from kinfmu.fmu import simulate
+from kinfmu.fmu.slaves import Slave2
+from kinfmu.run import Run
+from kinfmu.solver.status import Status
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
+    """The names of the variables that each `get` asks for, in turn; the first one is for fixed coordinates."""
+    calls: list[set[str]] = []
+    get = Slave2.get
+
+    def recorded(slave: Slave2, references: Sequence[int]) -> list[float]:
+        names = {reference: name for name, reference in slave.references.items()}
+        calls.append({names[reference] for reference in references})
+        return get(slave, references)
+
+    monkeypatch.setattr(Slave2, "get", recorded)
+    return calls
+
+
+def test_an_fmu_is_asked_for_the_channels_and_no_others(fourbar: Path, asked: list[set[str]]) -> None:
+    whole = simulate(fourbar, stop=3.0)
+    asked.clear()
+    run = simulate(fourbar, stop=3.0, channels=["q", "residual"])
+    assert asked[1:] == [{*run.names, "solver.residual"}] * 4
+    np.testing.assert_array_equal(run.q, whole.q)
+    assert np.isnan(run.rates).all()
+    assert np.isnan(run.margin).all()
+    assert "coupler.vx" in run.absent
+    assert [column.name for column in run.columns()] == ["time", *run.names, "solver.status", "solver.residual"]
+
+
+def test_samples_that_are_not_kept_are_not_asked_for(fourbar: Path, asked: list[set[str]]) -> None:
+    whole = simulate(fourbar, stop=10.0, step=0.5)
+    asked.clear()
+    run = simulate(fourbar, stop=10.0, step=0.5, rate=0.25)
+    assert run.t.tolist() == [0.0, 4.0, 8.0, 10.0]
+    assert len(asked) == 1 + 4
+    np.testing.assert_allclose(run.values, whole.values[[0, 8, 16, 20]], rtol=0.0, atol=1e-14)
+
+
+def test_none_asks_for_nothing(fourbar: Path, asked: list[set[str]]) -> None:
+    run = simulate(fourbar, stop=5.0, channels=["none"])
+    assert len(asked) == 1
+    assert len(run) == 6
+    assert run.good.all()
+
+
+@pytest.mark.parametrize("inputs", [None, {"time": [0.0, 4.0], "crank_angle": [5.0, 7.0]}])
+def test_a_sample_without_numbers_is_kept_whatever_the_rate(
+    pendulum: Path, inputs: dict[str, list[float]] | None
+) -> None:
+    run = simulate(pendulum, stop=4.0, step=0.25, rate=0.5, inputs=inputs)
+    assert run.status[-1] == Status.OUTSIDE
+    assert run.t[-1] % 2.0
+    assert np.isfinite(run.inputs[-1, 0])
+    assert run.events[-1].level == "error"
+
+
+def test_wrong_channels_and_rates_are_told(fourbar: Path) -> None:
+    with pytest.raises(RequestError, match=r"channel 'qddd' is not known; did you mean 'qdd'\?"):
+        simulate(fourbar, channels=["qddd"])
+    with pytest.raises(RequestError, match="rate = 0 samples a second must be positive and finite"):
+        simulate(fourbar, rate=0.0)
+
+
+class Listing:
+    """A sink that lists its calls, and fails when it gets so many pieces."""
+
+    def __init__(self, most: int = 1000) -> None:
+        self.calls: list[str] = []
+        self.rows = 0
+        self.most = most
+
+    def begin(self, run: Run) -> None:
+        self.calls.append(f"begin {len(run)}")
+
+    def add(self, run: Run) -> None:
+        self.calls.append("add")
+        self.rows += len(run)
+        if len(self.calls) > self.most:
+            raise OSError("no more room")
+
+    def end(self, run: Run, reason: str) -> None:
+        self.calls.append(f"end {len(run)} {reason}")
+
+
+def test_a_sink_gets_every_sample_once_in_pieces_of_64_kilobytes(fourbar: Path) -> None:
+    sink = Listing()
+    run = simulate(fourbar, step=0.1, sink=sink)
+    assert sink.rows == len(run) == 1801
+    assert sink.calls[0] == "begin 0"
+    assert sink.calls[-1] == "end 1801 "
+    columns = len(list(run.columns()))
+    assert len(sink.calls) - 2 >= 1801 * 8 * columns // (64 * 1024)
+
+
+def test_a_sink_that_fails_ends_the_run_and_is_not_called_again(fourbar: Path) -> None:
+    sink = Listing(most=2)
+    with pytest.raises(OSError, match="no more room"):
+        simulate(fourbar, step=0.1, sink=sink)
+    assert sink.calls == ["begin 0", "add", "add"]
+
+
+def test_a_sink_is_told_why_a_run_ends(fourbar: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> bool:
+        raise RuntimeError("the FMU is gone")
+
+    monkeypatch.setattr(Slave2, "step", fails)
+    sink = Listing()
+    with pytest.raises(RuntimeError):
+        simulate(fourbar, sink=sink)
+    assert sink.calls == ["begin 0", "add", "end 1 the FMU is gone"]
+
+
+def test_a_model_description_is_kept_with_the_run(built: Callable[..., Path]) -> None:
+    run = simulate(built("fourbar", "time"), stop=1.0)
+    assert run.model_description.startswith("<?xml")
+    assert run.info["token"] in run.model_description
