@@ -272,10 +272,6 @@ class _Samples:
         """Events of their own times."""
         self._events.extend(events)
 
-    def extend(self, events: Iterable[Event]) -> None:
-        """Events of their own times."""
-        self._events.extend(events)
-
     def said(self) -> str:
         """The last message."""
         return self._events[-1].text if self._events else ""
