@@ -9,7 +9,8 @@ from typing import Any
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.files import exists, missing
+from kinfmu.cli.files import beside, exists, missing
+from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.units import Quantity, factors
 
@@ -23,10 +24,13 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
         name, known = str(value), gallery.names()
         if name.endswith(".toml"):
             return name if exists(Path(name)) else self.fail(missing(Path(name)), param, ctx)
-        if gallery.has(name):
-            return name
         files = (f"{name}.toml", str(Path(name) / "mechanism.toml"))
-        near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), suggestion(name, known))
+        if gallery.has(name):
+            if exists(Path(files[0])):
+                note(f"{name} is that of the gallery; the file here is {files[0]}")
+            return name
+        near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), "")
+        near = near or suggestion(name, [*beside(Path(name), ".toml"), *known])
         message = f"'{name}' is not in the gallery{near}; gallery: {listed(known)}; files end in .toml"
         return self.fail(message, param, ctx)
 

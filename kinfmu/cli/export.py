@@ -26,7 +26,7 @@ FORMATS: dict[str, Callable[[Run, Path], None]] = {".csv": _table, ".parquet": _
 
 
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.csv")
-@click.argument("run", type=InputFile())
+@click.argument("run", type=InputFile(".mcap"))
 @click.option(
     "-o",
     "output",

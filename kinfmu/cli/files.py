@@ -63,11 +63,15 @@ def missing(path: Path) -> str:
     """'runn.csv: there is no such file; did you mean 'run.csv'?': of its folder, by names that end alike."""
     if is_folder(path):
         return f"{path}: is a folder; the name of a file is needed"
+    return f"{path}: there is no such file{suggestion(str(path), beside(path, path.suffix))}"
+
+
+def beside(path: Path, suffix: str) -> list[str]:
+    """Files of a suffix in the folder of a path, by how they would be given in its place."""
     try:
-        beside = sorted(one.name for one in path.parent.iterdir() if one.suffix == path.suffix)
-    except (OSError, ValueError):
-        beside = []
-    return f"{path}: there is no such file{suggestion(path.name, beside)}"
+        return sorted(str(path.with_name(one.name)) for one in path.parent.iterdir() if one.suffix == suffix)
+    except (OSError, ValueError):  # no folder, or no name that a folder could have
+        return []
 
 
 def _check_suffix(

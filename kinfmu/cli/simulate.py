@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import click
@@ -14,7 +16,9 @@ from kinfmu.cli.progress import Progress
 from kinfmu.cli.settings import DRIVEN_BY_TIME, TOLERANCE, as_values, settled
 from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, RequestError
+
+LOGS = Path("logs")
 
 
 @main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
@@ -88,7 +92,8 @@ def simulate(
                 fmu = built(mech, Path(folder), drive="inputs" if inputs else default_drive(mech))
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
-        with Progress() as progress, instead(str(fmu), model):
+        needs_room = is_logged and (mcap is None or rrd is None)
+        with _room() if needs_room else nullcontext(), Progress() as progress, instead(str(fmu), model):
             run = simulated(
                 fmu,
                 start=start,
@@ -116,10 +121,21 @@ def simulate(
 
 def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
     """Where the logs go: into logs/, under the name of the file or of the gallery's mechanism, if nothing is said."""
-    folder, name = Path("logs"), Path(model.replace(":", "_")).name.removesuffix(".toml").removesuffix(".fmu")
-    if mcap is None or rrd is None:
-        try:
-            folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise KinfmuError(f"{folder}: cannot be made ({error.strerror})") from None
-    return mcap or folder / f"{name}.mcap", rrd or folder / f"{name}.rrd"
+    name = Path(model.replace(":", "_")).name.removesuffix(".toml").removesuffix(".fmu")
+    return mcap or LOGS / f"{name}.mcap", rrd or LOGS / f"{name}.rrd"
+
+
+@contextmanager
+def _room() -> Iterator[None]:
+    """The folder of logs is there in this block; one that was made for it goes again if the request is refused."""
+    is_there = LOGS.is_dir()
+    try:
+        LOGS.mkdir(exist_ok=True)
+    except OSError as error:
+        raise KinfmuError(f"{LOGS}: cannot be made ({error.strerror})") from None
+    try:
+        yield
+    except RequestError:
+        if not is_there:
+            LOGS.rmdir()
+        raise

@@ -89,5 +89,5 @@ def _file(path: str | Path | None, name: str) -> Path:
     if path.is_dir():
         return path / f"{name}.fmu"
     if path.suffix != ".fmu":
-        raise RequestError(f"{path}: the file of an FMU ends in .fmu")
+        raise RequestError(f"{path}: is no folder, and the file of an FMU ends in .fmu")
     return path

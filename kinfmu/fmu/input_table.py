@@ -58,7 +58,7 @@ class InputTable:
         if t[0] < self.start - slack or t[-1] > self.stop + slack:
             raise RequestError(
                 f"{self.source}: holds {self.start:g} to {self.stop:g} s, the run goes from {t[0]:g} to {t[-1]:g} s; "
-                "let it end with the rows, or give rows up to its ends"
+                "choose start and stop within the rows, or add rows: no inputs are made up beyond them"
             )
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
 
@@ -130,7 +130,8 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             try:
                 columns[name].append(float(cell) * factor)
             except ValueError:
-                raise FmuError(f"{path}, line {line}: {name} = '{cell.strip()}' is not a number") from None
+                point = "; decimals are written with a point" if "," in cell else ""
+                raise FmuError(f"{path}, line {line}: {name} = '{cell.strip()}' is not a number{point}") from None
     arrays = {name: np.array(values) for name, values in columns.items()}
     table = _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
     return replace(table, unitless=tuple(name for name, unit in titles if not unit))
@@ -157,7 +158,7 @@ def _check_names(where: str, names: list[str], known: Sequence[str]) -> None:
     for name in names:
         if name != TIME and name not in known:
             raise FmuError(
-                f"{where}: '{name}' is no input of this FMU{suggestion(name, known)}; columns: {listed((TIME, *known))}"
+                f"{where}: '{name}' is no input of this FMU{_meant(name, known)}; columns: {listed((TIME, *known))}"
             )
         if names.count(name) > 1:
             raise FmuError(f"{where}: the column '{name}' is there twice")
@@ -165,6 +166,21 @@ def _check_names(where: str, names: list[str], known: Sequence[str]) -> None:
         raise FmuError(f"{where}: the column 'time' is missing; columns: {listed(names)}")
     if len(names) == 1:
         raise FmuError(f"{where}: no input beside 'time'; inputs: {listed(known)}")
+
+
+def _meant(title: str, known: Sequence[str]) -> str:
+    """What may have been meant by the title of a column that is none."""
+    names = (TIME, *known)
+    base, bracket, unit = title.partition("(")
+    if bracket and base.strip() in names:
+        return f"; did you mean '{base.strip()} [{unit.rstrip(' )')}]'?"
+    if any(name in title.split() for name in names):
+        return "; columns are parted by commas, semicolons or tabs"
+    try:
+        float(title)
+    except ValueError:
+        return suggestion(title, names)
+    return "; the first line must name the columns"
 
 
 def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], rows: Sequence[str]) -> InputTable:

@@ -86,6 +86,7 @@ def simulate(
         table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
         experiment = interface.experiment
         t = _times(table or experiment, start, stop, experiment.step if step is None else step)
+        rows = np.empty((len(t), 0)) if table is None else table.at(t)
         kept = kept_samples(t, rate)
         settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
         text, xml = (_text_in(folder, name) for name in ("resources/mechanism.toml", "modelDescription.xml"))
@@ -99,7 +100,8 @@ def simulate(
             samples.read_fixed(one)
             samples.begin(channels, sink)
             try:
-                _step_through(one, samples, t, kept, table, progress, interrupted)
+                driven = [] if table is None else [one.references[name] for name in table.names]
+                _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
             except BaseException as failure:
                 samples.end(str(failure) or type(failure).__name__)
                 raise
@@ -198,21 +200,23 @@ def _step_through(
     samples: _Samples,
     t: NDArray[np.float64],
     kept: NDArray[np.int64],
-    table: InputTable | None,
+    inputs: list[int],
+    rows: NDArray[np.float64],
     progress: Callable[[int, int], None] | None,
     interrupted: Callable[[], bool],
 ) -> None:
-    """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step."""
+    """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step.
+
+    kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values.
+    """
     is_kept = np.isin(np.arange(len(t)), kept).tolist()
-    inputs = [] if table is None else [slave.references[name] for name in table.names]
-    settings = np.empty((len(t), 0)) if table is None else table.at(t)
     for k, time in enumerate(t.tolist()):
         samples.now = time
         if interrupted():
             samples.log(_ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
         if inputs:
-            slave.set(inputs, settings[k].tolist())
+            slave.set(inputs, rows[k].tolist())
         good = samples.read(time, slave, is_kept=is_kept[k])
         if progress is not None:
             progress(k + 1, len(t))

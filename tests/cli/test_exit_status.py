@@ -28,6 +28,8 @@ WRONG_USAGE = [
     ("list fourbar", "unexpected extra argument"),
     ("check", "Missing argument 'MECH'"),
     ("check forbar", "did you mean 'fourbar'?"),
+    ("check contradictin.tml", "did you mean 'contradicting.toml'?"),
+    ("check folder", "did you mean 'folder.toml'?"),
     ("check contradicting", "did you mean 'contradicting.toml'?"),
     ("check none.toml", "none.toml: there is no such file"),
     ("check contradictin.toml", "did you mean 'contradicting.toml'?"),
@@ -53,7 +55,7 @@ WRONG_USAGE = [
     ("solve five_bar -o run.csv --angle 0:1:2", "this mechanism has 2"),
     ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
     ("build forbar", "did you mean 'fourbar'?"),
-    ("build fourbar -o four.zip", "four.zip: the file of an FMU ends in .fmu"),
+    ("build fourbar -o four.zip", "four.zip: is no folder, and the file of an FMU ends in .fmu"),
     ("build fourbar --fmi 3", "--fmi 3 needs --flavour native"),
     ("build fourbar --platforms all", "--platforms all needs --flavour native"),
     ("build fourbar --set crank.sped=1", "did you mean 'crank.speed'?"),
@@ -76,9 +78,14 @@ WRONG_USAGE = [
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
     ("export none.mcap -o run.csv", "none.mcap: there is no such file"),
+    ("export short.csv -o run.csv", "short.csv: its name must end in .mcap"),
     ("export damaged.mcap", "Missing option '-o'"),
     ("export damaged.mcap -o run.xls", "run.xls: its name must end in one of .csv"),
     ("export damaged.mcap -o none/run.csv", "there is no folder 'none'"),
+    ("recover none.mcap", "none.mcap: there is no such file"),
+    ("recover damaged.mcap -o run.csv", "run.csv: its name must end in .mcap"),
+    ("simulate fourbar --channels qddd", "did you mean 'qdd'?"),
+    ("simulate fourbar --rate 0", "0.0 is not in the range"),
     ("bench speed", "'speed' is not a measurement"),
     ("bench --mechanism forbar", "did you mean 'fourbar'?"),
 ]
@@ -98,6 +105,7 @@ AT_FAULT = [
     ("simulate fourbar --input words.csv", "line 3: crank_angle = 'far' is not a number"),
     ("review damaged.mcap --save run.rrd", "damaged.mcap"),
     ("export damaged.mcap -o run.csv", "damaged.mcap"),
+    ("recover damaged.mcap", "nothing can be recovered"),
 ]
 
 

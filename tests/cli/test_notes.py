@@ -128,6 +128,14 @@ def test_driver_values_that_are_hardly_meant_are_told(
     assert read_csv(tmp_path / "run.csv")["solver.status"].max() < 3
 
 
+def test_a_name_of_the_gallery_that_is_a_file_here_too_is_told(
+    notes: Callable[..., list[str]], fourbar_file: Callable[..., Path]
+) -> None:
+    fourbar_file(name="fourbar.toml")
+    assert notes("check", "fourbar") == ["note: fourbar is that of the gallery; the file here is fourbar.toml"]
+    assert notes("check", "fourbar.toml") == []
+
+
 def test_a_constant_of_an_angle_that_looks_like_degrees_is_told(notes: Callable[..., list[str]]) -> None:
     call = ("solve", "fourbar", "-o", "run.csv", "--times", "0:1:1")
     assert notes(*call, "--set", "crank.start=90") == [

@@ -98,7 +98,7 @@ def test_outputs_can_be_chosen(tmp_path: Path) -> None:
         ({"drive": "input"}, "drive = 'input' is not known; did you mean 'inputs'"),
         ({"fmi": 3}, "fmi = 3 needs flavour = 'native'; the python flavour is FMI 2.0"),
         ({"platforms": "all"}, "platforms = 'all' needs flavour = 'native'"),
-        ({"path": "fourbar.zip"}, r"fourbar\.zip: the file of an FMU ends in \.fmu"),
+        ({"path": "fourbar.zip"}, r"fourbar\.zip: is no folder, and the file of an FMU ends in \.fmu"),
     ],
 )
 def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, str], words: str) -> None:

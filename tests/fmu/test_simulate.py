@@ -107,6 +107,14 @@ def test_columns_of_a_csv_may_name_their_units(fourbar: Path, tmp_path: Path, de
     [
         ("time,crank_angel\n0,1\n", r"'crank_angel' is no input of this FMU; did you mean 'crank_angle'\?"),
         ("crank_angle\n0\n", "the column 'time' is missing"),
+        (
+            "time,crank_angle (deg)\n0,1\n",
+            r"'crank_angle \(deg\)' is no input .*; did you mean 'crank_angle \[deg\]'\?",
+        ),
+        ("time crank_angle\n0 1\n", "is no input of this FMU; columns are parted by commas, semicolons or tabs"),
+        ("0,1\n1,2\n", "'0' is no input of this FMU; the first line must name the columns; columns: time, crank_angle"),
+        ("tine,crank_angle\n0,1\n", r"'tine' is no input of this FMU; did you mean 'time'\?"),
+        ("time;crank_angle\n0;1,5\n", "line 2: crank_angle = '1,5' is not a number; decimals are written with a point"),
         ("time\n0\n", "no input beside 'time'; inputs: crank_angle, crank_speed, crank_acceleration"),
         ("time,time,crank_angle\n0,0,0\n", "the column 'time' is there twice"),
         ("time,crank_angle\n0,1\n1,1\n1,2\n", "line 4: time = 1 s does not lie after 1 s; time must increase"),
@@ -155,11 +163,11 @@ def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
         ({"wrap": True}, "wrap follows angles among the inputs, and no inputs are given"),
         (
             {"inputs": {"time": [0.0, 2.0], "crank_angle": [1.0, 2.0]}, "stop": 3.0},
-            "inputs: holds 0 to 2 s, the run goes from 0 to 3 s; let it end with the rows",
+            "inputs: holds 0 to 2 s, the run goes from 0 to 3 s; choose start and stop within the rows",
         ),
         (
             {"inputs": {"time": [1.0, 2.0], "crank_angle": [1.0, 2.0]}, "start": 0.0},
-            "inputs: holds 1 to 2 s, the run goes from 0 to 2 s; let it end with the rows",
+            "inputs: holds 1 to 2 s, the run goes from 0 to 2 s; choose start and stop within the rows",
         ),
     ],
 )
