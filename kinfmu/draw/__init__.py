@@ -1,7 +1,12 @@
-"""Figures of a mechanism, for paper and for the gallery: SVG and PNG by matplotlib, which loads when one is drawn."""
+"""Figures for paper and pages: of a mechanism, of a run's coordinates, of a run as it moves.
+
+By matplotlib and Pillow, which load when one is drawn.
+"""
 
 from __future__ import annotations
 
+from kinfmu.draw.animation import animate
 from kinfmu.draw.drawing import figure
+from kinfmu.draw.plots import plot
 
-__all__ = ["figure"]
+__all__ = ["animate", "figure", "plot"]

@@ -80,11 +80,12 @@ class Push(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(Mark):
-    """A driven distance: ends (2, 2), the barrel at the first; barrel: its length [length]."""
+    """A driven distance: ends (2, 2), the barrel at the first; barrel, rod: their lengths [length]."""
 
     text: str
     ends: FloatArray
     barrel: float
+    rod: float
 
     def extent(self) -> FloatArray:
         return self.ends
@@ -101,7 +102,8 @@ class Cylinder(Mark):
         middle = a + along * (start + self.barrel) / 2.0
         barrel = box(middle, along, (self.barrel - start) / 2.0, _BARREL * size)
         sheet.line(barrel, 1.0, edge, closed=True, fill=fill, matters=1.0)
-        piston = box(a + along * (start + 0.8 * (self.barrel - start)), along, 1.6 * size, _BARREL * size)
+        inside = min(max(length - self.rod, start + 1.6 * size), self.barrel - 1.6 * size)  # where the rod begins
+        piston = box(a + along * inside, along, 1.6 * size, _BARREL * size)
         sheet.line(piston, 0.5, edge, closed=True, fill=edge, matters=0.0)
         anchors = np.array([a + part * (b - a) for part in (0.4, 0.55, 0.25, 0.75)])
         return [Name(self.text, anchors, _BARREL + 2.5, COLOUR, rank=1)]
@@ -117,7 +119,7 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
     text = f"{driver.name} = {_told(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
         (shape,) = (one for one in cylinder_shapes(shown) if one.driver == driver.name)
-        return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel)
+        return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel, shape.rod)
     if isinstance(driver, SlideDriver):
         a, b = driver.between
         e = np.array(unit_vector(driver.axis))

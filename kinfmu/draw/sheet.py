@@ -26,6 +26,7 @@ _SMALLEST = 120.0  # [pt]
 _LONG, _LONGEST_STRIP = 6.0, 2.5  # what is longer than it is high, such as a chain, may be wider, up to so many times
 _MARGIN = 34.0  # [pt]; room for supports and names
 _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
+_EDGE = 12.0  # [pt] left and below where no axes are drawn
 _FINEST = 0.45  # part of the usual size to which ornaments shrink where links are short
 _SPACING = 3.0  # [pt] between the dots that remember what is covered
 
@@ -33,10 +34,11 @@ _SPACING = 3.0  # [pt] between the dots that remember what is covered
 class Sheet:
     """An empty sheet for a mechanism that reaches over `extent` (k, 2) and whose shortest link is `shortest` [length].
 
-    point: how long a point of the printer (1/72 inch) is in the world; fine: size of ornaments against the usual one.
+    point: how long a point of the printer (1/72 inch) is in the world; fine: size of ornaments against the usual one;
+    unit: of the axes, None for a sheet without them and without names, one of many.
     """
 
-    def __init__(self, extent: FloatArray, shortest: float, unit: str, title: str) -> None:
+    def __init__(self, extent: FloatArray, shortest: float, unit: str | None, title: str) -> None:
         low, high = extent.min(axis=0), extent.max(axis=0)
         width, height = high - low
         side = float(max(width, height)) or 1.0
@@ -47,6 +49,7 @@ class Sheet:
         paper = np.maximum((high - low) * scale, _SMALLEST) + 2.0 * _MARGIN
         self.low: FloatArray = (low + high) / 2.0 - paper / 2.0 / scale
         self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
+        self._has_names = unit is not None
         self._layer = 1.0
         self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], how much it matters
         self.figure, self.axes = _paper(paper, self.low, self.high, unit, title)
@@ -148,6 +151,8 @@ class Sheet:
 
     def cover(self, route: FloatArray, matters: float, width: float = 0.0) -> None:
         """Remember that a stroke of `width` [pt] lies along a route (k, 2), for names to keep away from."""
+        if not self._has_names:
+            return
         paper = self.to_paper(route)
         dots = [paper[:1]]
         for a, b in pairwise(paper):
@@ -204,15 +209,23 @@ def arc(centre: ArrayLike, radius: float, first: float, last: float) -> FloatArr
     return np.asarray(centre, dtype=float) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str, title: str) -> tuple[Figure, Axes]:
+def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | None, title: str) -> tuple[Figure, Axes]:
     """A figure around a drawing of size `paper` [pt], with axes in the mechanism's unit of length."""
     from matplotlib.figure import Figure
 
-    width, height = paper[0] + _LEFT + _RIGHT, paper[1] + _BOTTOM + _TOP
+    left, bottom = (_LEFT, _BOTTOM) if unit else (_EDGE, _EDGE)
+    width, height = paper[0] + left + _RIGHT, paper[1] + bottom + _TOP
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    axes = made.add_axes((_LEFT / width, _BOTTOM / height, paper[0] / width, paper[1] / height))
+    axes = made.add_axes((left / width, bottom / height, paper[0] / width, paper[1] / height))
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
+    if not unit:
+        axes.set_axis_off()
+        axes.set_xticks([])  # which take long to place, seen or not
+        axes.set_yticks([])
+        above: Any = {"va": "bottom", "transform": axes.transAxes}
+        axes.text(0.0, 1.0 + 6.0 / paper[1], title, fontsize=11.0, color=ink(INK), parse_math=False, **above)
+        return made, axes
     grey = ink(GREY)
     axes.tick_params(labelsize=8.0, length=3.0, width=0.6, color=grey, labelcolor=grey)
     axes.set_xlabel(f"x [{unit}]", fontsize=8.0, color=grey, labelpad=2.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,22 +25,34 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
     paths = paths if isinstance(paths, tuple) else (paths,)
     for path in paths:
         check_suffix(path)
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise MissingPackageError(f"{paths[0]}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
-    with mpl.rc_context():
-        mpl.rcdefaults()  # a picture of ours, whatever the user's own settings are
-        mpl.rcParams["svg.fonttype"] = "none"  # text as text
-        mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
-        mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
+    with house_style(paths[0]):
         figure = draw()
         images = [_image(figure, path.suffix.lower()) for path in paths]
     for path, image in zip(paths, images, strict=True):
-        try:
-            path.write_bytes(image)
-        except OSError as error:
-            raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
+        write_bytes(path, image)
+
+
+@contextmanager
+def house_style(path: Path) -> Iterator[None]:
+    """A picture of ours, whatever the user's own settings are; MissingPackageError about `path` without matplotlib."""
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams["svg.fonttype"] = "none"  # text as text
+        mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
+        mpl.rcParams["font.family"] = ["DejaVu Sans"]  # comes with matplotlib
+        yield
+
+
+def write_bytes(path: Path, image: bytes) -> None:
+    """Write a picture; a FigureError if the file cannot be written."""
+    try:
+        path.write_bytes(image)
+    except OSError as error:
+        raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def check_suffix(path: Path) -> None:

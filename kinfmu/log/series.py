@@ -10,13 +10,12 @@ import numpy as np
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
+from kinfmu.shapes.shown import shown_range
 from kinfmu.units import Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
 SMALLEST = 1e-17  # drawn in the place of 0 on a logarithmic axis, below all round-off
-ROUND_OFF = 1e-9  # part of what a motion of this size and duration has, below which curves are noise around 0
-OUTLIERS = 1.0  # [percent] on either side, that may leave the plot if they would flatten all the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
                 names=tuple(derivative_name(run.outputs[k], order) for k in columns),
                 colours=tuple(colours[run.outputs[k]] for k in columns),
                 values=values,
-                shown=_shown(values, size / (duration or 1.0) ** order),
+                shown=shown_range(values, size / (duration or 1.0) ** order),
             )
     return found
 
@@ -67,24 +66,6 @@ def _title(kind: str, order: int, length_unit: str) -> str:
     """Such as 'angular velocity [rad/s]'."""
     words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[kind]
     return f"{words[order]} [{unit_of(Quantity(kind, order), length_unit)}]"
-
-
-def _shown(values: FloatArray, usual: float) -> tuple[float, float] | None:
-    """Range of the axis where the viewer's own choice, from least to greatest, would mislead.
-
-    Curves that are round-off against what is `usual` are a line at 0, not a storm; a few samples beside a singular
-    point, where speeds grow without bound, do not flatten all others. The data hold everything.
-    """
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return None
-    if np.abs(known).max() < ROUND_OFF * usual:
-        return -usual, usual
-    low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
-    width = high - low
-    if width > 0.0 and (known.min() < low - width or known.max() > high + width):
-        return float(low - width / 2), float(high + width / 2)
-    return None
 
 
 def accuracy(run: Run) -> Group:

@@ -1,0 +1,212 @@
+"""animate(): the linkage of a run as a moving picture that any page shows."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.draw.cams import cams
+from kinfmu.draw.ground import supports
+from kinfmu.draw.links import links, shortest
+from kinfmu.draw.mark import Mark
+from kinfmu.draw.motion import Cylinder, motion
+from kinfmu.draw.pins import paths, pins
+from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
+from kinfmu.draw.slides import rails, slots_and_blocks
+from kinfmu.draw.wheels import racks, wheels
+from kinfmu.draw.writing import house_style, write_bytes
+from kinfmu.errors import FigureError, MechanismError, listed
+from kinfmu.joints.placement import body_of
+from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import FloatArray, Run
+from kinfmu.shapes import palette
+from kinfmu.shapes.instant import Instant
+from kinfmu.shapes.placing import poses_of, world
+from kinfmu.shapes.slides import rods, slides
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+DOTS_PER_INCH = 80  # about 600 pixels across
+SHORTEST, LONGEST = 3.0, 8.0  # [s] that the picture plays: the run's own time where that lies between
+PER_SECOND, MOST = 20.0, 100  # pictures; viewers of GIF round their times to hundredths of a second
+COLOURS = 32  # of the whole picture; more cost room and are not seen
+REST = 1.0  # [s] that the last picture of a motion that does not come back stands
+_SAMPLES = 1000  # of the run; paths show no more
+_CLOSED = 1e-3  # of a body's way over the run; a motion that ends so near to where it began repeats
+_TRAIL = 0.12  # of the pictures, over which the trail reaches back
+_WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
+_LOST: palette.Colour = (185, 28, 28)
+
+
+class _Film(NamedTuple):
+    """Samples to show one after the other, and whether the last leads on to the first."""
+
+    rows: NDArray[np.int64]
+    seconds: float
+    repeats: bool
+
+
+def animate(run: Run, path: str | Path) -> None:
+    """Draw the linkage of `run` moving into a .gif file: bodies, joints, cams, wheels, cylinders, paths and trails.
+
+    The run plays in its own time if that is between SHORTEST and LONGEST, else in the nearer of them; a motion that
+    ends where it began repeats without a stop. Samples without numbers show the last pose that closed, and say so. The
+    same run gives the same bytes with the same matplotlib and Pillow.
+
+    Raises FigureError if the run does not hold its mechanism or coordinates of it, or has fewer than two samples with
+    numbers, and for files that cannot be written; MissingPackageError without matplotlib.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".gif":
+        raise FigureError(f"{path}: '{path.suffix}' is no moving picture that can be drawn; known: .gif")
+    mechanism, poses = _placed(run, path)
+    film = _film(run, poses, path)
+    with house_style(path):
+        images = list(_images(run, mechanism, poses, film))
+    write_bytes(path, _gif(images, film))
+
+
+def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
+    """The run's mechanism, and poses (n, 3) by body, the ground too; a gap holds the pose before it."""
+    if not run.mechanism_text:
+        raise FigureError(f"{path}: the run does not hold its mechanism, so there is nothing to draw")
+    try:
+        mechanism = toml_file.parse(run.mechanism_text, "the run's mechanism")
+    except MechanismError as error:
+        raise FigureError(f"{path}: {error}") from None
+    poses, missing = poses_of(run, mechanism)
+    if missing:
+        names = listed(name for columns in missing.values() for name in columns)
+        raise FigureError(f"{path}: the run does not hold {names}, without which the linkage cannot be drawn")
+    last = np.maximum.accumulate(np.where(run.good, np.arange(len(run)), 0))  # the last sample with numbers
+    held = {body: pose[last] for body, pose in poses.items()}
+    return mechanism, held | {GROUND_NAME: np.zeros((len(run), 3))}
+
+
+def _film(run: Run, poses: dict[str, FloatArray], path: Path) -> _Film:
+    good = np.flatnonzero(run.good)
+    if len(good) < 2:
+        raise FigureError(f"{path}: a moving picture needs two samples with numbers; the run has {len(good)}")
+    t = run.t[good[0] :]
+    seconds = float(np.clip(t[-1] - t[0], SHORTEST, LONGEST))
+    times = np.linspace(t[0], t[-1], min(round(PER_SECOND * seconds), MOST) + 1)
+    rows = good[0] + np.unique(np.searchsorted(t, times, side="right") - 1)
+    repeats = bool(run.good[[rows[0], rows[-1]]].all()) and all(_comes_back(pose[rows]) for pose in poses.values())
+    return _Film(rows[:-1] if repeats else rows, seconds, repeats)
+
+
+def _comes_back(pose: FloatArray) -> bool:
+    """True if a body (n, 3) ends where it began, turns aside."""
+    first, last = pose[0], pose[-1]
+    way = np.hypot(*np.ptp(pose[:, :2], axis=0))
+    turn = (last[2] - first[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(np.hypot(*(last - first)[:2]) <= _CLOSED * way and abs(turn) <= _CLOSED * np.ptp(pose[:, 2]))
+
+
+def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film) -> Iterator[Image]:
+    """The pictures one after the other, all of one size."""
+    some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
+    ways = {driver.name: 1.0 for driver in mechanism.drivers}
+
+    def shown(row: int) -> Instant:
+        return Instant(mechanism, {body: np.vstack([pose[row], pose[some]]) for body, pose in poses.items()}, ways)
+
+    first = shown(int(film.rows[0]))
+    ground = [*supports(first), *rails(first, slides(first))]  # which must not go from side to side
+    scenes = [_marks(shown(int(row)), ground) for row in film.rows]
+    extent = np.vstack([mark.extent() for marks in scenes for mark in marks])
+    thinnest = shortest(scenes[0], float(np.ptp(extent, axis=0).max()))
+    back = max(round(_TRAIL * len(film.rows)), 1)
+    for k, (row, marks) in enumerate(zip(film.rows, scenes, strict=True)):
+        sheet = Sheet(extent, thinnest, None, mechanism.title or mechanism.name)
+        begun = k - back if k >= back else (k - back + len(film.rows) if film.repeats else 0)
+        for mark in marks:
+            mark.draw(sheet)
+        _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
+        _clock(sheet, run, int(row))
+        yield _picture(sheet)
+
+
+def _marks(shown: Instant, ground: Sequence[Mark]) -> list[Mark]:
+    """Everything to draw of one picture, what is drawn later on top."""
+    sliding = slides(shown)
+    plates, bars = links(shown, rods(shown, sliding))
+    return [
+        *wheels(shown),
+        *cams(shown),
+        *ground,
+        *plates,
+        *paths(shown),
+        *bars,
+        *slots_and_blocks(shown, sliding),
+        *racks(shown),
+        *(mark for mark in motion(shown) if isinstance(mark, Cylinder)),
+        *pins(shown, sliding),
+    ]
+
+
+def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], ends: tuple[int, int]) -> None:
+    """Where points of interest just came from, the wider the later."""
+    first, last = ends
+    rows = np.arange(first, last + 1) if first <= last else np.r_[first : len(run), 0 : last + 1]
+    bodies = len(mechanism.moving_bodies)
+    for index, name in enumerate(mechanism.points.values()):
+        track = world(poses[body_of(name)][rows], mechanism.body_points[name])
+        track[~run.good[rows]] = np.nan
+        for piece, width in zip(np.array_split(np.arange(len(track)), len(_WIDTHS)), _WIDTHS, strict=True):
+            if len(piece):
+                sheet.track(track[max(piece[0] - 1, 0) : piece[-1] + 1], width, palette.body(bodies + index))
+
+
+def _clock(sheet: Sheet, run: Run, row: int) -> None:
+    """The time, and whether the run has numbers then."""
+    digits = max(2 - math.floor(math.log10(float(np.ptp(run.t)))), 0)
+    text, colour = f"{run.t[row]:.{digits}f} s", GREY
+    if not run.good[row]:
+        text, colour = f"no pose at {text}: the last one that closed", _LOST
+    sheet.axes.text(
+        1.0, 0.0, text, fontsize=9.0, ha="right", va="bottom", transform=sheet.axes.transAxes, color=ink(colour)
+    )
+
+
+def _picture(sheet: Sheet) -> Image:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    sheet.figure.set_dpi(DOTS_PER_INCH)
+    canvas = FigureCanvasAgg(sheet.figure)
+    canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib says no types here
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[no-untyped-call]
+
+
+def _gif(images: Sequence[Image], film: _Film) -> bytes:
+    """All pictures in the colours that they need most, without dots between these."""
+    from PIL import Image
+
+    width, height = images[0].size
+    some = images[:: max(len(images) // 8, 1)]
+    together = Image.new("RGB", (width, height * len(some)))
+    for k, image in enumerate(some):
+        together.paste(image, (0, k * height))
+    colours = together.quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    flat = [image.quantize(palette=colours, dither=Image.Dither.NONE) for image in images]
+    paper = 3 * int(np.asarray(flat[0])[0, 0])
+    table = (colours.getpalette() or [])[: 3 * COLOURS]
+    table[paper : paper + 3] = PAPER  # with which the quantizing mixed what is nearly as light
+    for page in flat:
+        page.putpalette(table)
+    each = round(100.0 * film.seconds / (len(images) - (not film.repeats))) * 10  # [ms]
+    times = [each] * len(images)
+    if not film.repeats:
+        times[-1] += round(1000.0 * REST)
+    file = io.BytesIO()
+    flat[0].save(file, "GIF", save_all=True, append_images=flat[1:], duration=times, loop=0)
+    return file.getvalue()

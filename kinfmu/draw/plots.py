@@ -1,0 +1,169 @@
+"""plot(): coordinates of a run against time, each with its velocity and acceleration below it, for a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.sheet import FONT, GREY, INCH, INK, ink
+from kinfmu.draw.writing import check_suffix, write
+from kinfmu.errors import FigureError, listed, suggestion
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.run import FloatArray, Run
+from kinfmu.shapes import palette
+from kinfmu.shapes.shown import ROUND_OFF, shown_range
+from kinfmu.units import unit_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_COORDINATES = 30  # more make a sheet that nobody prints
+_ABREAST = 3  # coordinates beside each other
+_WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its surroundings
+_LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 8.0, 44.0, 34.0  # [pt] around all panels
+_BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
+_LABEL = 40.0  # [pt] from an axis to its name
+_BINS = 1500  # of a long run; each shows its least and its greatest value
+_LOST: palette.Colour = (246, 222, 222)
+
+
+def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
+    """Draw coordinates of `run` against time into a .svg or .png file, as a report prints them.
+
+    columns: coordinates such as 'coupler.x', all generalized coordinates if none are named. Each is a column of three
+    panels: position, velocity and acceleration, in rad and the mechanism's unit of length. Stretches without numbers
+    are gaps on a tinted ground. The same run gives the same bytes.
+
+    Raises FigureError for an unknown name, more than MOST_COORDINATES of them, a run without samples, another suffix,
+    or a file that cannot be written; MissingPackageError without matplotlib.
+    """
+    path = Path(path)
+    check_suffix(path)
+    names = _chosen(run, tuple(dict.fromkeys(columns)), path)
+    write(path, lambda: _sheet(run, names))
+
+
+def _chosen(run: Run, columns: tuple[str, ...], path: Path) -> tuple[str, ...]:
+    """Names of coordinates that the run holds."""
+    known = (*run.outputs, *run.fixed)
+    for name in columns:
+        if name not in known:
+            raise FigureError(
+                f"{path}: the run has no coordinate '{name}'{suggestion(name, known)}; coordinates: {listed(known)}"
+            )
+    names = columns or run.names or run.outputs
+    if len(names) > MOST_COORDINATES:
+        raise FigureError(
+            f"{path}: {len(names)} coordinates are too many for one sheet, which holds {MOST_COORDINATES}; choose some "
+            f"of them by name, such as {names[0]}"
+        )
+    if not len(run) or not names:
+        raise FigureError(f"{path}: the run has no {'samples' if names else 'coordinates'} to plot")
+    return names
+
+
+def _sheet(run: Run, names: Sequence[str]) -> Figure:
+    from matplotlib.figure import Figure
+
+    abreast = min(len(names), _ABREAST)
+    blocks = -(-len(names) // _ABREAST)
+    block = 3.0 * _HEIGHT + _BLOCK_GAP
+    width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
+    height = _TOP + blocks * block - _BLOCK_GAP - _GAP + _BOTTOM
+    made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
+    title = run.info.get("title") or run.info.get("name") or ""
+    made.text(8.0 / width, 1.0 - 8.0 / height, title, fontsize=11.0, va="top", color=ink(INK), parse_math=False)
+    for index, name in enumerate(names):
+        row, column = divmod(index, _ABREAST)
+        left = _LEFT + column * _WIDTH
+        panels: list[Axes] = []
+        for order in range(3):
+            top = height - _TOP - row * block - order * _HEIGHT
+            size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
+            axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
+            panels.append(axes)
+            _panel(axes, run, name, order)
+        for axes in panels[:2]:
+            axes.tick_params(labelbottom=False)
+        panels[0].set_title(name, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+        panels[2].set_xlabel("t [s]", fontsize=SMALL, color=ink(GREY), labelpad=1.0)
+        for axes in panels:
+            axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)
+    return made
+
+
+def _panel(axes: Axes, run: Run, name: str, order: int) -> None:
+    """One curve over the whole run."""
+    column = derivative_name(name, order)
+    values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan)
+    known = values[np.isfinite(values)]
+    rows = _rows(values)
+    colour = ink((palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[order])
+    look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
+    if len(known) < 2:
+        look |= {"marker": "o", "markersize": 3.0}
+    axes.plot(run.t[rows], values[rows], **look)
+    dress(axes, "")
+    axes.set_xlim(*_span(run.t))
+    shown = _shown(run, name, order, known)
+    if shown:
+        axes.set_ylim(*shown)
+    axes.locator_params(axis="y", nbins=4)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+    unit = unit_of(quantity_of(name, order), run.length_unit).replace("s2", "s\N{SUPERSCRIPT TWO}")
+    axes.set_ylabel(f"{column.rpartition('.')[2]} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    for first, last in _gaps(run):
+        axes.axvspan(first, last, color=ink(_LOST), linewidth=0.0, zorder=0.0)
+
+
+def _shown(run: Run, name: str, order: int, known: FloatArray) -> tuple[float, float] | None:
+    """Range of the axis: noise about a constant is a straight line; None where matplotlib's own choice is right."""
+    if not len(known):
+        return -1.0, 1.0
+    kind = quantity_of(name).kind
+    alike = [k for k, other in enumerate(run.outputs) if quantity_of(other).kind == kind]
+    positions = run.values[run.good][:, alike]
+    size = float(np.max(np.abs(positions), initial=0.0, where=np.isfinite(positions)))
+    usual = size / (float(np.ptp(run.t)) or 1.0) ** order
+    if np.ptp(known) <= ROUND_OFF * np.abs(known).max():
+        middle = float(known.mean())
+        half = 0.5 * abs(middle) or usual or 1.0
+        return middle - half, middle + half
+    return shown_range(known, usual)
+
+
+def _rows(values: FloatArray) -> NDArray[np.int64]:
+    """Samples that draw the curve as all would: of long runs the extremes of short stretches, and gaps."""
+    count = len(values)
+    if count <= 4 * _BINS:
+        return np.arange(count)
+    found = [np.array([0, count - 1]), np.flatnonzero(np.diff(np.isfinite(values))) + np.array([[0], [1]])]
+    edges = np.linspace(0, count, _BINS + 1).astype(int)
+    for first, last in pairwise(edges):
+        part = values[first:last]
+        if np.isfinite(part).any():
+            found.append(first + np.array([np.nanargmin(part), np.nanargmax(part)]))
+    return np.unique(np.concatenate([rows.ravel() for rows in found]))
+
+
+def _span(t: FloatArray) -> tuple[float, float]:
+    first, last = float(t.min()), float(t.max())
+    edge = 0.01 * (last - first) or 0.5
+    return first - edge, last + edge
+
+
+def _gaps(run: Run) -> list[tuple[float, float]]:
+    """From the last sample with numbers before each gap to the first one after it."""
+    turns = np.flatnonzero(np.diff(np.r_[True, run.good, True].astype(int)))  # first of a gap, first after it, ...
+    last = len(run) - 1
+    return [
+        (float(run.t[max(begin - 1, 0)]), float(run.t[min(end, last)]))
+        for begin, end in zip(turns[::2], turns[1::2], strict=True)
+    ]
