@@ -1,13 +1,14 @@
-"""kinfmu export: a run as a file for other programs, the kind chosen by the file's ending."""
+"""kinfmu export: a run as a file for other programs, or for a page; the kind chosen by the file's ending."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from kinfmu.cli.arguments import names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import listed
@@ -16,16 +17,36 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 
-def _table(run: Run, path: Path) -> None:
+def _table(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001  --columns is refused before
     from kinfmu.log import write_table
 
     write_table(run, path)
 
 
-FORMATS: dict[str, Callable[[Run, Path], None]] = {".csv": _table, ".parquet": _table, ".npz": _table}
+def _plot(run: Run, path: Path, columns: Sequence[str]) -> None:
+    from kinfmu.draw import plot
+
+    plot(run, path, columns)
 
 
-@main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.csv")
+def _animation(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001
+    from kinfmu.draw import animate
+
+    animate(run, path)
+
+
+FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
+    ".csv": _table,
+    ".parquet": _table,
+    ".npz": _table,
+    ".svg": _plot,
+    ".png": _plot,
+    ".gif": _animation,
+}
+PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
+
+
+@main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
 @click.argument("run", type=InputFile(".mcap"))
 @click.option(
     "-o",
@@ -34,12 +55,17 @@ FORMATS: dict[str, Callable[[Run, Path], None]] = {".csv": _table, ".parquet": _
     required=True,
     help=f"The file to write: {listed(FORMATS)}.",
 )
-def export(run: Path, output: Path) -> None:
-    """Write a run as a table.
+@click.option("--columns", metavar="NAMES", help="Coordinates to plot, such as coupler.x,rocker.phi; else those of q.")
+def export(run: Path, output: Path, columns: str | None) -> None:
+    """Write a run as a table, as plots, or as a moving picture.
 
-    RUN is a record (.mcap) of simulate. Parquet and npz hold the units, too.
+    RUN is a record (.mcap) of simulate. A table holds everything; Parquet and npz the units, too. Plots (.svg, .png)
+    show coordinates against time, with velocity and acceleration; a .gif shows the linkage move.
     """
     from kinfmu.log import read
 
-    FORMATS[output.suffix.lower()](read(run), output)
+    suffix = output.suffix.lower()
+    if columns is not None and suffix not in PLOTS:
+        raise click.UsageError(f"--columns {columns}: chooses what is plotted, into {listed(PLOTS)}, not {suffix}")
+    FORMATS[suffix](read(run), output, names_in(columns) or ())
     click.echo(f"written: {output}")

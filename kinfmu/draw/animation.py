@@ -196,13 +196,15 @@ def _gif(images: Sequence[Image], film: _Film) -> bytes:
     together = Image.new("RGB", (width, height * len(some)))
     for k, image in enumerate(some):
         together.paste(image, (0, k * height))
-    colours = together.quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
-    flat = [image.quantize(palette=colours, dither=Image.Dither.NONE) for image in images]
-    paper = 3 * int(np.asarray(flat[0])[0, 0])
-    table = (colours.getpalette() or [])[: 3 * COLOURS]
-    table[paper : paper + 3] = PAPER  # with which the quantizing mixed what is nearly as light
-    for page in flat:
-        page.putpalette(table)
+    fixed = [*PAPER, *_LOST]  # which the quantizing would mix with others
+    mixed = together.quantize(COLOURS - len(fixed) // 3, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    colours = np.array([*fixed, *mixed[: 3 * COLOURS - len(fixed)]], int).reshape(-1, 3)
+    nearest = _nearest(colours)
+    flat = []
+    for image in images:
+        coarse = np.asarray(image, int) >> 3
+        flat.append(Image.fromarray(nearest[coarse[:, :, 0], coarse[:, :, 1], coarse[:, :, 2]]))
+        flat[-1].putpalette(colours.ravel().tolist())
     each = round(100.0 * film.seconds / (len(images) - (not film.repeats))) * 10  # [ms]
     times = [each] * len(images)
     if not film.repeats:
@@ -210,3 +212,11 @@ def _gif(images: Sequence[Image], film: _Film) -> bytes:
     file = io.BytesIO()
     flat[0].save(file, "GIF", save_all=True, append_images=flat[1:], duration=times, loop=0)
     return file.getvalue()
+
+
+def _nearest(colours: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Which of some colours (k, 3) is nearest to one of 32 shades of red, green and blue, (32, 32, 32)."""
+    shades = np.arange(32) * 255 // 31
+    red, green, blue = np.meshgrid(shades, shades, shades, indexing="ij")
+    apart = sum((part[..., None] - colours[:, k]) ** 2 for k, part in enumerate((red, green, blue)))
+    return np.asarray(np.argmin(apart, axis=-1), np.uint8)

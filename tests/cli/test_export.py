@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kinfmu.cli.export import FORMATS
+from kinfmu.draw import animation
 from kinfmu.log import read, write_mcap
 from tests.cli.conftest import Command, read_csv
 from tests.log.runs import fourbar
@@ -47,3 +48,22 @@ def test_what_cannot_be_exported_is_told(record: Path, refuses: Callable[..., st
     assert "none.mcap: there is no such file" in refuses("export", "none.mcap", "-o", "run.csv")
     record.write_text("no record")
     assert "not a whole MCAP file" in fails("export", record, "-o", "run.csv")
+
+
+def test_plots_and_moving_pictures_are_made_of_a_record(
+    record: Path, command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "MOST", 3)
+    assert command("export", record, "-o", "run.svg", "--columns", "coupler.x,rocker.phi").exit_code == 0
+    text = (tmp_path / "run.svg").read_text(encoding="utf-8")
+    assert "rocker.phi" in text
+    assert "coupler.y" not in text
+    assert command("export", record, "-o", "run.gif").exit_code == 0
+    assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
+
+
+def test_columns_are_for_plots(record: Path, refuses: Callable[..., str], fails: Callable[..., str]) -> None:
+    told = refuses("export", record, "-o", "run.csv", "--columns", "coupler.x")
+    assert "--columns coupler.x: chooses what is plotted, into .svg, .png, not .csv" in told
+    told = fails("export", record, "-o", "run.svg", "--columns", "cupler.x")
+    assert "run.svg: the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?" in told

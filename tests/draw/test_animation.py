@@ -1,0 +1,124 @@
+"""Moving pictures: what moves, how long, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.draw import animate, animation
+from kinfmu.draw.animation import _film, _marks, _placed
+from kinfmu.draw.motion import Cylinder
+from kinfmu.errors import FigureError
+from kinfmu.run import Run
+from kinfmu.shapes import palette
+from kinfmu.shapes.instant import Instant
+from kinfmu.sweep import run_times
+from tests.log.runs import fourbar, with_gap
+
+image = pytest.importorskip("PIL.Image")
+
+
+@pytest.fixture(autouse=True)
+def few_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(animation, "MOST", 6)
+
+
+def solved(name: str, step: int = 4) -> Run:
+    mechanism = kinfmu.load(name)
+    return kinfmu.solve(mechanism, run_times(mechanism.run)[::step])
+
+
+def pages(path: Path) -> tuple[list[np.ndarray], list[int]]:
+    with image.open(path) as picture:
+        found, times = [], []
+        for k in range(picture.n_frames):
+            picture.seek(k)
+            found.append(np.asarray(picture.convert("RGB"), dtype=int))
+            times.append(picture.info["duration"])
+        return found, times
+
+
+def test_a_turning_linkage_repeats_without_a_stop(tmp_path: Path) -> None:
+    animate(solved("crank_rocker"), tmp_path / "run.gif")
+    found, times = pages(tmp_path / "run.gif")
+    assert len(found) == 6
+    assert times == [500] * 6  # a run of 2 s is shown in 3 s
+    assert len({page.shape for page in found}) == 1
+    for page, after in pairwise(found):
+        assert (page != after).any()
+
+
+def test_bodies_are_in_their_colours_on_white(tmp_path: Path) -> None:
+    animate(solved("crank_rocker"), tmp_path / "run.gif")
+    page = pages(tmp_path / "run.gif")[0][0].reshape(-1, 3)
+    assert (page == 255).all(axis=1).mean() > 0.5
+    for colour in palette.BODIES[:3]:
+        assert (np.abs(page - palette.lighter(colour)).max(axis=1) <= 12).sum() > 100
+
+
+def test_a_motion_that_does_not_come_back_rests_at_its_end(tmp_path: Path) -> None:
+    run = fourbar(np.arange(181.0))
+    animate(run, tmp_path / "run.gif")
+    found, times = pages(tmp_path / "run.gif")
+    assert len(found) == 7
+    assert times[-1] == times[0] + 1000
+    film = _film(run, _placed(run, tmp_path)[1], tmp_path)
+    assert (film.rows[0], film.rows[-1]) == (0, 180)
+    assert not film.repeats
+
+
+def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
+    run = with_gap(fourbar(np.arange(181.0)), 100, 120)
+    _, poses = _placed(run, tmp_path)
+    np.testing.assert_array_equal(poses["crank"][100:121], np.tile(poses["crank"][99], (21, 1)))
+    late = with_gap(fourbar(np.arange(181.0)), 0, 30)
+    film = _film(late, _placed(late, tmp_path)[1], tmp_path)
+    assert film.rows[0] == 31
+    animate(run, tmp_path / "run.gif")
+    reddish = [
+        ((page[..., 0] > 150) & (page[..., 1] < 90) & (page[..., 2] < 90)).sum()
+        for page in pages(tmp_path / "run.gif")[0]
+    ]
+    assert [count > 40 for count in reddish] == [False, False, False, False, True, False, False]
+
+
+def test_a_cylinder_keeps_its_barrel_and_rod_while_it_works() -> None:
+    run = solved("excavator")
+    mechanism, poses = _placed(run, Path("run.gif"))
+    ways = {driver.name: 1.0 for driver in mechanism.drivers}
+    lengths = set()
+    for row in (0, 30, 60, 100):
+        shown = Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, ways)
+        lengths |= {(mark.barrel, mark.rod) for mark in _marks(shown, []) if isinstance(mark, Cylinder)}
+    assert len(lengths) == 3
+
+
+def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
+    run = fourbar(np.arange(0.0, 181.0, 30.0))
+    animate(run, tmp_path / "a.gif")
+    animate(run, tmp_path / "b.gif")
+    assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
+
+
+def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
+    run = fourbar(np.arange(181.0))
+    path = tmp_path / "run.gif"
+    with pytest.raises(FigureError, match=r"run\.gif: the run does not hold its mechanism, so there"):
+        animate(dataclasses.replace(run, mechanism_text=""), path)
+    with pytest.raises(FigureError, match=r"run\.gif: the run's mechanism: not valid TOML"):
+        animate(dataclasses.replace(run, mechanism_text="name = ["), path)
+    less = dataclasses.replace(run, outputs=("crank.phi", "x", "y", "coupler.phi", "rocker.phi", "A.x", "A.y"))
+    with pytest.raises(FigureError, match=r"the run does not hold coupler\.x, coupler\.y, without which the linkage"):
+        animate(less, path)
+    with pytest.raises(FigureError, match=r"needs two samples with numbers; the run has 1$"):
+        animate(fourbar(np.array([60.0])), path)
+    with pytest.raises(FigureError, match=r"run\.mp4: '\.mp4' is no moving picture that can be drawn; known: \.gif"):
+        animate(run, tmp_path / "run.mp4")
+    with pytest.raises(FigureError, match=r"run\.gif: cannot be written"):
+        animate(fourbar(np.arange(0.0, 181.0, 60.0)), tmp_path / "nowhere" / "run.gif")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,104 @@
+"""Plots of a run: the curves it holds, gaps, units, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinfmu.draw import plot
+from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
+from kinfmu.errors import FigureError
+from kinfmu.run import Run
+from tests.log.runs import fourbar, with_gap
+
+
+@pytest.fixture
+def run() -> Run:
+    return fourbar(np.arange(181.0))
+
+
+def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) -> None:
+    panels = _sheet(run, ("coupler.x", "rocker.phi")).axes
+    assert [panel.get_ylabel() for panel in panels] == [
+        "x [m]",
+        "vx [m/s]",
+        "ax [m/s²]",
+        "phi [rad]",
+        "omega [rad/s]",
+        "alpha [rad/s²]",
+    ]
+    assert [panel.get_title(loc="left") for panel in panels] == ["coupler.x", "", "", "rocker.phi", "", ""]
+    for panel, name in zip(panels, ("coupler.x", "coupler.vx", "coupler.ax"), strict=False):
+        np.testing.assert_array_equal(panel.lines[0].get_xydata(), np.column_stack([run.t, run[name]]))
+
+
+def test_all_generalized_coordinates_are_plotted_if_none_are_named(run: Run, tmp_path: Path) -> None:
+    plot(run, tmp_path / "run.svg")
+    words = re.findall(r">([\w.]+)</text>", (tmp_path / "run.svg").read_text(encoding="utf-8"))
+    assert [word for word in words if word in run.outputs] == list(run.names)
+
+
+def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
+    for name in ("a.svg", "b.svg", "a.png", "b.png"):
+        plot(run, tmp_path / name, ["A.x"])
+    for suffix in ("svg", "png"):
+        assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
+
+
+def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
+    gap = with_gap(run, 100, 120)
+    assert _gaps(gap) == [(99.0, 121.0)]
+    assert _gaps(with_gap(run, 0, 180)) == [(0.0, 180.0)]
+    assert _gaps(with_gap(with_gap(run, 0, 3), 170, 180)) == [(0.0, 4.0), (169.0, 180.0)]
+    assert _gaps(run) == []
+    panel = _sheet(gap, ("coupler.x",)).axes[0]
+    assert len(panel.patches) == 1
+    assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
+
+
+def test_noise_about_a_constant_is_a_straight_line(run: Run) -> None:
+    noise = 1e-16 * np.random.default_rng(3).normal(size=len(run))
+    values = run.values + noise[:, None] * (np.array(run.outputs) == "coupler.phi")
+    noisy = dataclasses.replace(run, values=values)
+    shown = _shown(noisy, "coupler.phi", 0, noisy["coupler.phi"])
+    assert shown
+    assert shown[1] - shown[0] > 1.0
+    low, high = _shown(run, "crank.phi", 1, run["crank.omega"]) or (0.0, 0.0)
+    assert low < run["crank.omega"][0] < high
+    assert _shown(run, "coupler.x", 0, run["coupler.x"]) is None
+
+
+def test_a_long_run_is_drawn_by_its_extremes() -> None:
+    values = np.random.default_rng(5).normal(size=100_000)
+    values[40_000:40_500] = np.nan
+    rows = _rows(values)
+    assert len(rows) < 3100
+    assert {int(np.nanargmin(values)), int(np.nanargmax(values)), 39_999, 40_000, 40_499, 40_500} <= set(rows.tolist())
+    assert np.array_equal(_rows(values[:6000]), np.arange(6000))
+
+
+def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path: Path) -> None:
+    plot(fourbar(np.array([60.0])), tmp_path / "one.png", ["coupler.x"])
+    plot(with_gap(run, 0, 180), tmp_path / "none.png", ["coupler.x"])
+    panels = _sheet(run, ("rocker.x",)).axes
+    assert set(panels[0].lines[0].get_ydata()) == {1.0}
+    assert set(panels[1].lines[0].get_ydata()) == {0.0}
+
+
+def test_what_cannot_be_plotted_is_said(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(FigureError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
+        plot(run, tmp_path / "run.svg", ["cupler.x"])
+    with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is no figure that can be drawn; known: \.svg, \.png"):
+        plot(run, tmp_path / "run.jpg")
+    names = tuple(f"body{k}.x" for k in range(31))
+    table = np.zeros((181, 31))
+    wide = dataclasses.replace(run, outputs=names, coordinate_count=31, values=table, rates=table, accelerations=table)
+    with pytest.raises(FigureError, match="31 coordinates are too many for one sheet, which holds 30; choose some"):
+        plot(wide, tmp_path / "run.svg")
+    with pytest.raises(FigureError, match="the run has no samples to plot"):
+        plot(fourbar(np.array([])), tmp_path / "run.svg")
+    assert not list(tmp_path.iterdir())
