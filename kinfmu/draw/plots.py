@@ -39,7 +39,7 @@ def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
 
     columns: coordinates such as 'coupler.x', all generalized coordinates if none are named. Each is a column of three
     panels: position, velocity and acceleration, in rad and the mechanism's unit of length. Stretches without numbers
-    are gaps on a tinted ground. The same run gives the same bytes.
+    are gaps on a tinted ground; panels of what was not kept say so. The same run gives the same bytes.
 
     Raises FigureError for an unknown name, more than MOST_COORDINATES of them, a run without samples, another suffix,
     or a file that cannot be written; MissingPackageError without matplotlib.
@@ -102,7 +102,8 @@ def _sheet(run: Run, names: Sequence[str]) -> Figure:
 def _panel(axes: Axes, run: Run, name: str, order: int) -> None:
     """One curve over the whole run."""
     column = derivative_name(name, order)
-    values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan)
+    is_kept = column not in run.absent
+    values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan) if is_kept else np.full(len(run), np.nan)
     known = values[np.isfinite(values)]
     rows = _rows(values)
     colour = ink((palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[order])
@@ -119,6 +120,8 @@ def _panel(axes: Axes, run: Run, name: str, order: int) -> None:
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
     unit = unit_of(quantity_of(name, order), run.length_unit).replace("s2", "s\N{SUPERSCRIPT TWO}")
     axes.set_ylabel(f"{column.rpartition('.')[2]} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    if not is_kept:
+        axes.text(0.5, 0.5, "not kept", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
     for first, last in _gaps(run):
         axes.axvspan(first, last, color=ink(_LOST), linewidth=0.0, zorder=0.0)
 

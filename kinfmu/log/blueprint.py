@@ -38,7 +38,10 @@ def single(
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in found]))
-    rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in solver]))
+    shares = [2.0] * len(rows)
+    if solver:
+        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in solver]))
+        shares.append(1.5)
     rows.append(status_view([""], [run]))
     text: list[rrb.View] = [card_view()]
     if happenings(run):
@@ -48,7 +51,7 @@ def single(
         rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
         row_shares=[1.7, 1],
     )
-    right = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 2) + [1.5, 1.0])
+    right = rrb.Vertical(*rows, row_shares=[*shares, 1.0])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
 
 
@@ -61,7 +64,8 @@ def compared(
     """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
     import rerun.blueprint as rrb
 
-    rows = [_overlaid("position", runs, curves)]
+    overlaid = [row for order in ORDERS if (row := _overlaid(order, runs, curves))]
+    rows: list[rrb.Container | rrb.View] = [*overlaid[:1]]
     for order in ORDERS:
         found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
         if found:
@@ -78,15 +82,15 @@ def compared(
         row_shares=[1.4, 1],
     )
     apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
-    both = rrb.Vertical(*[_overlaid(order, runs, curves) for order in ORDERS], name="A and B")
+    both = rrb.Vertical(*overlaid, name="A and B")
     right = rrb.Tabs(apart, both)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
 
 
 def _overlaid(
     order: str, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
-) -> rrb.Container | rrb.View:
-    """The curves of both runs in the same plots, one for each unit."""
+) -> rrb.Container | None:
+    """The curves of both runs in the same plots, one for each unit; None if they have none of that order."""
     import rerun.blueprint as rrb
 
     plots = []
@@ -94,7 +98,7 @@ def _overlaid(
         pair = [(root, of[order, kind]) for root, of in zip(("/a", "/b"), curves, strict=True) if (order, kind) in of]
         if pair:
             plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, runs))
-    return rrb.Horizontal(*plots)
+    return rrb.Horizontal(*plots) if plots else None
 
 
 def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:

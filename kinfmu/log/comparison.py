@@ -84,7 +84,8 @@ def _difference(a: Run, b: Run) -> Run | None:
         key: _at(a.t, b.t, getattr(b, key)[:, of_b]) - getattr(a, key)[:, of_a]
         for key in ("values", "rates", "accelerations")
     }
-    return dataclasses.replace(a, outputs=tuple(common), coordinate_count=len(common), **tables)
+    absent = a.absent | b.absent
+    return dataclasses.replace(a, outputs=tuple(common), coordinate_count=len(common), absent=absent, **tables)
 
 
 def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:

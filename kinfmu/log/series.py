@@ -48,14 +48,17 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
             continue
         size = 0.0
         for order, table in enumerate((run.values, run.rates, run.accelerations)):
-            values = np.where(run.good[:, None], table[:, columns], np.nan)
+            kept = [k for k in columns if derivative_name(run.outputs[k], order) not in run.absent]
+            if not kept:
+                continue
+            values = np.where(run.good[:, None], table[:, kept], np.nan)
             if order == 0:
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
             found[ORDERS[order], kind] = Group(
                 path=f"{ORDERS[order]}/{kind}",
                 title=_title(kind, order, run.length_unit),
-                names=tuple(derivative_name(run.outputs[k], order) for k in columns),
-                colours=tuple(colours[run.outputs[k]] for k in columns),
+                names=tuple(derivative_name(run.outputs[k], order) for k in kept),
+                colours=tuple(colours[run.outputs[k]] for k in kept),
                 values=values,
                 shown=shown_range(values, size / (duration or 1.0) ** order),
             )
@@ -68,29 +71,33 @@ def _title(kind: str, order: int, length_unit: str) -> str:
     return f"{words[order]} [{unit_of(Quantity(kind, order), length_unit)}]"
 
 
-def accuracy(run: Run) -> Group:
-    """log10 of the residual and of the largest watch, both relative to the mechanism's size."""
-    curves = {"residual": run.residual}
-    if run.watch_names:
+def accuracy(run: Run) -> Group | None:
+    """log10 of the residual and of the largest watch, both relative to the mechanism's size; None if not kept."""
+    curves = {"residual": run.residual} if "solver.residual" not in run.absent else {}
+    if run.watch_names and not {f"watch.{name}" for name in run.watch_names} & run.absent:
         curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
-    return _logarithmic("accuracy", f"log10 {', '.join(curves)}", curves, 0, SMALLEST)
+    return _logarithmic("accuracy", f"log10 {', '.join(curves)}", curves, 0, SMALLEST) if curves else None
 
 
 def error_estimates(run: Run) -> Group | None:
     """log10 of the estimated errors of q, qd and qdd; None if no sample has any."""
     curves = {name: run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
-    if not np.any(run.error > 0.0):
+    if not np.any(run.error > 0.0):  # nor where errors were not kept, which are NaN then
         return None
     return _logarithmic("error", "log10 error", curves, 2, np.nan)
 
 
-def margin(run: Run) -> Group:
+def margin(run: Run) -> Group | None:
     """log10 of the margin, 1 / condition of the worst block: 0 far from singular points, -16 at one."""
+    if "solver.margin" in run.absent:
+        return None
     return _logarithmic("margin", "log10 margin", {"margin": run.margin}, 1, SMALLEST)
 
 
-def iterations(run: Run) -> Group:
+def iterations(run: Run) -> Group | None:
     """Newton's iterations, a step from sample to sample."""
+    if "solver.iterations" in run.absent:
+        return None
     return Group(
         path="solver/iterations",
         title="Newton iterations",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,17 +21,7 @@ def thinned(run: Run, most: int | None = None) -> Run:
     if len(run) <= most:
         return run
     rows = np.union1d(np.arange(0, len(run), -(-len(run) // most)), _telling(run))
-    return at_rows(run, rows)
-
-
-def at_rows(run: Run, rows: NDArray[np.int64]) -> Run:
-    """The run with some of its samples."""
-    tables: dict[str, Any] = {
-        field.name: table[rows]
-        for field in dataclasses.fields(run)
-        if isinstance(table := getattr(run, field.name), np.ndarray)
-    }
-    return dataclasses.replace(run, **tables)
+    return run.part(rows, events=run.events)
 
 
 def _telling(run: Run) -> NDArray[np.int64]:

@@ -210,4 +210,4 @@ def test_check_draws_a_mechanism_without_a_driver_and_still_fails(
 def test_check_refuses_another_kind_of_figure_before_it_works(run_cli: Callable[..., tuple[int, str, str]]) -> None:
     status, out, err = run_cli("check", "fourbar", "--figure", "F.pdf")
     assert (status, out) == (2, "")
-    assert err.endswith("Error: --figure F.pdf: a figure ends in one of .svg, .png\n")
+    assert err.endswith("F.pdf: its name must end in one of .svg, .png\n")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinfmu.channels import select
 from kinfmu.draw import plot
 from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
 from kinfmu.errors import FigureError
@@ -87,6 +88,11 @@ def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path
     panels = _sheet(run, ("rocker.x",)).axes
     assert set(panels[0].lines[0].get_ydata()) == {1.0}
     assert set(panels[1].lines[0].get_ydata()) == {0.0}
+
+
+def test_what_was_not_kept_is_an_empty_panel_that_says_so(run: Run) -> None:
+    panels = _sheet(select(run, ["q"]), ("coupler.x",)).axes
+    assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
 
 def test_what_cannot_be_plotted_is_said(run: Run, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinfmu.channels import select
 from kinfmu.errors import LogError
 from kinfmu.log import headless, write_mcap, write_rrd
 from kinfmu.log.comparison import write_comparison
@@ -108,6 +109,22 @@ def test_paths_do_not_depend_on_the_run(tmp_path: Path) -> None:
     named = [{path for path in entities(tmp_path / name) if path != "/log"} for name in ("a.rrd", "b.rrd")]
     assert named[0] == named[1]
     assert {"/position/angle", "/acceleration/length", "/solver/status", "/card", "/linkage/bodies/crank"} <= named[0]
+
+
+def test_what_was_not_kept_has_no_curves(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "run.rrd"
+    write_rrd(select(run, ["q", "-coupler.x", "residual"]), path)
+    found = entities(path)
+    assert {"/position/angle", "/position/length", "/solver/accuracy", "/solver/status"} <= found
+    assert not {entity for entity in found if entity.startswith(("/velocity", "/acceleration", "/solver/margin"))}
+    assert "/linkage/bodies/crank" in found
+    assert "/linkage/bodies/coupler" not in found
+    assert verified(path)
+    write_comparison(run, select(run, ["qd"]), tmp_path / "compare.rrd")
+    assert {entity for entity in entities(tmp_path / "compare.rrd") if entity.startswith("/difference")} == {
+        "/difference/velocity/angle",
+        "/difference/velocity/length",
+    }
 
 
 def test_a_missing_folder_is_named_and_nothing_is_left_behind(run: Run, tmp_path: Path) -> None:
