@@ -296,13 +296,26 @@ def six_bars(rng: Rng) -> Iterator[Number]:
 
 @family
 def chains(rng: Rng) -> Iterator[Number]:
-    """Loops one after another: each rocker is the next loop's crank; parallelograms among them."""
+    """Loops one after another, each rocker the next loop's crank: nearly parallelograms, some of them just that."""
     n = int(rng.choice([2, 3, 5, 8, 20, 60]))
     loops = []
-    for _ in range(n):
-        crank, ground = round(float(rng.uniform(0.8, 1.2)), 3), round(float(rng.uniform(1.5, 3.0)), 3)
-        loops.append((ground, crank, ground, crank))
+    for ground, crank in _cranks(rng, n):
+        more = rng.choice([0.0, 1.0]) * rng.uniform(-0.02, 0.02, 2)
+        loops.append((ground, crank, round(ground + float(more[0]), 3), round(crank + float(more[1]), 3)))
+    yield from _crank_turned(_chain(loops), rng, rng.uniform(0.9, 2.2, 4), 1.5, f"{n} loops")
+
+
+@family
+def parallel_chains(rng: Rng) -> Iterator[Number]:
+    """Parallelograms in a row: every prediction is exact, so that rounding leaves next to no error to estimate."""
+    n = int(rng.choice([2, 3, 5, 8, 20, 60]))
+    loops = [(ground, crank, ground, crank) for ground, crank in _cranks(rng, n)]
     yield from _crank_turned(_chain(loops), rng, rng.uniform(0.4, 2.7, 4), 1.0, f"{n} loops")
+
+
+def _cranks(rng: Rng, n: int) -> list[tuple[float, float]]:
+    """Ground and crank of n loops of a chain."""
+    return [(round(float(rng.uniform(1.5, 3.0)), 3), round(float(rng.uniform(0.8, 1.2)), 3)) for _ in range(n)]
 
 
 def _chain(loops: Sequence[tuple[float, float, float, float]]) -> Linkage:
@@ -446,10 +459,7 @@ def loops_after_a_limit(rng: Rng) -> Iterator[Number]:
 def bridged_chains(rng: Rng) -> Iterator[Number]:
     """Parallelograms in a row where they all lie flat."""
     n = int(rng.choice([1, 2, 3, 5]))
-    loops = []
-    for _ in range(n):
-        crank, ground = round(float(rng.uniform(0.8, 1.2)), 3), round(float(rng.uniform(1.5, 3.0)), 3)
-        loops.append((ground, crank, ground, crank))
+    loops = [(ground, crank, ground, crank) for ground, crank in _cranks(rng, n)]
     linkage = _chain(loops)
     turns = int(rng.choice([0, 0, 1, 50]))
     angles = TURN * turns + rng.choice([0.0, math.pi], 5) + rng.choice([1, -1, 0], 5) * 10.0 ** rng.uniform(-9, -1, 5)

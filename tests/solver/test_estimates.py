@@ -15,7 +15,7 @@ from tests.error_estimates import FAMILIES, ORDERS, Number, measured, told
 from tests.mechanisms import fourbar as fourbar_of_bars
 
 SEED = 1989
-COUNTS = {"gallery": 25, "chains": 3, "turned_far": 3}  # mechanisms drawn; eight of the other families
+COUNTS = {"gallery": 25, "chains": 5, "parallel_chains": 3, "turned_far": 3}  # mechanisms drawn; eight of the other families
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +32,14 @@ def test_the_estimate_is_at_least_the_error_in_99_percent_and_1000_times_too_lar
     assert result.count > 150
     assert result.coverage >= 0.99
     assert result.overestimation <= 1000.0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_along_a_chain_estimates_grow_no_faster_than_errors(numbers: list[Number], order: str) -> None:
+    """Of 2 to 60 loops, each known to what the loops before it leave."""
+    result = told([number for number in numbers if number.family == "chains" and number.order == order])
+    assert result.coverage == 1.0
+    assert result.overestimation <= 100.0
 
 
 def test_every_kind_of_sample_is_among_them(numbers: list[Number]) -> None:
