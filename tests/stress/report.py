@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.stress.branch import EDGE, OUTSIDE
-from tests.stress.trial import NARROW, ORDERS, TIGHT, Verdict
+from tests.stress.trial import NARROW, ORDERS, ROOM, TIGHT, Verdict
 
 STATUSES = ("ok", "near_singular", "bridged", "outside", "inconsistent", "not_converged")
 EPS = float(np.finfo(float).eps)
@@ -107,7 +107,7 @@ class Report:
         said.append(
             f"{self.refused} samples past a limit were told so; {self.edge} lay within 1e-10 of one; "
             f"told outside though the branch goes on: {self.spared} behind a place tighter than {TIGHT:g}, "
-            f"{self.narrow} behind a change point narrower than {NARROW:g} rad"
+            f"{self.narrow} behind a change point narrower than {NARROW:g} rad or within {ROOM:g} of a limit"
         )
         said.append(
             f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"

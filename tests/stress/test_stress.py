@@ -43,6 +43,14 @@ def test_a_near_change_point_that_falls_steeply_is_not_bridged(seed: int) -> Non
     assert trial(seed, "near change points").judged().faults == []
 
 
+def test_a_crossing_1e_3_rad_before_a_limit_is_a_limit_and_counted_as_such() -> None:
+    """A rhombus lies flat where the loop on it is about to be stretched: no six nodes of a bridge fit between."""
+    verdict = trial(1841, "watt six-bars").judged()
+    assert verdict.faults == []
+    assert verdict.narrow == 1
+    assert verdict.spared == 0
+
+
 @pytest.mark.parametrize(
     ("seed", "family"),
     [(6838, "stephenson six-bars"), (7342, "watt six-bars"), (7440, "four-bars"), (21356, "near change points")],

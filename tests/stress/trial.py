@@ -25,6 +25,7 @@ from tests.stress.patterns import drawn_steps
 WRONG = 1e-9  # of the column's largest magnitude
 TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
 NARROW = 0.015  # [rad]; change points that turn in less have no room for a bridge: `outside` is an answer too
+ROOM = 4e-3  # [rad, lengths]; nor have those as close to a limit: four half widths of the narrowest bridge
 BEYOND = 10.0  # times its own estimate: a flagged sample may not be wronger
 SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
 SINGULAR = 1e-6  # product of what must stay positive; below, long doubles lose the digits that errors are judged by
@@ -57,7 +58,7 @@ class Verdict:
     absolute: Floats  # (n, 3) the same relative to the size for lengths, in radians for angles: as estimates are
     estimate: Floats  # (n, 3)
     spared: int  # samples that were told unreachable behind a place too tight
-    narrow: int  # the same behind a change point too narrow
+    narrow: int  # the same behind a change point too narrow, or too close to a limit
     digits: int  # samples that were judged by 50 digits
     gap: float  # largest difference of the two oracles, as a part of what is judged
     faults: list[Fault] = field(default_factory=list)
@@ -122,12 +123,25 @@ class Trial:
             if not run.good[k] and expected.side[k] == INSIDE:
                 if expected.tightest[k] < TIGHT:
                     verdict.spared += 1
-                elif is_narrow:
+                elif is_narrow or self._is_behind_a_crowded_change_point(float(self.inputs[0][k, 0])):
                     verdict.narrow += 1
                 else:
                     verdict.faults.append(Fault("told unreachable", k, f"status {status}"))
             if not run.good[k] and status != 3:
                 verdict.faults.append(Fault("not outside", k, f"status {status}"))
+
+    def _is_behind_a_crowded_change_point(self, x: float) -> bool:
+        """True if between the start and a driver value branches cross so close to the limit that no bridge fits."""
+        if not isinstance(self.branch, Interval):
+            return False
+        branch, unit = self.branch, 1.0 if self.drawn.sketch.kinds == ("angle",) else float(self.drawn.frame.scale)
+        for mark in branch.marks:
+            after, before = branch.high_is_limit and x > mark, branch.low_is_limit and x < mark
+            left = branch.high - mark if after else mark - branch.low if before else np.inf
+            if left < ROOM * unit:
+                sines = self.drawn.positions(np.array([[mark]])).closing.sines
+                return min(abs(float(np.atleast_1d(sine)[0])) for sine in sines) < 1e-12
+        return False
 
     def _errors(
         self, numbers: Numbers, run: Run, expected: Expected, which: NDArray[np.int64], size: float
