@@ -15,7 +15,7 @@ from tests.error_estimates import FAMILIES, ORDERS, Number, measured, told
 from tests.mechanisms import fourbar as fourbar_of_bars
 
 SEED = 1989
-COUNTS = {"gallery": 25, "chains": 5, "parallel_chains": 3, "turned_far": 3}  # mechanisms drawn; eight of the other families
+COUNTS = {"gallery": 25, "chains": 5, "parallel_chains": 3, "turned_far": 3}  # mechanisms drawn; eight of the others
 
 
 @pytest.fixture(scope="module")
