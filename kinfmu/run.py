@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.errors import KinfmuError, suggestion
+from kinfmu.errors import KinfmuError, MissingPackageError, suggestion
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.status import Status
 from kinfmu.units import unit_of
@@ -196,6 +197,23 @@ class Run:
         table: NDArray[Any] = getattr(self, place.table)
         return table if place.column is None else table[:, place.column]
 
+    def to_arrow(self) -> Any:
+        """The columns as a pyarrow.Table, with the unit of each in the metadata of its field."""
+        pa = _optional("pyarrow")
+        columns = list(self.columns())
+        fields = [pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), False, {"unit": c.unit}) for c in columns]
+        return pa.table([pa.array(c.values) for c in columns], schema=pa.schema(fields))
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
+        frame = _optional("pandas").DataFrame({column.name: column.values for column in self.columns()})
+        frame.attrs["units"] = {place.name: place.unit for place in self.places()}
+        return frame
+
+    def to_polars(self) -> Any:
+        """The columns as a polars.DataFrame."""
+        return _optional("polars").DataFrame({column.name: column.values for column in self.columns()})
+
     def input_unit(self, name: str) -> str:
         """Unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
         first = self.input_names[self.input_names.index(name) // 3 * 3]
@@ -219,3 +237,11 @@ class Run:
                 return self._column(place)
             names.append(place.name)
         raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")
+
+
+def _optional(package: str) -> Any:
+    """A package that is not installed with kinfmu."""
+    try:
+        return import_module(package)
+    except ImportError:
+        raise MissingPackageError(f"a run as a table of {package} needs it: pip install {package}") from None

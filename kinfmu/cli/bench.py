@@ -14,7 +14,7 @@ from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
-MEASUREMENTS = ("accuracy", "sample", "sweep", "step", "native", "import", "chains")
+MEASUREMENTS = ("accuracy", "sample", "sweep", "step", "native", "log", "import", "chains")
 ALL = "all"
 
 
@@ -69,6 +69,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     sweep     a sweep by the native engine beside a closed form written by hand
     step      a step of the FMU beside the smallest pythonfmu FMU
     native    a step of the native FMU in a C host beside closed forms by hand
+    log       records of a million samples, written and read back, beside mcap's writer
     import    `import kinfmu` beside bare Python
     chains    chains of up to a thousand loops
     all       all of these
@@ -98,6 +99,10 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             from kinfmu.bench import native_step
 
             click.echo(native_step.run(gallery.load("fourbar"), **given))
+        elif name == "log":
+            from kinfmu.bench import log_files
+
+            click.echo(log_files.run(**given))
         elif name == "import":
             from kinfmu.bench import import_time
 

@@ -117,7 +117,7 @@ def _logarithmic(path: str, title: str, curves: Mapping[str, FloatArray], first_
         title=title,
         names=tuple(curves),
         colours=tuple(palette.body(first_colour + k) for k in range(len(curves))),
-        values=np.log10(np.where(table > 0.0, np.maximum(table, SMALLEST), zero)),
+        values=np.log10(np.where(table == 0.0, zero, np.maximum(np.abs(table), SMALLEST))),
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kinfmu.errors import LogError, MissingPackageError, listed
-from kinfmu.log.record import description
+from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run
 
@@ -54,7 +54,8 @@ def _write_parquet(run: Run, path: Path) -> None:
         raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
 
     columns = _columns(run)
-    about = description(run) | {"mechanism": run.mechanism_text} | {f"info.{k}": v for k, v in run.info.items()}
+    info = {f"info.{key}": value for key, value in run.info.items()}
+    about = description(run) | ending(run) | {"mechanism": run.mechanism_text} | info
     schema = pa.schema(
         [
             pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), False, {"unit": column.unit})

@@ -12,7 +12,7 @@ import pytest
 
 from kinfmu import gallery
 from kinfmu.backends.c import compiler
-from kinfmu.bench import accuracy, case, chains, native_sweep, singular
+from kinfmu.bench import accuracy, case, chains, log_files, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
@@ -161,7 +161,7 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, sweep, step, native, import, chains, all",
+            "known: accuracy, sample, sweep, step, native, log, import, chains, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -247,3 +247,15 @@ def test_the_engine_that_is_shipped_comes_first(command: Command, tmp_path: Path
     table = (tmp_path / SETTINGS_PAGE).read_text(encoding="utf-8")
     first = next(line for line in table.splitlines() if line.startswith("| **"))
     assert first.startswith(f"| **{Shipped().name}** | velocity and acceleration | full | round-off |")
+
+
+def test_logs_are_measured_beside_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = log_files.run(rounds=1, samples=5000)
+    assert re.search(r"^the record by the package mcap .* us/row +1\.0 +\d+\.\d B/row$", table, re.MULTILINE)
+    sizes = [float(size) for size in re.findall(r"^MCAP: .* ([\d.]+) B/row$", table, re.MULTILINE)]
+    assert len(sizes) == 2
+    assert sizes[0] < float(re.findall(r"may take (\d+) B", table)[0])
+    monkeypatch.setattr(log_files, "find_spec", lambda _: None)
+    table = log_files.run(rounds=1, samples=100)
+    assert table.endswith("mcap is not installed: pip install 'kinfmu[bench]'")
+    assert "package mcap " not in table

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).parents[2]
-HEAVY = {"numpy", "scipy", "pythonfmu", "fmpy", "mcap", "rerun", "pyarrow", "PIL", "matplotlib", "importlib.metadata"}
+LOGGING = {"mcap", "zstandard", "lz4", "rerun", "pyarrow", "pandas", "polars"}
+HEAVY = {"numpy", "scipy", "pythonfmu", "fmpy", "PIL", "matplotlib", "importlib.metadata"} | LOGGING
 
 
 def loaded_by(statement: str) -> set[str]:
@@ -40,3 +41,23 @@ def test_importing_loads_no_heavy_package(statement: str, late: set[str]) -> Non
     loaded = loaded_by(statement)
     assert "kinfmu" in loaded
     assert loaded & late == set()
+
+
+def test_building_and_stepping_an_fmu_loads_nothing_to_log_with(tmp_path: Path) -> None:
+    statement = (
+        f"import kinfmu; fmu = kinfmu.build(kinfmu.load('fourbar'), {str(tmp_path / 'fourbar.fmu')!r}); "
+        "run = kinfmu.simulate(fmu, stop=1.0); assert len(run) == 2"
+    )
+    loaded = loaded_by(statement)
+    assert {"kinfmu.fmu.simulate", "fmpy"} <= loaded
+    assert loaded & LOGGING == set()
+    assert not [name for name in loaded if name.startswith("kinfmu.log")]
+
+
+def test_writing_and_reading_a_record_loads_no_viewer(tmp_path: Path) -> None:
+    path = str(tmp_path / "run.mcap")
+    statement = (
+        f"import kinfmu; run = kinfmu.solve(kinfmu.load('fourbar')); kinfmu.log.write_mcap(run, {path!r}); "
+        f"assert len(kinfmu.log.read({path!r})) == 181"
+    )
+    assert loaded_by(statement) & LOGGING == {"zstandard"}

@@ -1,0 +1,126 @@
+"""Logs of a long run of the four-bar: how fast they are written and read, and how large they are.
+
+Beside them the writer of the package mcap, which takes one message after another, and gets the same ones ready made.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.errors import MissingPackageError
+from kinfmu.gallery import load
+from kinfmu.log import read, write_mcap
+from kinfmu.log.clock import nanoseconds
+from kinfmu.log.mcap_file import sample_template
+from kinfmu.log.record import tables
+from kinfmu.run import Run
+from kinfmu.sweep import solve
+
+ROUNDS = 5
+SAMPLES = 1_000_000
+PLAIN_SAMPLES = 100_000  # of them for the package mcap: its time a row does not depend on their number
+TURNS = 0.5  # of the crank
+PER_DOUBLE, PER_ROW = 9.0, 20.0  # [bytes] that a file may take
+
+
+class Way(NamedTuple):
+    """Something that writes the first `rows` samples of a run to a file, or reads them."""
+
+    name: str
+    rows: int
+    take: Callable[[], object]
+    file: Path
+
+
+def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
+    """A table: rows a second by the clock; processor time a row and how often it goes into the package mcap's; size."""
+    long_run = fourbar(samples)
+    processor: dict[str, list[float]] = {}
+    with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
+        found, absent = ways(long_run, Path(folder))
+        takes = [_timed(way.take, processor.setdefault(way.name, [])) for way in found]
+        clock = in_turn(takes, rounds, perf_counter)
+        sizes = [way.file.stat().st_size / way.rows for way in found]
+    doubles = len(list(long_run.places()))
+    lines = [
+        f"{samples} samples of the four-bar, {doubles} columns of 8 bytes, {rounds} rounds in turn",
+        f"{'':40}{'million rows/s':>16}{'best':>7}{'processor':>13}{'mcap/this':>11}{'size':>14}",
+    ]
+    usual = spread([value / found[0].rows for value in processor[found[0].name][1:]]).median
+    for way, seconds, size in zip(found, clock, sizes, strict=True):
+        speed = spread([way.rows / value / 1e6 for value in seconds])
+        busy = spread([value / way.rows for value in processor[way.name][1:]]).median  # the first round warms up
+        share = "" if absent else f"{usual / busy:.1f}"
+        figures = f"{speed.median:16.2f}{speed.high:7.2f}{busy * 1e6:6.2f} us/row{share:>11}{size:8.1f} B/row"
+        lines.append(f"{way.name:40}{figures}")
+    allowed = PER_DOUBLE * doubles + PER_ROW
+    lines.append(f"a row may take {allowed:.0f} B: {PER_DOUBLE:g} for each of {doubles} columns, and {PER_ROW:g}")
+    return "\n".join([*lines, *([absent] if absent else [])])
+
+
+def _timed(take: Callable[[], object], seconds: list[float]) -> Callable[[], object]:
+    """The same, with the processor time of each call, in all threads, appended to `seconds`."""
+
+    def timed() -> None:
+        start = process_time()
+        take()
+        seconds.append(process_time() - start)
+
+    return timed
+
+
+def fourbar(samples: int) -> Run:
+    """A run of the gallery's four-bar, with all its columns computed."""
+    angle = np.linspace(0.0, TURNS * 2.0 * np.pi, samples)
+    found = solve(load("fourbar"), angle / np.radians(1.0))
+    return replace(found, margin=found.margin, error=found.error)  # computed when they are read here
+
+
+def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
+    """What is measured, the package mcap first if it is installed, and what is said if not."""
+    n = len(long_run)
+    record, everything = folder / "record.mcap", folder / "everything.mcap"
+    found = [
+        Way("MCAP: the record", n, lambda: write_mcap(long_run, record, channels=["-drawn"]), record),
+        Way("MCAP: the record and what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
+        Way("the record read back", n, lambda: read(record), record),
+        Way("the record read back from all that", n, lambda: read(everything), everything),
+    ]
+    try:
+        return [_plain(long_run, folder / "plain.mcap"), *found], ""
+    except MissingPackageError as error:
+        return found, str(error)
+
+
+def _plain(long_run: Run, file: Path) -> Way:
+    """The record by the package mcap: messages that are ready bytes, one call each."""
+    if find_spec("mcap") is None:
+        raise MissingPackageError("mcap is not installed: pip install 'kinfmu[bench]'")
+    from mcap.writer import CompressionType, Writer
+
+    part = long_run.part(slice(0, PLAIN_SAMPLES))
+    stamps = nanoseconds(part.t)
+    template = sample_template(len(list(part.places())))
+    payloads = np.empty((len(part), template.length), np.uint8)
+    template.fill(payloads, stamps, tables(part))
+    messages = [(stamp, payload.tobytes()) for stamp, payload in zip(stamps.tolist(), payloads, strict=True)]
+
+    def take() -> None:
+        with file.open("wb") as stream:
+            writer = Writer(stream, compression=CompressionType.ZSTD)
+            writer.start(profile="ros2", library="")
+            channel = writer.register_channel("/sample", "cdr", writer.register_schema("Sample", "ros2msg", b""))
+            for number, (stamp, message) in enumerate(messages):
+                writer.add_message(channel, stamp, message, stamp, number)
+            writer.finish()
+
+    return Way("the record by the package mcap", len(part), take, file)
