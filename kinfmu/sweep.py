@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.toml_file import text
 from kinfmu.plan import SolvePlan, compile_plan
@@ -56,6 +57,8 @@ def solve(
     """
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+    if not isinstance(mechanism, SolvePlan):
+        refuse_other(mechanism, "solve")
     plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
     plan, bound, solver = _with_geometry(plan, geometry, tolerance)

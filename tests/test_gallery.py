@@ -57,3 +57,22 @@ def test_a_saved_file_has_the_same_bytes_on_every_system(tmp_path: Path) -> None
     content = kinfmu.save(kinfmu.load("fourbar"), tmp_path / "mine.toml").read_bytes()
     assert b"\r" not in content
     assert content.endswith(b'\n[outputs]\ncoordinates = "moving"\n')
+
+
+@pytest.mark.parametrize("purpose", ["check", "solve", "build"])
+def test_a_name_where_a_mechanism_is_needed_is_told(purpose: str) -> None:
+    door = getattr(kinfmu, purpose)
+    with pytest.raises(RequestError) as caught:
+        door("fourbar")
+    assert str(caught.value) == f"{purpose} needs a Mechanism: kinfmu.load('fourbar') gives it"
+    with pytest.raises(
+        RequestError, match=f"^{purpose} needs a Mechanism, not dict; kinfmu.load gives one by its name$"
+    ):
+        door({})
+
+
+def test_simulate_says_that_a_mechanism_is_built_first() -> None:
+    with pytest.raises(
+        RequestError, match=r"^simulate steps an FMU; build\(mechanism\) makes one of mechanism 'fourbar'$"
+    ):
+        kinfmu.simulate(kinfmu.load("fourbar"))  # type: ignore[arg-type]

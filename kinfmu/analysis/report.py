@@ -19,6 +19,7 @@ from kinfmu.analysis.way import follow
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, KinfmuError
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
 from kinfmu.redundancy import DependentRow, Redundancy, find_redundancy
 
@@ -116,6 +117,7 @@ def check(mechanism: Mechanism) -> Report:
 
     Faults of the mechanism do not raise; they stand in the report's `problem`.
     """
+    refuse_other(mechanism, "check")
     notes = list(file_notes(mechanism))
     local, origin = localized(mechanism)
     system = System(local)

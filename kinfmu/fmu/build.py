@@ -11,6 +11,7 @@ from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.joints.laws import External
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import refuse_other
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -39,6 +40,7 @@ def build(
 
     The same mechanism, compiled by the same compiler, gives the same bytes. CompilerError if there is no compiler.
     """
+    refuse_other(mechanism, "build")
     if flavour not in FLAVOURS:
         raise RequestError(
             f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"

@@ -25,7 +25,7 @@ from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.interrupt import interruptible
 from kinfmu.fmu.slaves import Slave, slave
-from kinfmu.mechanism import RunSettings
+from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Event, Run
 from kinfmu.sink import Sink
@@ -77,6 +77,8 @@ def simulate(
     Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
     of level "error" names driver, value and limit.
     """
+    if isinstance(fmu_path, Mechanism):
+        raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")
     path = Path(fmu_path)
     with _unpacked(path) as folder:
         about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))

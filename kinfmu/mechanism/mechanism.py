@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
@@ -146,3 +147,13 @@ class Mechanism:
             quantity = None if old.kind == "number" else old.quantity  # a pure number, or nobody could know
             parameters[name] = Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved
         return replace(self, parameters=parameters, drivers=with_law_constants(self.drivers, constants))
+
+
+def refuse_other(value: object, purpose: str) -> None:
+    """Raise a RequestError if a value is not a Mechanism but its name, its path or anything else; purpose: 'solve'."""
+    if isinstance(value, str | PurePath):
+        raise RequestError(f"{purpose} needs a Mechanism: kinfmu.load({str(value)!r}) gives it")
+    if not isinstance(value, Mechanism):
+        raise RequestError(
+            f"{purpose} needs a Mechanism, not {type(value).__name__}; kinfmu.load gives one by its name"
+        )

@@ -338,6 +338,8 @@ def _outputs(
 
 def _chosen(motions: Sequence[Motion], coordinate_count: int, outputs: Sequence[str]) -> tuple[list[Motion], int]:
     known = [motion.name for motion in motions]
+    if isinstance(outputs, str):
+        raise RequestError(f"outputs: '{outputs}' must be a list of names, such as ['{known[0]}']")
     for name in outputs:
         if name not in known:
             raise RequestError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")

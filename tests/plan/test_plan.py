@@ -62,6 +62,10 @@ def test_what_the_outputs_do_not_need_is_not_solved() -> None:
     assert plan.watches == ()
     with pytest.raises(RequestError, match=r"'coupler\.z' is not one; did you mean 'coupler\.[xy]'\?; outputs:"):
         compile_plan(reference_fourbar(), ["coupler.z"])
+    with pytest.raises(
+        RequestError, match=r"^outputs: 'crank\.phi' must be a list of names, such as \['crank\.phi'\]$"
+    ):
+        compile_plan(reference_fourbar(), "crank.phi")
 
 
 def test_dependencies_are_structural() -> None:
