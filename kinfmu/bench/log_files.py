@@ -21,7 +21,7 @@ from kinfmu.gallery import load
 from kinfmu.log import read, write_mcap
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.mcap_file import sample_template
-from kinfmu.log.record import tables
+from kinfmu.log.record import layout, tables
 from kinfmu.run import Run
 from kinfmu.sweep import solve
 
@@ -111,7 +111,7 @@ def _plain(long_run: Run, file: Path) -> Way:
     stamps = nanoseconds(part.t)
     template = sample_template(len(list(part.places())))
     payloads = np.empty((len(part), template.length), np.uint8)
-    template.fill(payloads, stamps, tables(part))
+    template.fill(payloads, stamps, tables(part, layout(part)))
     messages = [(stamp, payload.tobytes()) for stamp, payload in zip(stamps.tolist(), payloads, strict=True)]
 
     def take() -> None:

@@ -40,6 +40,7 @@ _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "e
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _DISCARD, _ERROR = 2, 3
 PIECE = 64 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
+FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own
 PERIOD = 0.5  # [s] by the clock
 
 
@@ -303,7 +304,7 @@ class _Samples:
         )
         self._sink = sink
         if sink is not None:
-            self._piece = max(1, PIECE // (8 * (len(self._asked) + 3)))
+            self._piece = max(FEWEST, PIECE // (8 * (len(self._asked) + 3)))
             self._last_time = perf_counter()
             sink.begin(self._run(slice(0, 0)))
 
@@ -312,6 +313,7 @@ class _Samples:
         status, iterations = slave.counts()
         good = status <= Status.BRIDGED
         if good and not is_kept:
+            self._pass_on_what_is_due()
             return True
         row = self._reals[self._size]
         if good:
@@ -322,10 +324,14 @@ class _Samples:
         self._t[self._size] = t
         self._counts[self._size] = status, iterations
         self._size += 1
+        self._pass_on_what_is_due()
+        return good
+
+    def _pass_on_what_is_due(self) -> None:
+        """The sink gets a piece when there is one, and what there is when PERIOD has passed."""
         waiting = self._size - self._passed_on
         if self._sink is not None and (waiting >= self._piece or perf_counter() - self._last_time > PERIOD):
             self._pass_on()
-        return good
 
     def end(self, reason: str = "") -> Run:
         """All rows as a Run; reason: why it ended by an error."""

@@ -32,7 +32,7 @@ from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds, zero_of
 from kinfmu.log.container import McapWriter, Messages
 from kinfmu.log.drawn import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, joint_topics
-from kinfmu.log.record import description, ending, is_integer, tables
+from kinfmu.log.record import description, ending, is_integer, layout, tables
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import sentence, status_events
 from kinfmu.mechanism import toml_file
@@ -146,12 +146,12 @@ class _SampleTopic:
         metadata = {f"unit.{name}": place.unit for name, place in zip(names, places, strict=True)}
         metadata |= {f"column.{name}": place.name for name, place in zip(names, places, strict=True)}
         definition = ros2.sample_definition(zip(kinds, names, comments, strict=True))
-        self._writer, self._template = writer, sample_template(len(places))
+        self._writer, self._template, self._layout = writer, sample_template(len(places)), layout(run)
         self._channel = writer.channel(SAMPLE_TOPIC, "cdr", "kinfmu_msgs/msg/Sample", definition, metadata)
 
     def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
         """The next samples."""
-        template, numbers = self._template, tables(run)
+        template, numbers = self._template, tables(run, self._layout)
         self._writer.write(
             self._channel,
             Messages(np.arange(len(run)), stamps, template.length, lambda out: template.fill(out, stamps, numbers)),

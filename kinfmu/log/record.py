@@ -58,14 +58,26 @@ def is_integer(table: str) -> bool:
     return table in _INTEGERS
 
 
-def tables(run: Run) -> list[NDArray[np.generic]]:
+Layout = Sequence[tuple[str, list[int] | None]]  # tables by name, and which of their columns, all if None
+
+
+def layout(run: Run) -> Layout:
+    """Where the columns that were kept stand, in their order."""
+    found: list[tuple[str, list[int] | None]] = []
+    for name, group in groupby(run.places(kept=False), key=lambda place: place.table):
+        places = list(group)
+        kept = [place.column or 0 for place in places if place.name not in run.absent]
+        if kept:
+            found.append((name, kept if len(kept) < len(places) else None))
+    return found
+
+
+def tables(run: Run, columns: Layout) -> list[NDArray[np.generic]]:
     """All columns that were kept, side by side, as tables (n, k) of 8-byte items."""
     found = []
-    for name, places in groupby(run.places(), key=lambda place: place.table):
-        table = np.asarray(getattr(run, name), "<i8" if is_integer(name) else "<f8")
-        table = _of_columns(table)
-        columns = [place.column or 0 for place in places]
-        found.append(table if len(columns) == table.shape[1] else table[:, columns])
+    for name, kept in columns:
+        table = _of_columns(np.asarray(getattr(run, name), "<i8" if is_integer(name) else "<f8"))
+        found.append(table if kept is None else table[:, kept])
     return found
 
 
@@ -119,13 +131,12 @@ def _fill(run: Run, blocks: Sequence[NDArray[np.uint64]]) -> None:
     """Rows into the tables of a run, block by block while they are in the processor's cache."""
     moves = []
     at = 0
-    for name, places in groupby(run.places(), key=lambda place: place.table):
+    for name, kept in layout(run):
         table = _of_columns(getattr(run, name)).view("<u8")
-        columns = [place.column or 0 for place in places]
-        whole = columns == list(range(columns[0], columns[0] + len(columns)))
-        target = slice(columns[0], columns[0] + len(columns)) if whole else columns
-        moves.append((table, target, slice(at, at + len(columns))))
-        at += len(columns)
+        columns = slice(None) if kept is None else kept
+        count = table.shape[1] if kept is None else len(kept)
+        moves.append((table, columns, slice(at, at + count)))
+        at += count
     row = 0
     for block in blocks:
         for table, target, source in moves:
