@@ -29,8 +29,8 @@ HIGHEST_ORDER = 7  # of a derivative that units are written for
 
 
 def like_degrees(angle: float) -> bool:
-    """True for a number of radians that looks as if degrees were meant: a multiple of 45 other than 0."""
-    return angle != 0.0 and angle % 45.0 == 0.0
+    """True for a number of radians that looks as if degrees were meant: 30, 45, 60, 75, ..., of either sign."""
+    return abs(angle) >= 30.0 and angle % 15.0 == 0.0
 
 
 def in_turns(angle: float) -> str:

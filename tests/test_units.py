@@ -8,9 +8,27 @@ from fractions import Fraction
 import pytest
 
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.units import METRES, Quantity, display_units, every_unit, factors, quantity_in, unit_of
+from kinfmu.units import (
+    METRES,
+    Quantity,
+    display_units,
+    every_unit,
+    factors,
+    in_turns,
+    like_degrees,
+    quantity_in,
+    unit_of,
+)
 
 EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
+
+
+def test_radians_that_look_like_degrees_are_known_by_their_fifteens() -> None:
+    for angle in (30.0, 45.0, 90.0, -120.0, 360.0, 3600.0):
+        assert like_degrees(angle)
+    for angle in (0.0, 15.0, 31.0, 4.0 * math.pi, 100.0, 45.5):
+        assert not like_degrees(angle)
+    assert in_turns(-360.0) == "57.3 turns"
 
 
 @pytest.mark.parametrize("inside", METRES)

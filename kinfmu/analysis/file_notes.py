@@ -11,7 +11,7 @@ from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.places import Place, told
-from kinfmu.units import Quantity
+from kinfmu.units import Quantity, like_degrees
 
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a whole turn may be meant
 _LOOKS = 201  # times of a run at which a driver is looked at
@@ -37,8 +37,10 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
     large: list[tuple[Place, float]] = []
 
     def look(place: Place, value: Any, quantity: Quantity) -> Any:
-        is_looked_at = quantity == Quantity("angle") and place[0] in ("bodies", "joints") and "law" not in place
-        if is_looked_at and abs(value) > _TURN:
+        is_turns = (
+            "law" in place or place[0] == "drivers"
+        )  # laws go on for many turns; whole fifteens are degrees there
+        if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or like_degrees(value)):
             large.append((place, float(value)))
         return value
 

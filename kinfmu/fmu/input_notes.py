@@ -39,9 +39,11 @@ def _span(experiment: RunSettings, table: InputTable, start: float | None, stop:
     """A note if the run has ends of the table that are not those of the model."""
     if (start is None and table.start != experiment.start) or (stop is None and table.stop != experiment.stop):
         first, last = table.start if start is None else start, table.stop if stop is None else stop
-        whole = start is None and stop is None
-        rows = "as" if whole else "one end as"
-        yield Event(first, "info", f"the run goes from {first:g} to {last:g} s, {rows} the rows of {table.source}")
+        rows = "as" if start is None and stop is None else "one end as"
+        alone = "; a second row would hold the values until then" if table.start == table.stop else ""
+        yield Event(
+            first, "info", f"the run goes from {first:g} to {last:g} s, {rows} the rows of {table.source}{alone}"
+        )
 
 
 def _unlikely(name: str, table: InputTable) -> Iterator[Event]:

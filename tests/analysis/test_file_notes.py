@@ -35,6 +35,13 @@ def test_an_angle_that_looks_like_degrees_is_told() -> None:
     ]
 
 
+def test_an_angle_of_a_law_that_looks_like_degrees_is_told_and_many_turns_are_not() -> None:
+    assert 'start = "60 deg"' in DRIVER
+    told = list(file_notes(parse(CRANK_ROCKER.replace('start = "60 deg"', "start = 60"))))
+    assert [note.partition(" rad is")[0] for note in told] == ["[drivers.crank] start = 60"]
+    assert list(file_notes(parse(CRANK_ROCKER.replace('start = "60 deg"', 'start = "3600 deg"')))) == []
+
+
 def test_a_driven_distance_below_zero_is_told() -> None:
     cylinder = (
         'cylinder = { type = "distance", between = ["ground.O", "coupler.Q"], law = "constant_speed", start = -3 }'

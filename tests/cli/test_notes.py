@@ -40,6 +40,10 @@ def test_a_run_takes_its_ends_from_the_rows_of_its_input(notes: Callable[..., li
     ]
     assert log.read(tmp_path / "logs" / "fourbar.mcap").t.tolist() == [2.0, 3.0]
     assert notes("simulate", "fourbar", "--input", "in.csv", "--start", 3, "--stop", 4) == []
+    (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n2,30\n")
+    assert notes("simulate", "fourbar", "--input", "in.csv") == [
+        "note: the run goes from 2 to 2 s, as the rows of in.csv; a second row would hold the values until then"
+    ]
 
 
 def test_a_table_as_long_as_the_models_run_needs_no_word(notes: Callable[..., list[str]], tmp_path: Path) -> None:
