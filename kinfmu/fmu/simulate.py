@@ -172,6 +172,11 @@ def _parameters(
                 chosen[name] = measured(f"{where}: {name}", value, quantity, interface.length_unit)
             except MechanismError as error:
                 raise RequestError(str(error)) from None
+            low, high = known[name].minimum, known[name].maximum
+            ends = {"at least": low, "at most": high}
+            if (low is not None and chosen[name] < low) or (high is not None and chosen[name] > high):
+                valid = listed(f"{word} {end:g}" for word, end in ends.items() if end is not None)
+                raise RequestError(f"{where}: {name} = {chosen[name]:g} must be {valid}")
     if has_inputs:
         chosen.setdefault("driven_by_time", False)
     return chosen

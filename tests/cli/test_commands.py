@@ -202,6 +202,13 @@ def test_the_program_checks_a_mechanism_in_a_process_of_its_own(tmp_path: Path) 
     assert "mobility    1, driven by crank" in done.stdout
 
 
+def test_the_package_is_a_program_too(tmp_path: Path) -> None:
+    command = [sys.executable, "-W", "error", "-m", "kinfmu", "--version"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith(f", version {kinfmu.VERSION}\n")
+
+
 def test_the_program_tells_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: Callable[..., Path]) -> None:
     path = fourbar_file("length = 1\n", "length = 1.01\n")
     done = program("solve", path.name, "-o", "run.csv", cwd=tmp_path)

@@ -157,6 +157,8 @@ def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
             r"crank\.speed = '2\*a' must be a number, alone or with a unit: rad/s",
         ),
         ({"parameters": {"driven_by_time": 2}}, "driven_by_time = 2 must be true or false"),
+        ({"parameters": {"solver.tolerance": -1.0}}, "solver.tolerance = -1 must be at least 1e-15, at most 1$"),
+        ({"parameters": {"solver.tolerance": 2.0}}, "solver.tolerance = 2 must be at least 1e-15, at most 1$"),
         ({"step": 0.0}, "a positive step"),
         ({"start": 9.0, "stop": 1.0}, "start <= stop"),
         ({"inputs": "nowhere.csv"}, r"nowhere\.csv: cannot be read"),

@@ -1,0 +1,6 @@
+"""python -m kinfmu: the command line, where the command `kinfmu` is not on the path."""
+
+from kinfmu.cli import main
+
+if __name__ == "__main__":
+    main()
