@@ -43,7 +43,22 @@ def shoot(path: str | Path, at: float | None = None, size: tuple[int, int] = (16
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
     """
-    with _viewer(size) as (client, deadline):
+    with viewer(size) as shown:
+        shown.show(path, at)
+        return shown.shot()
+
+
+class Viewer:
+    """An invisible viewer that shows one recording after the other."""
+
+    def __init__(self, client: ViewerClient) -> None:
+        self._client = client
+
+    def show(self, path: str | Path, at: float | None = None) -> None:
+        """Show a recording in the place of the one before, at time `at` [s] if given."""
+        client, deadline = self._client, time.monotonic() + SETTLE_TIME
+        if client.get_state().recordings:
+            client.close("all")
         client.open(str(Path(path).resolve()))
         while (state := client.get_state()).loading or not state.views:
             if time.monotonic() > deadline:
@@ -53,12 +68,24 @@ def shoot(path: str | Path, at: float | None = None, size: tuple[int, int] = (16
             client.set_time(play_state="paused")
         else:
             client.set_time(play_state="paused", duration=at)
-        _settle(client, deadline)
-        views = client.get_state().views
+
+    def shot(self) -> Shot:
+        """A picture once it stands still."""
+        _settle(self._client, time.monotonic() + SETTLE_TIME)
+        return self._shot()
+
+    def glance(self) -> Shot:
+        """A picture as soon as everything is drawn, notices above it and all: for what the views complain about."""
+        for _ in range(2):  # a view complains when it is drawn, and plots are drawn after what they load
+            self._client.take_screenshot(max_size=_PROBE_SIZE)
+        return self._shot()
+
+    def _shot(self) -> Shot:
+        views = self._client.get_state().views
         reports = tuple(
             f"{view.name}: {report.severity}: {report.summary}" for view in views for report in view.reports
         )
-        return Shot(client.take_screenshot(), tuple(view.name for view in views), reports)
+        return Shot(self._client.take_screenshot(), tuple(view.name for view in views), reports)
 
 
 def executable() -> str:
@@ -84,8 +111,11 @@ def last_words(stream: IO[bytes]) -> str:
 
 
 @contextmanager
-def _viewer(size: tuple[int, int]) -> Iterator[tuple[ViewerClient, float]]:
-    """A viewer of our own on the loopback interface, ended with the block, and when to stop waiting for it."""
+def viewer(size: tuple[int, int] = (1600, 900)) -> Iterator[Viewer]:
+    """A viewer of our own on the loopback interface, ended with the block.
+
+    A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
+    """
     from rerun.experimental import ViewerClient
 
     port = _free_port()
@@ -105,7 +135,7 @@ def _viewer(size: tuple[int, int]) -> Iterator[tuple[ViewerClient, float]]:
             with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
                 _await_answer(process, client, complaints)
                 try:
-                    yield client, time.monotonic() + SETTLE_TIME
+                    yield Viewer(client)
                 except OSError as error:  # what the client raises when the viewer is gone
                     with suppress(subprocess.TimeoutExpired):
                         process.wait(END_TIME)

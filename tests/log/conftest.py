@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import LogError
-from kinfmu.log import headless, write_rrd
+from kinfmu.log import headless
 from kinfmu.run import Run
 from tests.log.runs import KINDS, fourbar, with_gap
 
@@ -44,13 +45,19 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
 
 
 @pytest.fixture(scope="session")
-def graphics(tmp_path_factory: pytest.TempPathFactory) -> None:
+def viewer() -> Iterator[headless.Viewer]:
+    """One invisible viewer for all recordings; skips, with the reason, where no picture can be drawn."""
+    with ExitStack() as stack:
+        try:
+            found = stack.enter_context(headless.viewer((800, 600)))
+        except LogError as error:
+            if not error.data.get("no_graphics"):
+                raise
+            pytest.skip(str(error))
+        yield found
+
+
+@pytest.fixture(scope="session")
+def graphics(viewer: headless.Viewer) -> None:
     """Skips, with the reason, where no picture can be drawn."""
-    path = tmp_path_factory.mktemp("graphics") / "probe.rrd"
-    write_rrd(fourbar(np.arange(2.0)), path)
-    try:
-        headless.shoot(path, size=(320, 200))
-    except LogError as error:
-        if not error.data.get("no_graphics"):
-            raise
-        pytest.skip(str(error))
+    assert viewer

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,11 @@ import pytest
 
 from kinfmu.channels import select
 from kinfmu.errors import LogError
-from kinfmu.log import headless, write_mcap, write_rrd
+from kinfmu.log import headless, write_rrd
 from kinfmu.log.comparison import write_comparison
 from kinfmu.log.rerun_file import _check_whole
 from kinfmu.run import Run
-from tests.log.runs import KINDS, fourbar, with_gap, without_samples
+from tests.log.runs import KINDS, fourbar, without_samples
 
 SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
 
@@ -171,37 +170,3 @@ def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -
 def test_runs_in_different_units_are_not_compared(run: Run, tmp_path: Path) -> None:
     with pytest.raises(LogError, match="lengths in m and mm; they need the same unit"):
         write_comparison(run, dataclasses.replace(run, length_unit="mm"), tmp_path / "compare.rrd")
-
-
-def _single(path: Path) -> None:
-    write_rrd(with_gap(fourbar(np.arange(181.0)), 100, 120), path)
-
-
-def _one_sample(path: Path) -> None:
-    write_rrd(KINDS["one sample"](), path)
-
-
-def _compared(path: Path) -> None:
-    write_comparison(fourbar(np.arange(181.0)), with_gap(fourbar(np.arange(0.0, 181.0, 0.5)), 40, 60), path)
-
-
-def _mcap(path: Path) -> None:
-    write_mcap(with_gap(fourbar(np.arange(181.0)), 100, 120), path)
-
-
-@pytest.mark.parametrize(
-    ("name", "write", "view"),
-    [
-        ("gap.rrd", _single, "angular velocity [rad/s]"),
-        ("one.rrd", _one_sample, "linkage"),
-        ("compared.rrd", _compared, "B - A: position [m]"),
-        ("run.mcap", _mcap, "joint_states/position"),
-    ],
-)
-@pytest.mark.usefixtures("graphics")
-def test_no_view_complains(name: str, write: Callable[[Path], None], view: str, tmp_path: Path) -> None:
-    write(tmp_path / name)
-    shot = headless.shoot(tmp_path / name, size=(800, 600))
-    assert shot.reports == ()
-    assert view in shot.views
-    assert shot.png.startswith(b"\x89PNG")
