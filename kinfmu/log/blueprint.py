@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 MOST_CURVES = 14  # a longer legend would hide the curves
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
 EDGE = 0.01  # of the run's time, left free before and after the curves
-LEGEND_EDGE, LETTER, PLOT = 34.0, 7.0, 400.0  # [points]; width of a legend around its names, of a letter, of a plot
+LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
+PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
 LEAST_ROOM, MOST_ROOM = 0.15, 0.6  # of the run's time, left free behind the curves for the legend
 
 
@@ -40,7 +41,7 @@ def single(
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in found]))
     shares = [2.0] * len(rows)
     if solver:
-        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in solver]))
+        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run], NARROW) for group in solver]))
         shares.append(1.5)
     rows.append(status_view([""], [run]))
     text: list[rrb.View] = [card_view()]
@@ -136,8 +137,12 @@ def time_axis(runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
     return rrb.TimeAxis(view_range=shown)
 
 
-def plot(title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run]) -> rrb.TimeSeriesView:
-    """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group)."""
+def plot(
+    title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run], width: float = PLOT
+) -> rrb.TimeSeriesView:
+    """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group); width: of
+    the plot [points].
+    """
     import rerun.blueprint as rrb
 
     names = [name for _, group in groups for name in group.names]
@@ -148,16 +153,16 @@ def plot(title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run]) -
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(runs, _legend_room(names) if has_legend else EDGE),
+        axis_x=time_axis(runs, _legend_room(names, width) if has_legend else EDGE),
         axis_y=axis_y,
         plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )
 
 
-def _legend_room(names: Sequence[str]) -> float:
-    """Part of the run's time that the legend of these curves hides on a usual screen."""
-    width = LEGEND_EDGE + LETTER * max(map(len, names))
-    return min(max(width / max(PLOT - width, 1.0), LEAST_ROOM), MOST_ROOM)
+def _legend_room(names: Sequence[str], width: float) -> float:
+    """Part of the run's time that the legend of these curves hides in a plot of this width [points]."""
+    legend = LEGEND_EDGE + LETTER * max(map(len, names))
+    return min(max(legend / max(width - legend, 1.0), LEAST_ROOM), MOST_ROOM)
 
 
 def linkage_view(roots: Sequence[str], runs: Sequence[Run], scenes: Sequence[Scene | None]) -> rrb.Spatial2DView:

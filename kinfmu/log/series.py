@@ -76,7 +76,7 @@ def accuracy(run: Run) -> Group | None:
     curves = {"residual": run.residual} if "solver.residual" not in run.absent else {}
     if run.watch_names and not {f"watch.{name}" for name in run.watch_names} & run.absent:
         curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
-    return _logarithmic("accuracy", f"log10 {', '.join(curves)}", curves, 0, SMALLEST) if curves else None
+    return _logarithmic("accuracy", f"log10 {next(iter(curves))}", curves, 0, SMALLEST) if curves else None
 
 
 def error_estimates(run: Run) -> Group | None:
