@@ -18,10 +18,11 @@ import numpy as np
 from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import MissingPackageError
 from kinfmu.gallery import load
-from kinfmu.log import read, write_mcap
+from kinfmu.log import read, write_mcap, write_rrd
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.mcap_file import sample_template
 from kinfmu.log.record import layout, tables
+from kinfmu.log.thinned import MOST_ROWS
 from kinfmu.run import Run
 from kinfmu.sweep import solve
 
@@ -63,6 +64,8 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
         figures = f"{speed.median:16.2f}{speed.high:7.2f}{busy * 1e6:6.2f} us/row{share:>11}{size:8.1f} B/row"
         lines.append(f"{way.name:40}{figures}")
     allowed = PER_DOUBLE * doubles + PER_ROW
+    recorded, best = found[-1].rows, min(clock[-1])
+    lines.append(f"a Rerun recording of {recorded} samples, its record read, takes {best:.2f} s at best")
     lines.append(f"a row may take {allowed:.0f} B: {PER_DOUBLE:g} for each of {doubles} columns, and {PER_ROW:g}")
     return "\n".join([*lines, *([absent] if absent else [])])
 
@@ -89,11 +92,15 @@ def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
     """What is measured, the package mcap first if it is installed, and what is said if not."""
     n = len(long_run)
     record, everything = folder / "record.mcap", folder / "everything.mcap"
+    short, recording = folder / "short.mcap", folder / "short.rrd"
+    reviewed = long_run.part(slice(0, MOST_ROWS))
+    write_mcap(reviewed, short)
     found = [
         Way("MCAP: the record", n, lambda: write_mcap(long_run, record, channels=["-drawn"]), record),
         Way("MCAP: the record and what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
         Way("the record read back", n, lambda: read(record), record),
         Way("the record read back from all that", n, lambda: read(everything), everything),
+        Way("a record made a Rerun recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
     ]
     try:
         return [_plain(long_run, folder / "plain.mcap"), *found], ""
