@@ -119,11 +119,19 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         return "\n".join([*lines, "", "The runs have no coordinates in common.", ""])
     if not np.array_equal(a.t, b.t):
         lines += ["The times differ: B is interpolated linearly at those of A.", ""]
-    lines += ["| largest difference | position | velocity | acceleration |", "|---|---:|---:|---:|"]
+    apart, equal = [], []
     for k, name in enumerate(difference.outputs):
         tables = (difference.values, difference.rates, difference.accelerations)
-        lines.append(f"| {plain(name)} | " + " | ".join(_largest(table[:, k]) for table in tables) + " |")
-    return "\n".join(lines) + "\n"
+        largest = [_largest(table[:, k]) for table in tables]
+        if set(largest) <= {"0", "-"} and "0" in largest:
+            equal.append(plain(name))
+        else:
+            apart.append(f"| {plain(name)} | " + " | ".join(largest) + " |")
+    if apart:
+        lines += ["| largest difference | position | velocity | acceleration |", "|---|---:|---:|---:|", *apart, ""]
+    if equal:
+        lines += [f"Equal in both: {', '.join(equal)}.", ""]
+    return "\n".join(lines)
 
 
 def _largest(column: FloatArray) -> str:

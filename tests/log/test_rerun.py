@@ -35,6 +35,19 @@ def rows(path: Path, entity: str, component: str) -> list[tuple[int, list[object
     return sorted(found, key=lambda row: row[0])
 
 
+def documents(path: Path, entity: str) -> list[str]:
+    """The texts of a card."""
+    import rerun as rr
+
+    return [
+        text
+        for chunk in rr.chunk.RrdReader(path).stream()
+        if chunk.entity_path == entity
+        for row in chunk.to_record_batch()["TextDocument:text"].to_pylist()
+        for text in row
+    ]
+
+
 def entities(path: Path) -> set[str]:
     import rerun as rr
 
@@ -155,6 +168,15 @@ def test_differences_are_those_of_b_from_a(run: Run, tmp_path: Path) -> None:
         assert len(found) == len(run)
         np.testing.assert_allclose([value for _, value in found], 0.25, rtol=1e-14)
     assert verified(tmp_path / "compare.rrd")
+
+
+def test_the_card_of_a_comparison_lists_what_differs_and_names_what_is_equal(run: Run, tmp_path: Path) -> None:
+    moved = run.values + 0.25 * (np.array(run.outputs) == "A.x")
+    write_comparison(run, dataclasses.replace(run, values=moved), tmp_path / "compare.rrd")
+    (text,) = documents(tmp_path / "compare.rrd", "/card")
+    assert "| A.x | 0.25 | 0 | 0 |" in text
+    assert "Equal in both: crank.phi, coupler.x, coupler.y, coupler.phi, rocker.phi, A.y." in text
+    assert "coupler.x |" not in text
 
 
 def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -> None:

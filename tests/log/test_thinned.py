@@ -14,7 +14,7 @@ from kinfmu.log.comparison import write_comparison
 from kinfmu.log.thinned import thinned
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
-from tests.log.test_rerun import SCALARS, rows
+from tests.log.test_rerun import SCALARS, documents, rows
 
 
 @pytest.fixture
@@ -48,22 +48,10 @@ def test_a_recording_says_what_it_leaves_out_and_tells_all_events(
     write_rrd(long_run, tmp_path / "run.rrd")
     angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
     assert 100 <= len(angles) < 150
-    (text,) = static_texts(tmp_path / "run.rrd", "/card")
+    (text,) = documents(tmp_path / "run.rrd", "/card")
     assert f"{len(angles)} of 2001 samples are drawn" in text
     assert len(rows(tmp_path / "run.rrd", "/log", "TextLog:text")) == 6
     write_comparison(long_run, long_run, tmp_path / "both.rrd")
-    (text,) = static_texts(tmp_path / "both.rrd", "/card")
+    (text,) = documents(tmp_path / "both.rrd", "/card")
     assert "A: " in text
     assert "B: " in text
-
-
-def static_texts(path: Path, entity: str) -> list[str]:
-    import rerun as rr
-
-    return [
-        text
-        for chunk in rr.chunk.RrdReader(path).stream()
-        if chunk.entity_path == entity
-        for row in chunk.to_record_batch()["TextDocument:text"].to_pylist()
-        for text in row
-    ]
