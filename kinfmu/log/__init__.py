@@ -1,6 +1,6 @@
 """What a run leaves: MCAP as the durable record, Rerun as the picture, tables for everything else.
 
-The writers and readers load their packages (mcap, rerun, pyarrow) when first used, not when this room is imported.
+The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not when this room is imported.
 """
 
 from __future__ import annotations

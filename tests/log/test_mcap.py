@@ -11,7 +11,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from kinfmu.channels import select
 from kinfmu.errors import LogError
@@ -312,3 +312,27 @@ def test_a_gap_of_several_pieces_has_an_empty_message_each(run: Run, tmp_path: P
     write_mcap(with_gap(with_gap(run, 10, 12), 20, 20), tmp_path / "run.mcap")
     found = messages(tmp_path / "run.mcap", "/joint_states")
     assert [time // 10**9 for time, payload in found if not numbers_of_joint_state(payload)[0]] == [10, 20]
+
+
+@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
+def test_a_file_that_another_program_wrote_anew_reads_back(
+    compression: CompressionType, run_with_gap: Run, tmp_path: Path
+) -> None:
+    write_mcap(run_with_gap, tmp_path / "run.mcap")
+    with (tmp_path / "run.mcap").open("rb") as source, (tmp_path / "anew.mcap").open("wb") as target:
+        reader, writer = make_reader(source), Writer(target, chunk_size=10_000, compression=compression)
+        writer.start()
+        channels: dict[int, int] = {}
+        for schema, channel, message in reader.iter_messages():  # by time, all topics in the same chunks
+            if channel.id not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                metadata, encoding = channel.metadata, channel.message_encoding
+                channels[channel.id] = writer.register_channel(channel.topic, encoding, number, metadata)
+            place = channels[channel.id]
+            writer.add_message(place, message.log_time, message.data, message.publish_time, message.sequence)
+        for record in reader.iter_metadata():
+            writer.add_metadata(record.name, record.metadata)
+        for one in reader.iter_attachments():
+            writer.add_attachment(one.create_time, one.log_time, one.name, one.media_type, one.data)
+        writer.finish()
+    assert_same(run_with_gap, read(tmp_path / "anew.mcap"))
