@@ -11,6 +11,8 @@ from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run
 
+ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
+
 
 def write_table(run: Run, path: str | Path) -> None:
     """Write all columns of `run` to a .csv, .parquet or .npz file.
@@ -37,8 +39,10 @@ def _write_csv(run: Run, path: Path) -> None:
     columns = _columns(run)
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(_quoted(column.name) for column in columns) + "\n")
-        rows = zip(*(column.values.tolist() for column in columns), strict=True)
-        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)  # repr: shortest text of the same bits
+        for start in range(0, len(run), ROWS):
+            block = (column.values[start : start + ROWS].tolist() for column in columns)
+            rows = zip(*block, strict=True)
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)  # repr: shortest text of the same bits
 
 
 def _quoted(name: str) -> str:

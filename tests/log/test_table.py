@@ -11,7 +11,9 @@ import pytest
 
 from kinfmu.errors import LogError
 from kinfmu.log import write_table
+from kinfmu.log.table import ROWS
 from kinfmu.run import Run
+from tests.log.runs import fourbar
 
 
 def test_csv_reads_back_bit_for_bit_with_the_csv_module(any_run: Run, tmp_path: Path) -> None:
@@ -23,6 +25,12 @@ def test_csv_reads_back_bit_for_bit_with_the_csv_module(any_run: Run, tmp_path: 
     table = np.array([[float(text) for text in row] for row in rows])
     for k, column in enumerate(columns):
         np.testing.assert_array_equal(table[:, k], column.values)
+
+
+def test_a_long_csv_has_every_sample_once(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(2 * ROWS + 7)
+    write_table(fourbar(t), tmp_path / "run.csv")
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1, usecols=0), t)
 
 
 def test_csv_reads_with_numpy_in_one_call(run_with_gap: Run, tmp_path: Path) -> None:
