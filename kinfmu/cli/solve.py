@@ -81,7 +81,8 @@ def solve(
     t, samples = None, {}
     if angle:
         if len(mech.drivers) != 1:
-            raise click.UsageError(f"--angle drives one driver; this mechanism has {len(mech.drivers)}")
+            names = listed(driver.name for driver in mech.drivers)
+            raise click.UsageError(f"--angle drives one driver, {mechanism} has {names}; simulate --input drives them")
         for name in given.constants:
             raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
         samples = _driver_values(angle, mech.drivers[0], mech.length_unit, wrap)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 
-from kinfmu.errors import LogError
+from kinfmu.errors import LogError, RequestError
 from kinfmu.log.headless import executable, last_words, shoot
 from kinfmu.log.reading import read
 from kinfmu.log.rerun_file import write_rrd
@@ -76,6 +76,8 @@ def _beside(run: Path, other: str | Path | None) -> str:
 def _record(run: Path, other: str | Path | None, recording: Path, at: float | None) -> float | None:
     """Write the recording; returns the time [s] at which a picture of it shows something."""
     first = read(run)
+    if at is not None and other is None and len(first) and not first.t[0] <= at <= first.t[-1]:
+        raise RequestError(f"at = {at:g} s lies outside the run, {first.t[0]:g} to {first.t[-1]:g} s")
     if other is None:
         write_rrd(first, recording)
     else:

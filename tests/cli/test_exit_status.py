@@ -53,7 +53,7 @@ WRONG_USAGE = [
     ("solve fourbar -o run.csv --outputs roker.phi", "did you mean 'rocker.phi'?"),
     ("solve fourbar -o run.csv --times 0:1", "must be A:B:STEP"),
     ("solve fourbar -o run.csv --angle 0:1:2 --times 0:1:1", "cannot both drive"),
-    ("solve five_bar -o run.csv --angle 0:1:2", "this mechanism has 2"),
+    ("solve five_bar -o run.csv --angle 0:1:2", "five_bar has left, right; simulate --input drives them"),
     ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
     ("build forbar", "did you mean 'fourbar'?"),
     ("build fourbar -o four.zip", "four.zip: is no folder, and the file of an FMU ends in .fmu"),
@@ -79,6 +79,7 @@ WRONG_USAGE = [
     ("review picture.rrd --save run.rrd", "picture.rrd: a recording cannot be saved as another; give the run's .mcap"),
     ("review picture.rrd damaged.mcap", "picture.rrd: a recording cannot be compared"),
     ("review damaged.mcap --at 3", "--at is the time of --screenshot"),
+    ("review whole.mcap --screenshot run.png --at 5", "at = 5 s lies outside the run, 0 to 2 s"),
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
     ("export none.mcap -o run.csv", "none.mcap: there is no such file"),
@@ -130,6 +131,7 @@ def folder(tmp_path: Path, fmu: bytes) -> Path:
     assert "length = 1\n" in fourbar
     (tmp_path / "contradicting.toml").write_text(fourbar.replace("length = 1\n", "length = 1.01\n"), encoding="utf-8")
     (tmp_path / "fourbar.fmu").write_bytes(fmu)
+    kinfmu.log.write_mcap(kinfmu.solve(kinfmu.load("fourbar"), [0.0, 1.0, 2.0]), tmp_path / "whole.mcap")
     return tmp_path
 
 
