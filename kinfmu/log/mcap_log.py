@@ -33,6 +33,7 @@ class McapLog:
     def begin(self, run: Run) -> None:  # noqa: ARG002  # every piece of the run holds what is in this one
         """The run before its first sample; LogError if no file can be made."""
         check_room(self.path)
+        self._content, self._status = None, Status.OK
 
     def add(self, run: Run) -> None:
         """The next samples, and the events since the last call."""

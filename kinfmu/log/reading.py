@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.errors import LogError, listed
+from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds
 from kinfmu.log.drawn import LOG_TOPIC, event_in
 from kinfmu.log.mcap_file import (
@@ -24,7 +26,7 @@ from kinfmu.log.mcap_file import (
     write_mcap,
 )
 from kinfmu.log.record import column_count, events_of, run_of
-from kinfmu.log.scan import Block, Scan
+from kinfmu.log.scan import Scan
 from kinfmu.run import Event, FloatArray, Run
 
 
@@ -36,6 +38,8 @@ def read(path: str | Path) -> Run:
     try:
         run, _ = _run_in(scan)
         return run
+    except OSError as error:
+        raise _unreadable(path, error) from None
     except LogError as error:
         raise LogError(f"{path}: {error}{_advice(scan, path)}") from None
 
@@ -48,6 +52,8 @@ def recover(path: str | Path, output: str | Path) -> Run:
     scan = _scan(path)
     try:
         run, fault = _run_in(scan, is_cut=True)
+    except OSError as error:
+        raise _unreadable(path, error) from None
     except LogError as error:
         raise LogError(f"{path}: nothing can be recovered: {scan.fault or error}") from None
     run = _cut_off(run, fault)
@@ -59,7 +65,11 @@ def _scan(path: str | Path) -> Scan:
     try:
         return Scan(Path(path))
     except OSError as error:
-        raise LogError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: str | Path, error: OSError) -> LogError:
+    return LogError(f"{path}: cannot be read ({error.strerror or error})")
 
 
 def _advice(scan: Scan, path: str | Path) -> str:
@@ -84,9 +94,7 @@ def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
         end = {}
     if not (end or is_cut):
         raise LogError("how the run ended is missing or damaged")
-    template = sample_template(column_count(texts))
-    found, fault = _samples(scan, channel, template.length, is_cut=is_cut)
-    blocks = [template.read(block.payloads) for block in found]
+    blocks, fault = _samples(scan, channel, sample_template(column_count(texts)), is_cut=is_cut)
     samples = sum(map(len, blocks))
     if end and samples != int(end["samples"]):
         fault = fault or f"holds {samples} of {end['samples']} samples"
@@ -97,27 +105,29 @@ def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
     return replace(run, events=events), fault
 
 
-def _samples(scan: Scan, channel: int, length: int, *, is_cut: bool) -> tuple[list[Block], str]:
-    """Blocks of samples in the order of their numbers, and why there are no more."""
-    blocks: list[Block] = []
+def _samples(scan: Scan, channel: int, template: Template, *, is_cut: bool) -> tuple[list[NDArray[np.uint64]], str]:
+    """Rows of samples, in blocks in the order of their numbers, and why there are no more."""
+    blocks: list[NDArray[np.uint64]] = []
+    numbers: list[NDArray[np.uint32]] = []
     fault = scan.fault
     try:
         for block in scan.blocks(channel):
-            if block.payloads.shape[1] != length:
-                raise LogError(f"a sample has {block.payloads.shape[1]} bytes instead of {length}")
-            blocks.append(block)
+            if block.payloads.shape[1] != template.length:
+                raise LogError(f"a sample has {block.payloads.shape[1]} bytes instead of {template.length}")
+            blocks.append(template.read(block.payloads))
+            numbers.append(block.sequence.copy())  # a view would keep the whole chunk
     except LogError as error:
         if not is_cut:
             raise
         fault = str(error)
-    sequence = np.concatenate([block.sequence for block in blocks]) if blocks else np.empty(0)
+    sequence = np.concatenate(numbers) if numbers else np.empty(0)
     if np.array_equal(sequence, np.arange(len(sequence))):
         return blocks, fault
     order = np.argsort(sequence, kind="stable")  # another program put them into another order, or some are missing
     known = int(np.argmin(np.append(sequence[order] == np.arange(len(order)), False)))
-    kept = order[:known]
-    whole = Block(*(np.concatenate(parts)[kept] for parts in zip(*blocks, strict=True)))
-    return [whole], fault or ("" if known == len(order) else f"sample {known} is missing")
+    return [np.concatenate(blocks)[order[:known]]], fault or (
+        "" if known == len(order) else f"sample {known} is missing"
+    )
 
 
 def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:

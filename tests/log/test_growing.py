@@ -81,6 +81,16 @@ def test_what_was_added_is_in_the_file_at_once(run: Run, tmp_path: Path) -> None
     sink.close()
 
 
+def test_a_sink_that_is_used_again_writes_the_file_anew(run: Run, tmp_path: Path) -> None:
+    sink = McapLog(tmp_path / "run.mcap")
+    for part in (run, run.part(slice(5, 50))):
+        sink.begin(without_samples(part))
+        for piece in pieces(part, 20):
+            sink.add(piece)
+        sink.end(part, "")
+        assert_same(part, read(tmp_path / "run.mcap"))
+
+
 def test_the_older_file_stays_until_the_first_samples(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(b"old")

@@ -1,0 +1,56 @@
+"""kinfmu simulate --channels, --rate: what is kept, none at all, and the names of the logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from kinfmu import log
+from tests.cli.conftest import Command
+
+
+def test_channels_and_rate_choose_what_is_kept(command: Command, tmp_path: Path) -> None:
+    result = command("simulate", "fourbar", "--channels", "q, residual", "--rate", "0.1")
+    assert result.exit_code == 0
+    run = log.read(tmp_path / "logs" / "fourbar.mcap")
+    assert run.t.tolist() == [10.0 * k for k in range(19)]
+    assert [column.name for column in run.columns()] == ["time", *run.names, "solver.status", "solver.residual"]
+    assert result.stdout.startswith("19 samples: ")
+
+
+def test_a_minus_leaves_out(command: Command, tmp_path: Path) -> None:
+    assert command("simulate", "fourbar", "--stop", "2", "--channels", "-error,-residual").exit_code == 0
+    run = log.read(tmp_path / "logs" / "fourbar.mcap")
+    assert run.absent == {"solver.residual", *(f"solver.error_{order}" for order in ("q", "qd", "qdd"))}
+
+
+def test_none_leaves_no_logs(command: Command, refuses: Callable[..., str], tmp_path: Path) -> None:
+    result = command("simulate", "fourbar", "--channels", "none")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("181 samples: ")
+    assert "nan" not in result.stdout
+    assert "written" not in result.stdout
+    assert not list(tmp_path.iterdir())
+    told = refuses("simulate", "fourbar", "--channels", "none", "--mcap", "run.mcap")
+    assert told == "--channels none keeps nothing to write to run.mcap"
+
+
+def test_wrong_channels_and_rates_are_wrong_usage(refuses: Callable[..., str]) -> None:
+    assert "channel 'resdual' is not known; did you mean 'residual'?" in refuses(
+        "simulate", "fourbar", "--channels", "q,resdual"
+    )
+    assert "0" in refuses("simulate", "fourbar", "--rate", "0")
+
+
+@pytest.mark.parametrize(
+    ("model", "name"), [("fourbar_chain:2", "fourbar_chain_2"), ("mine.toml", "mine"), ("other.fmu", "other")]
+)
+def test_logs_have_the_name_of_what_is_simulated(
+    model: str, name: str, command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    fourbar_file(name="mine.toml")
+    assert command("build", "fourbar", "-o", "other.fmu").exit_code == 0
+    assert command("simulate", model, "--stop", "1").exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == [f"{name}.mcap", f"{name}.rrd"]
