@@ -115,12 +115,16 @@ AT_FAULT = [
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return kinfmu.build(kinfmu.load("fourbar"), tmp_path_factory.mktemp("fmu") / "fourbar.fmu").read_bytes()
+def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """An FMU and a record, made once."""
+    path, mechanism = tmp_path_factory.mktemp("made"), kinfmu.load("fourbar")
+    kinfmu.build(mechanism, path / "fourbar.fmu")
+    kinfmu.log.write_mcap(kinfmu.solve(mechanism, [0.0, 1.0, 2.0]), path / "whole.mcap")
+    return {file.name: file.read_bytes() for file in path.iterdir()}
 
 
 @pytest.fixture
-def folder(tmp_path: Path, fmu: bytes) -> Path:
+def folder(tmp_path: Path, made: dict[str, bytes]) -> Path:
     """What is there: files with and without faults."""
     for name, text in FILES.items():
         if text is None:
@@ -130,8 +134,8 @@ def folder(tmp_path: Path, fmu: bytes) -> Path:
     fourbar = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")
     assert "length = 1\n" in fourbar
     (tmp_path / "contradicting.toml").write_text(fourbar.replace("length = 1\n", "length = 1.01\n"), encoding="utf-8")
-    (tmp_path / "fourbar.fmu").write_bytes(fmu)
-    kinfmu.log.write_mcap(kinfmu.solve(kinfmu.load("fourbar"), [0.0, 1.0, 2.0]), tmp_path / "whole.mcap")
+    for name, content in made.items():
+        (tmp_path / name).write_bytes(content)
     return tmp_path
 
 
