@@ -169,14 +169,17 @@ class _Linkage:
 
         if not len(self.good):
             return
-        look = rr.LineStrips2D.from_fields(
-            radii=[radius * self.size],
-            labels=[label] if label else None,
-            show_labels=self.named if label else None,
-            draw_order=self.layer + order,
-        )
-        self.rec.log(path, look, static=True)
+        look: dict[str, Any] = {
+            "radii": [radius * self.size],
+            "labels": [label] if label else None,
+            "show_labels": self.named if label else None,
+            "draw_order": self.layer + order,
+        }
         strip = [line.astype(np.float32)]
+        if self.run.good.all():
+            self.rec.log(path, rr.LineStrips2D(strip, colors=[colour], **look), static=True)
+            return
+        self.rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
         send(self.rec, path, self.run.t[self.good[:1]], lambda _: rr.LineStrips2D.columns(strips=strip))
         turns = self._turns()
         colours = np.array([colour if good else palette.OUT_OF_REACH for good in self.run.good[turns]], np.uint8)
@@ -207,11 +210,19 @@ class _Linkage:
 
         if not len(self.good):
             return
-        look = rr.Points2D.from_fields(
-            radii=[radius * self.size], colors=[colour], labels=names, show_labels=shown, draw_order=self.layer + order
-        )
-        self.rec.log(path, look, static=True)
-        columns = rr.Points2D.columns(positions=points.astype(np.float32)).partition([len(points)])
+        look: dict[str, Any] = {
+            "radii": [radius * self.size],
+            "colors": [colour],
+            "labels": names,
+            "show_labels": shown,
+            "draw_order": self.layer + order,
+        }
+        at = points.astype(np.float32)
+        if self.run.good.all():
+            self.rec.log(path, rr.Points2D(at, **look), static=True)
+            return
+        self.rec.log(path, rr.Points2D.from_fields(**look), static=True)
+        columns = rr.Points2D.columns(positions=at).partition([len(at)])
         send(self.rec, path, self.run.t[self.good[:1]], lambda _: columns)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ from kinfmu.shapes.pins import pins_of, supported
 from kinfmu.shapes.placing import poses_of, world
 
 LOOKS = 2000  # samples of a run that tell how far everything goes
-_ROOMY, _FINEST = 0.15, 0.5  # shortest link, as a part of the size, that needs no thinner lines; the thinnest
+_ROOMY, _FINEST = 0.15, 0.1  # shortest link, as a part of the size, that needs no thinner lines; the thinnest
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ class Scene:
         for body in self.bodies:
             lengths += np.hypot(*np.diff(body.outline, axis=0).T).tolist()
         shortest = min((length for length in lengths if length > 1e-3 * self.size), default=self.size)
-        return self.size * min(max(shortest / (_ROOMY * self.size), _FINEST), 1.0)
+        return self.size * math.sqrt(min(max(shortest / (_ROOMY * self.size), _FINEST**2), 1.0))
 
 
 def drawable(run: Run) -> tuple[Scene | None, str]:

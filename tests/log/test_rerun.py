@@ -35,17 +35,22 @@ def rows(path: Path, entity: str, component: str) -> list[tuple[int, list[object
     return sorted(found, key=lambda row: row[0])
 
 
-def documents(path: Path, entity: str) -> list[str]:
-    """The texts of a card."""
+def statics(path: Path, entity: str, component: str) -> list[object]:
+    """What of an entity's component holds at all times."""
     import rerun as rr
 
-    return [
-        text
-        for chunk in rr.chunk.RrdReader(path).stream()
-        if chunk.entity_path == entity
-        for row in chunk.to_record_batch()["TextDocument:text"].to_pylist()
-        for text in row
-    ]
+    found = []
+    for chunk in rr.chunk.RrdReader(path).stream():
+        if chunk.entity_path == entity and chunk.is_static:
+            batch = chunk.to_record_batch()
+            if component in batch.schema.names:
+                found += [value for row in batch[component].to_pylist() for value in row]
+    return found
+
+
+def documents(path: Path, entity: str) -> list[str]:
+    """The texts of a card."""
+    return [str(text) for text in statics(path, entity, "TextDocument:text")]
 
 
 def entities(path: Path) -> set[str]:
@@ -90,7 +95,7 @@ def test_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
 def test_links_stand_where_the_run_says(run: Run, tmp_path: Path) -> None:
     write_rrd(run, tmp_path / "run.rrd")
     path = tmp_path / "run.rrd"
-    ((_, (line,)),) = rows(path, "/linkage/bodies/crank", STRIPS)
+    (line,) = statics(path, "/linkage/bodies/crank", STRIPS)
     np.testing.assert_allclose(line, [[0, 0], [1, 0]])
     for entity, angle, x, y in (("crank", "crank.phi", 0.0, 0.0), ("coupler", "coupler.phi", None, None)):
         shifts = dict(rows(path, f"/linkage/bodies/{entity}", "Transform3D:translation"))
