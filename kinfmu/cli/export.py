@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import names_in
+from kinfmu.cli.arguments import TIME, names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
-from kinfmu.errors import listed
+from kinfmu.errors import RequestError, listed
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -43,6 +44,20 @@ FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
     ".png": _plot,
     ".gif": _animation,
 }
+
+
+def _between(run: Run, start: float | None, stop: float | None) -> Run:
+    """The samples from start to stop [s], both included; all where nothing is said."""
+    if start is None and stop is None:
+        return run
+    first, last = -math.inf if start is None else start, math.inf if stop is None else stop
+    rows = (run.t >= first) & (run.t <= last)
+    if not rows.any():
+        told = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run) else "none"
+        raise RequestError(f"--start, --stop: the run has no samples from {first:g} to {last:g} s; its samples: {told}")
+    return run.part(rows, events=tuple(event for event in run.events if first <= event.t <= last))
+
+
 PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
 
 
@@ -56,7 +71,9 @@ PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
     help=f"The file to write: {listed(FORMATS)}.",
 )
 @click.option("--columns", metavar="NAMES", help="Coordinates to plot, such as coupler.x,rocker.phi; else those of q.")
-def export(run: Path, output: Path, columns: str | None) -> None:
+@click.option("--start", type=TIME, help="Only samples from then on [s].")
+@click.option("--stop", type=TIME, help="Only samples until then [s].")
+def export(run: Path, output: Path, columns: str | None, start: float | None, stop: float | None) -> None:
     """Write a run as a table, as plots, or as a moving picture.
 
     RUN is a record (.mcap) of simulate. A table holds everything; Parquet and npz the units, too. Plots (.svg, .png)
@@ -67,5 +84,5 @@ def export(run: Path, output: Path, columns: str | None) -> None:
     suffix = output.suffix.lower()
     if columns is not None and suffix not in PLOTS:
         raise click.UsageError(f"--columns {columns}: chooses what is plotted, into {listed(PLOTS)}, not {suffix}")
-    FORMATS[suffix](read(run), output, names_in(columns) or ())
+    FORMATS[suffix](_between(read(run), start, stop), output, names_in(columns) or ())
     click.echo(f"written: {output}")

@@ -67,3 +67,14 @@ def test_columns_are_for_plots(record: Path, refuses: Callable[..., str], fails:
     assert "--columns coupler.x: chooses what is plotted, into .svg, .png, not .csv" in told
     told = fails("export", record, "-o", "run.svg", "--columns", "cupler.x")
     assert "run.svg: the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?" in told
+
+
+def test_a_part_of_a_run_is_exported(
+    record: Path, command: Command, tmp_path: Path, refuses: Callable[..., str]
+) -> None:
+    assert command("export", record, "-o", "run.csv", "--start", "30", "--stop", "60s").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(30, 61))
+    assert command("export", record, "-o", "run.csv", "--start", "175").exit_code == 0
+    assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(175, 181))
+    told = refuses("export", record, "-o", "run.csv", "--start", "181")
+    assert "the run has no samples from 181 to inf s; its samples: 0 to 180 s" in told
