@@ -42,6 +42,7 @@ REST = 1.0  # [s] that the last picture of a motion that does not come back stan
 _SAMPLES = 1000  # of the run; paths show no more
 _CLOSED = 1e-3  # of a body's way over the run; a motion that ends so near to where it began repeats
 _TRAIL = 0.12  # of the pictures, over which the trail reaches back
+_FARTHEST = 0.5 * math.pi  # [rad] that a body may turn from picture to picture
 _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
 _LOST: palette.Colour = (185, 28, 28)
 
@@ -61,8 +62,9 @@ def animate(run: Run, path: str | Path) -> None:
     ends where it began repeats without a stop. Samples without numbers show the last pose that closed, and say so. The
     same run gives the same bytes with the same matplotlib and Pillow.
 
-    Raises FigureError if the run does not hold its mechanism or coordinates of it, or has fewer than two samples with
-    numbers, and for files that cannot be written; MissingPackageError without matplotlib.
+    Raises FigureError if the run does not hold its mechanism or coordinates of it, has fewer than two samples with
+    numbers or too many turns for its pictures, and for files that cannot be written; MissingPackageError without
+    matplotlib.
     """
     path = Path(path)
     if path.suffix.lower() != ".gif":
@@ -99,8 +101,22 @@ def _film(run: Run, poses: dict[str, FloatArray], path: Path) -> _Film:
     seconds = float(np.clip(t[-1] - t[0], SHORTEST, LONGEST))
     times = np.linspace(t[0], t[-1], min(round(PER_SECOND * seconds), MOST) + 1)
     rows = good[0] + np.unique(np.searchsorted(t, times, side="right") - 1)
+    if len(rows) < len(t):
+        _check_seen(run, poses, rows, path)
     repeats = bool(run.good[[rows[0], rows[-1]]].all()) and all(_comes_back(pose[rows]) for pose in poses.values())
     return _Film(rows[:-1] if repeats else rows, seconds, repeats)
+
+
+def _check_seen(run: Run, poses: dict[str, FloatArray], rows: NDArray[np.int64], path: Path) -> None:
+    """Raise a FigureError if a body turns so far from picture to picture that it seems to go another way."""
+    steps = {body: float(np.abs(np.diff(pose[rows, 2])).max()) for body, pose in poses.items()}
+    body = max(steps, key=lambda name: steps[name])
+    if steps[body] > _FARTHEST:
+        part = float(run.t[rows[-1]] - run.t[rows[0]]) * _FARTHEST / steps[body]
+        raise FigureError(
+            f"{path}: '{body}' turns by {math.degrees(steps[body]):.0f} deg from one of {len(rows)} pictures to the "
+            f"next, so that its motion would not be seen; choose a part of the run, no longer than {part:.3g} s"
+        )
 
 
 def _comes_back(pose: FloatArray) -> bool:

@@ -72,6 +72,17 @@ def test_a_motion_that_does_not_come_back_rests_at_its_end(tmp_path: Path) -> No
     assert not film.repeats
 
 
+def test_more_turns_than_pictures_can_show_are_refused_with_what_they_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), np.arange(0.0, 8.1, 0.0625))  # 4 turns
+    message = r"run\.gif: 'crank' turns by 24\d deg from one of 7 pictures to the next, .* no longer than 2\.9\d s$"
+    with pytest.raises(FigureError, match=message):
+        animate(run, tmp_path / "run.gif")
+    monkeypatch.setattr(animation, "MOST", 20)
+    animate(run, tmp_path / "run.gif")
+
+
 def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
     run = with_gap(fourbar(np.arange(181.0)), 100, 120)
     _, poses = _placed(run, tmp_path)
