@@ -54,7 +54,8 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     differences = groups(apart) if apart else {}
     curves = [groups(run) for run in shown]
     layout = compared((shown[0], shown[1]), scenes, curves, differences)
-    with recording(path, f"{names[0]} and {names[1]}", layout, application(*shown)) as rec:
+    own_name = application(shown, [group for found in (*curves, differences) for group in found.values()])
+    with recording(path, f"{names[0]} and {names[1]}", layout, own_name) as rec:
         for run, drawn, scene, own, look in zip((a, b), shown, scenes, curves, _LOOKS, strict=True):
             if scene:
                 log_linkage(rec, f"{look.root}/linkage", drawn, scene, look.colour, look.bars, look.layer)

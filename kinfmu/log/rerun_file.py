@@ -17,7 +17,7 @@ of the same mechanism and time, are of one application, and what a person arrang
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,7 +60,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(shown, scene, curves, solver), application(run)) as rec:
+    with recording(path, name, single(shown, scene, curves, solver), application([shown], curves.values())) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
             log_linkage(rec, "/linkage", shown, scene)
@@ -77,9 +77,9 @@ def left_out(run: Run, shown: Run) -> list[str]:
     return [f"{len(shown)} of {len(run)} samples are drawn, peaks and gaps among them; the MCAP holds all."]
 
 
-def application(*runs: Run) -> str:
-    """Name of the application that recordings of such runs belong to, such as 'kinfmu_fourbar_12ab34cd'."""
-    ranges = [[group.shown for group in groups(run).values()] for run in runs]
+def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
+    """Name of the application that recordings of such runs and curves belong to, such as 'kinfmu_fourbar_12ab34cd'."""
+    ranges = [(group.path, group.shown) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
     facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, bool(happenings(run))) for run in runs]))
     names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
