@@ -77,7 +77,7 @@ def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
 def test_most_samples_go_side_by_side() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     told = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
-    assert told.side_by_side == SAMPLES // 256 * 256  # all that fill the lanes
+    assert told.side_by_side == SAMPLES // 64 * 64  # all that fill the lanes
     assert (told.status == 0).all()
 
 

@@ -6,6 +6,8 @@
 #ifndef KF_LANES_H
 #define KF_LANES_H
 
+#include <math.h>
+
 #include "kinfmu.h"
 #include "lane_sizes.h"
 #include "sincos.h"
@@ -18,28 +20,42 @@
 #define KF_SIDE_BY_SIDE
 #endif
 
-/* As many lanes as the first caches hold. */
-#define KF_LANES (KF_COORDINATES <= 64 ? 256 : 32)
+#define KF_LANES (KF_COORDINATES <= 64 ? 64 : 32) /* as many as the first caches hold */
+#define KF_VECTOR 8 /* lanes that are predicted at once, and may be past the last one */
 
-/* x, x1, x2, outputs: where the numbers of each coordinate and of each output that is a formula go: rooms of their own, or
- * straight into a table.
+/* z, sine, cosine: predicted unknowns, and sine and cosine of angles, which are corrected where they stand. hold: what units
+ * hand on. rows: room for KF_LANES rows of a table.
  */
 typedef struct {
-    double *x[KF_COORDINATES], *x1[KF_COORDINATES], *x2[KF_COORDINATES];
-    double *outputs[3][KF_ROOM(KF_OUTPUTS)];
+    double x[KF_COORDINATES][KF_LANES], x1[KF_COORDINATES][KF_LANES], x2[KF_COORDINATES][KF_LANES];
+    double outputs[3][KF_ROOM(KF_OUTPUTS)][KF_LANES];
+    double z[KF_ROOM(KF_UNKNOWNS)][KF_LANES + KF_VECTOR];
+    double angles[2][KF_UNKNOWNS + 1][KF_LANES + KF_VECTOR]; /* sines and cosines: of unknown angles, and of the driver's */
+    double *sine[KF_COORDINATES], *cosine[KF_COORDINATES]; /* of each coordinate; NULL: not predicted */
     double hold[KF_ROOM(KF_LANE_HOLD)][KF_LANES];
     double watches[KF_ROOM(KF_WATCHES)][KF_LANES];
     double error[KF_LANES];  /* largest of the blocks' squared residuals, relative to the size */
     double margin[KF_LANES]; /* smallest |determinant| */
     double moved[KF_LANES];  /* correction of the prediction, in radians and sizes */
-    double coordinate_rooms[3][KF_COORDINATES][KF_LANES];
-    double output_rooms[3][KF_ROOM(KF_OUTPUTS)][KF_LANES];
+    double rows[KF_ROOM(KF_OUTPUTS) * KF_LANES];
 } kf_lanes;
 
-/* From predictions in x (and speeds and accelerations of the drivers at the ends of x1 and x2) to the motion. Generated.
- * full: with rates and accelerations.
+/* Generated. Where sine and cosine of each coordinate stand among those of unknown angles and, last, of the driver's; -1:
+ * they are not predicted.
  */
-void kf_lanes_solve(const kf_model *model, kf_lanes *lanes, bool full);
+extern const int kf_lane_angles[KF_COORDINATES];
+
+/* From predictions to positions, residuals and watches; and from there, with speeds and accelerations of the drivers at the
+ * ends of x1 and x2, to rates and accelerations. held: blocks whose unknowns are given in x, x1, x2; NULL: none. Generated.
+ */
+void kf_lanes_position(const kf_model *model, kf_lanes *lanes, const bool *held);
+void kf_lanes_motion(const kf_model *model, kf_lanes *lanes, const bool *held);
+
+#ifdef FP_FAST_FMA
+#define KF_FMA(a, b, c) fma(a, b, c)
+#else
+#define KF_FMA(a, b, c) ((a) * (b) + (c))
+#endif
 
 static inline double kf_sin(double x)
 {
@@ -55,15 +71,31 @@ static inline double kf_cos(double x)
     return cosine;
 }
 
-/* Sine and cosine of an angle that changes by a small step, below 1e-2. */
+/* Sine and cosine of an angle that changes by a small step, below 2e-3. */
 static inline void kf_rotate(double step, double *sine, double *cosine)
 {
     const double square = step * step;
-    const double ds = step * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)));
-    const double dc = -square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
+    const double ds = step - step * square * (1.0 / 6.0);
+    const double dc = square * (square * (1.0 / 24.0) - 0.5);
     const double s = *sine, c = *cosine;
     *sine = s + (s * dc + c * ds);
     *cosine = c + (c * dc - s * ds);
+}
+
+/* The same for a step of up to pi/4, by fdlibm's polynomials, from s and c. */
+static inline void kf_turn(double step, double s, double c, double *sine, double *cosine)
+{
+    const double z = step * step;
+    const double p = KF_FMA(z, KF_FMA(z, KF_FMA(z, KF_FMA(z, KF_FMA(z, 1.58969099521155010221e-10,
+        -2.50507602534068634195e-08), 2.75573137070700676789e-06), -1.98412698298579493134e-04),
+        8.33333333332248946124e-03), -1.66666666666666324348e-01);
+    const double r = KF_FMA(z, KF_FMA(z, KF_FMA(z, KF_FMA(z, KF_FMA(z, -1.13596475577881948265e-11,
+        2.08757232129817482790e-09), -2.75573143513906633035e-07), 2.48015872894767294178e-05),
+        -1.38888888888741095749e-03), 4.16666666666666019037e-02);
+    const double ds = KF_FMA(step * z, p, step);
+    const double dc = z * KF_FMA(z, r, -0.5); /* cosine of the step, less 1 */
+    *sine = s + KF_FMA(s, dc, c * ds);
+    *cosine = c + KF_FMA(c, dc, -s * ds);
 }
 
 #endif

@@ -1,0 +1,23 @@
+/* Follower: a solver that goes from one good pose to the next. */
+#ifndef KF_FOLLOWER_H
+#define KF_FOLLOWER_H
+
+#include "solver.h"
+
+/* poses: the last good one, if any was found since the start, and one to be tried. */
+typedef struct {
+    kf_solver solver;
+    kf_pose poses[2];
+    int here;
+    bool started;
+} kf_follower;
+
+/* Solve at driver values from the last good pose, or from the anchor; the pose found is the last good one from now on, if
+ * it is good.
+ */
+kf_pose *kf_followed(kf_follower *follower, const double *u);
+
+/* Start again from the anchor. */
+void kf_restart(kf_follower *follower);
+
+#endif

@@ -1,0 +1,369 @@
+/* Segments: what is known of the motion between nodes. See segments.h. */
+#include "segments.h"
+
+#include <stdlib.h>
+
+#include "way.h"
+
+#define SEGMENTS 16       /* in a turn */
+#define TURN 6.283185307179586
+#define HIGH 6.2831853069365025     /* [rad]; 2 pi to 32 bits, as in turns.c */
+#define LOW 2.430840202602477e-10   /* [rad]; the rest */
+#define SAME 1e-9         /* difference of poses that are a turn apart */
+#define SURE 0.05         /* determinant from which nodes count as regular */
+#define MOST_MEMORY 1e8   /* [bytes] for segments on either side of the anchor */
+#define STEEP 0.78        /* [rad]; up to here sines and cosines are turned by polynomials */
+
+#if KF_HAS_LANES
+
+typedef struct {
+    bool is_good;
+    double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
+} kf_node;
+
+/* The driver value of a node; every other node is the centre of a segment. */
+static double node_place(const kf_segments *segments, int64_t number)
+{
+    return kf_anchor_u[0] + (double)number * (0.5 * segments->width);
+}
+
+/* The polynomial of a bridge's window: that of kf_span_read, in powers of x. */
+static void read_bridge(kf_window *window, const kf_bridge *bridge, const kf_span *span)
+{
+    static const double places[4] = {-2.0, -1.0, 1.0, 2.0};
+    const double half = span->half;
+    int i, j, k;
+    window->low = bridge->u[2];
+    window->high = bridge->u[3];
+    window->centre = bridge->centre;
+    window->half = half;
+    memcpy(window->held, span->held, sizeof window->held);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        const double from = span->z[2][k];
+        double samples[4][3], powers[KF_WINDOW_TERMS] = {0.0};
+        kf_hermite polynomial;
+        for (i = 0; i < 4; ++i) {
+            samples[i][0] = span->z[i + 1][k] - from;
+            samples[i][1] = span->zd[i + 1][k] * half;
+            samples[i][2] = span->zdd[i + 1][k] * half * half;
+        }
+        kf_hermite_through(4, places, (const double(*)[3])samples, &polynomial);
+        for (i = KF_WINDOW_TERMS - 1; i >= 0; --i) { /* times x - node, plus the next coefficient */
+            for (j = KF_WINDOW_TERMS - 1; j > 0; --j) {
+                powers[j] = powers[j - 1] - polynomial.nodes[i] * powers[j];
+            }
+            powers[0] = polynomial.coefficients[i] - polynomial.nodes[i] * powers[0];
+        }
+        window->base[k] = kf_turned(from + powers[0], bridge->turns == 0.0 ? 0.0 : bridge->raised[k]);
+        for (j = 1; j < KF_WINDOW_TERMS; ++j) {
+            window->c[j - 1][k] = powers[j];
+        }
+    }
+}
+
+/* Windows of the bridges that a pose has met on its way. */
+static void collect(kf_segments *segments, const kf_solver *solver, const kf_pose *pose)
+{
+    const kf_road *const road = &solver->roads[pose->road < 0 ? 0 : pose->road];
+    int i, k;
+    for (k = 0; pose->road >= 0 && k < road->bridges && segments->window_count < KF_WINDOWS; ++k) {
+        const kf_bridge *const bridge = &solver->bridges[road->bridge[k]];
+        for (i = 0; i < segments->window_count && segments->windows[i].centre != bridge->centre; ++i) {
+        }
+        if (i == segments->window_count) {
+            read_bridge(&segments->windows[i], bridge, &solver->spans[bridge->span]);
+            ++segments->window_count;
+        }
+    }
+}
+
+static bool take_node(kf_segments *segments, kf_follower *follower, int64_t number, kf_node *node)
+{
+    const double u = node_place(segments, number);
+    kf_pose *const pose = kf_followed(follower, &u);
+    if (!KF_GOOD(pose->status)) {
+        return false;
+    }
+    collect(segments, &follower->solver, pose);
+    node->is_good = pose->status == KF_OK && pose->found.margin >= SURE;
+    if (node->is_good) {
+        kf_tangent(&follower->solver.model, pose);
+        memcpy(node->z, pose->found.x, sizeof node->z);
+        memcpy(node->zd, pose->x1, sizeof node->zd);
+        memcpy(node->zdd, pose->x2, sizeof node->zdd);
+    }
+    return true;
+}
+
+/* The polynomial of degree 8 through value, slope and curvature at x = -1, 0, 1; past a change point the motion is as smooth
+ * as elsewhere. half: of the width.
+ *
+ * rest, slope, curve: what the terms from the third on are to give at either end, in odd and in even powers.
+ */
+static void join(const kf_node *a, const kf_node *middle, const kf_node *b, double centre, double half, kf_segment *segment)
+{
+    double(*const c)[KF_ROOM(KF_UNKNOWNS)] = segment->c;
+    int j, k;
+    segment->is_plain = a->is_good && middle->is_good && b->is_good;
+    segment->centre = centre;
+    segment->sine[KF_UNKNOWNS] = sin(centre);
+    segment->cosine[KF_UNKNOWNS] = cos(centre);
+    for (k = 0; k < KF_UNKNOWNS && segment->is_plain; ++k) {
+        const double z = middle->z[k], v = middle->zd[k] * half, w = 0.5 * middle->zdd[k] * half * half;
+        const double before = a->z[k] - z + v - w, after = b->z[k] - z - v - w;
+        const double slope_before = a->zd[k] * half - v + 2.0 * w, slope_after = b->zd[k] * half - v - 2.0 * w;
+        const double curve_before = a->zdd[k] * half * half - 2.0 * w, curve_after = b->zdd[k] * half * half - 2.0 * w;
+        const double odd = 0.5 * (after - before), even = 0.5 * (after + before);
+        const double odd_slope = 0.5 * (slope_after + slope_before), even_slope = 0.5 * (slope_after - slope_before);
+        const double odd_curve = 0.5 * (curve_after - curve_before), even_curve = 0.5 * (curve_after + curve_before);
+        double most = 0.0;
+        segment->base[k] = z;
+        segment->sine[k] = sin(z);
+        segment->cosine[k] = cos(z);
+        c[0][k] = v;
+        c[1][k] = w;
+        c[6][k] = (odd_curve - 7.0 * odd_slope + 15.0 * odd) / 8.0;
+        c[4][k] = (odd_slope - 3.0 * odd) / 2.0 - 2.0 * c[6][k];
+        c[2][k] = odd - c[4][k] - c[6][k];
+        c[7][k] = (even_curve - 9.0 * even_slope + 24.0 * even) / 8.0;
+        c[5][k] = (even_slope - 4.0 * even) / 2.0 - 2.0 * c[7][k];
+        c[3][k] = even - c[5][k] - c[7][k];
+        for (j = 0; j < KF_TERMS - 1; ++j) {
+            most += fabs(c[j][k]);
+        }
+        segment->is_steep[k] = !(most <= STEEP);
+    }
+}
+
+/* Follow nodes from the anchor in one direction, up to segment `last` or as far as poses can be reached: true if all can.
+ * nodes: room for four; the first and the last one stand there afterwards.
+ */
+static bool lay(kf_segments *segments, kf_follower *follower, int64_t last, kf_node nodes[4])
+{
+    const int64_t side = last >= 0 ? 1 : -1;
+    int64_t number;
+    kf_restart(follower);
+    if (!take_node(segments, follower, 0, &nodes[0])) {
+        return false;
+    }
+    nodes[3] = nodes[0];
+    for (number = 0; number != last; number += side) {
+        kf_segment *const segment = &segments->segments[(side > 0 ? number : number - 1) - segments->first];
+        nodes[1] = nodes[3];
+        if (!take_node(segments, follower, 2 * number + side, &nodes[2])
+            || !take_node(segments, follower, 2 * number + 2 * side, &nodes[3])) {
+            return false;
+        }
+        join(&nodes[side > 0 ? 1 : 3], &nodes[2], &nodes[side > 0 ? 3 : 1], node_place(segments, 2 * number + side),
+             0.5 * segments->width, segment);
+    }
+    return true;
+}
+
+static bool make_room(kf_segments *segments, int64_t first, int64_t last)
+{
+    segments->first = first;
+    segments->count = last - first;
+    segments->window_count = 0;
+    free(segments->segments);
+    segments->segments = calloc((size_t)segments->count, sizeof *segments->segments);
+    return segments->segments != NULL;
+}
+
+/* True if the mechanism is after a turn of the driver as it was before, but for whole turns of its angles. */
+static bool is_repeated(kf_segments *segments, const kf_node *a, const kf_node *b)
+{
+    int k;
+    if (!a->is_good || !b->is_good) {
+        return false;
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        const double turns = kf_unknown_is_angle[k] ? rint((b->z[k] - a->z[k]) / TURN) : 0.0;
+        const double scale = kf_unknown_scales[k];
+        segments->raised[k] = turns;
+        if (!(fabs(b->z[k] - a->z[k] - turns * TURN) <= SAME * scale)
+            || !(fabs(b->zd[k] - a->zd[k]) <= 1e3 * SAME * scale)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Smallest and largest of the anchor and of driver values, those that are numbers. */
+static void range(int64_t count, const double *u, double *low, double *high)
+{
+    double lows[KF_VECTOR], highs[KF_VECTOR];
+    int64_t k;
+    int i;
+    for (i = 0; i < KF_VECTOR; ++i) {
+        lows[i] = highs[i] = kf_anchor_u[0];
+    }
+    for (k = 0; k + KF_VECTOR <= count; k += KF_VECTOR) {
+        for (i = 0; i < KF_VECTOR; ++i) {
+            lows[i] = u[k + i] < lows[i] ? u[k + i] : lows[i];
+            highs[i] = u[k + i] > highs[i] ? u[k + i] : highs[i];
+        }
+    }
+    for (; k < count; ++k) {
+        lows[0] = u[k] < lows[0] ? u[k] : lows[0];
+        highs[0] = u[k] > highs[0] ? u[k] : highs[0];
+    }
+    *low = lows[0];
+    *high = highs[0];
+    for (i = 1; i < KF_VECTOR; ++i) {
+        *low = lows[i] < *low ? lows[i] : *low;
+        *high = highs[i] > *high ? highs[i] : *high;
+    }
+}
+
+bool kf_segments_lay(kf_segments *segments, kf_follower *follower, int64_t count, const double *u)
+{
+    const double width = TURN / SEGMENTS * kf_reach[0];
+    const double most = fmin(floor(MOST_MEMORY / sizeof *segments->segments), KF_FARTHEST * kf_reach[0] / width);
+    kf_node *const nodes = malloc(4 * sizeof *nodes);
+    double low, high;
+    bool done = nodes != NULL;
+    segments->width = width;
+    range(count, u, &low, &high);
+    low = (low - kf_anchor_u[0]) / width;
+    high = (high - kf_anchor_u[0]) / width;
+    segments->repeats = KF_REPEATS && kf_driver_is_angle[0] && high - low > SEGMENTS && done
+        && make_room(segments, 0, SEGMENTS) && lay(segments, follower, SEGMENTS, nodes)
+        && is_repeated(segments, &nodes[0], &nodes[3]);
+    if (done && !segments->repeats) {
+        low = floor(fmax(low, -most));
+        high = ceil(fmin(high, most));
+        done = make_room(segments, (int64_t)low, (int64_t)(high > low ? high : low + 1.0));
+        if (done) {
+            lay(segments, follower, (int64_t)high, nodes);
+            lay(segments, follower, (int64_t)low, nodes);
+        }
+    }
+    kf_restart(follower);
+    free(nodes);
+    return done;
+}
+
+void kf_segments_free(kf_segments *segments)
+{
+    free(segments->segments);
+}
+
+double kf_turns_after(const kf_segments *segments, double u)
+{
+    return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
+}
+
+/* A run of lanes in one segment, from `from` on, `count` rounded up to whole vectors. */
+static void predict_run(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
+                        int count, kf_lanes *lanes)
+{
+    const double per_half = 2.0 / segments->width, high = turns * HIGH, low = turns * LOW;
+    double x[KF_LANES + KF_VECTOR];
+    int i, k;
+    count = (count + KF_VECTOR - 1) / KF_VECTOR * KF_VECTOR;
+    if (kf_driver_is_angle[0]) {
+        const double s = segment->sine[KF_UNKNOWNS], c = segment->cosine[KF_UNKNOWNS];
+        double *const sine = lanes->angles[0][KF_UNKNOWNS] + from;
+        double *const cosine = lanes->angles[1][KF_UNKNOWNS] + from;
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < count; ++i) {
+            const double step = u[from + i] - high - segment->centre - low;
+            x[i] = step * per_half;
+            kf_turn(step, s, c, &sine[i], &cosine[i]);
+        }
+    } else {
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < count; ++i) {
+            x[i] = (u[from + i] - segment->centre) * per_half;
+        }
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        const double c0 = segment->c[0][k], c1 = segment->c[1][k], c2 = segment->c[2][k], c3 = segment->c[3][k];
+        const double c4 = segment->c[4][k], c5 = segment->c[5][k], c6 = segment->c[6][k], c7 = segment->c[7][k];
+        const double base = turns == 0.0 ? segment->base[k] : kf_turned(segment->base[k], turns * segments->raised[k]);
+        const double s = segment->sine[k], c = segment->cosine[k];
+        double *const z = lanes->z[k] + from;
+        double *const sine = lanes->angles[0][k] + from, *const cosine = lanes->angles[1][k] + from;
+        const bool turns_on = kf_unknown_is_angle[k] && !segment->is_steep[k];
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < count; ++i) {
+            const double at = x[i];
+            const double p = KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, c7, c6), c5), c4),
+                c3), c2), c1), c0) * at;
+            z[i] = base + p;
+            if (turns_on) {
+                kf_turn(p, s, c, &sine[i], &cosine[i]);
+            }
+        }
+        if (kf_unknown_is_angle[k] && segment->is_steep[k]) {
+            KF_SIDE_BY_SIDE
+            for (i = 0; i < count; ++i) {
+                kf_sincos(z[i], &sine[i], &cosine[i]);
+            }
+        }
+    }
+}
+
+void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, int32_t *alone)
+{
+    const double begin = kf_anchor_u[0] + (double)segments->first * segments->width;
+    const double per_width = 1.0 / segments->width, farthest = KF_FARTHEST * kf_reach[0];
+    const double last = segments->repeats ? INFINITY : (double)segments->count;
+    const double least = segments->repeats ? -INFINITY : 0.0;
+    double own[KF_LANES + KF_VECTOR] = {0.0}, number[KF_LANES];
+    int i, from, to;
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_LANES; ++i) {
+        const double place = __builtin_floor((u[i] - begin) * per_width);
+        const bool is_within = (place >= least) & (place < last) & (fabs(u[i]) < farthest);
+        own[i] = u[i];
+        alone[i] = !is_within;
+        number[i] = is_within ? place : 0.0;
+    }
+    for (from = 0; from < KF_LANES; from = to) {
+        const double turns = segments->repeats ? floor(number[from] / SEGMENTS) : 0.0;
+        const kf_segment *const segment = &segments->segments[(int64_t)(number[from] - SEGMENTS * turns)];
+        for (to = from + 1; to < KF_LANES && number[to] == number[from]; ++to) {
+        }
+        for (i = from; i < to && !segment->is_plain; ++i) {
+            alone[i] = 1;
+        }
+        predict_run(segments, segment, turns, own, from, to - from, lanes);
+    }
+}
+
+void kf_window_read(const kf_segments *segments, const kf_window *window, const double *u, const double *turns,
+                    kf_lanes *lanes)
+{
+    const double *const ud = lanes->x1[KF_COORDINATES - 1], *const udd = lanes->x2[KF_COORDINATES - 1];
+    const double per_half = 1.0 / window->half;
+    int i, j, k;
+    for (i = 0; i < KF_LANES; ++i) {
+        kf_sincos(u[i], &lanes->angles[0][KF_UNKNOWNS][i], &lanes->angles[1][KF_UNKNOWNS][i]);
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_LANES; ++i) {
+            const double x = (u[i] - window->centre) * per_half;
+            double z = 0.0, zd = 0.0, zdd = 0.0;
+            for (j = KF_WINDOW_TERMS - 2; j >= 0; --j) {
+                zdd = zdd * x + 2.0 * zd;
+                zd = zd * x + z;
+                z = z * x + window->c[j][k];
+            }
+            zdd = zdd * x + 2.0 * zd;
+            zd = (zd * x + z) * per_half;
+            zdd *= per_half * per_half;
+            z = window->base[k] + z * x;
+            kf_sincos(z, &lanes->angles[0][k][i], &lanes->angles[1][k][i]);
+            z += turns[i] * segments->raised[k] * HIGH + turns[i] * segments->raised[k] * LOW;
+            lanes->z[k][i] = z;
+            lanes->x[k][i] = z;
+            lanes->x1[k][i] = zd * ud[i];
+            lanes->x2[k][i] = zdd * ud[i] * ud[i] + zd * udd[i];
+        }
+    }
+}
+
+#endif
