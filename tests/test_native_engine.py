@@ -81,6 +81,43 @@ def test_most_samples_go_side_by_side() -> None:
     assert (told.status == 0).all()
 
 
+def test_windows_of_bridges_are_read_side_by_side() -> None:
+    u = 0.3 + np.arange(64 * 60) * (np.pi / 180.0)
+    plan = compile_plan(kinfmu.load("fourbar"), ("coupler.x", "rocker.phi"))
+    values, rates, accelerations = (np.empty((len(u), 2)) for _ in range(3))
+    speed, acceleration = np.sin(u), np.cos(3.0 * u)
+    inputs = (u[:, None], speed[:, None], acceleration[:, None])
+    told = library.Library(plan).sweep(inputs, (values, rates, accelerations))
+    assert told.side_by_side > len(u) - 2 * 8  # in either window few may be left over
+    assert 90 <= (told.status == 2).sum() <= 150  # at 21 change points windows of 0.1 rad: five or six samples each
+    np.testing.assert_allclose(values, np.stack([1.0 + np.cos(u), u], axis=1), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rates, np.stack([-np.sin(u) * speed, speed], axis=1), rtol=0, atol=1e-10)
+    exact = np.stack([-np.cos(u) * speed**2 - np.sin(u) * acceleration, acceleration], axis=1)
+    np.testing.assert_allclose(accelerations, exact, rtol=0, atol=1e-8)
+    assert told.residual.max() <= 1e-12
+
+
+def test_more_stretches_than_are_told_one_by_one_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "MOST_FAILURES", 2)
+    plan = compile_plan(kinfmu.load("triple_rocker"))
+    u = np.where(np.arange(SAMPLES) % 100 < 50, 1.0, 9.0)
+    failures = library.Library(plan).sweep(driven(u), tables(plan.outputs)).failures
+    assert [sample for sample, _ in failures] == [50, 150, 250]
+    assert failures[-1][1] == "9 more stretches without numbers begin here or later: 2 are told"
+
+
+def test_memory_that_runs_out_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    compiled = library.Library(plan)
+    for name, nothing in (("kf_sweep_run", False), ("kf_sweep_new", None)):
+        with monkeypatch.context() as patch:
+            patch.setattr(compiled._library, name, lambda *_, nothing=nothing: nothing)
+            with pytest.raises(
+                KinfmuError, match=f"no memory is left for a sweep of {SAMPLES} samples of 'crank_rocker'"
+            ):
+                compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs))
+
+
 def test_what_lies_past_a_limit_is_told_and_the_branch_comes_back() -> None:
     mechanism = kinfmu.load("triple_rocker")
     u = np.concatenate([np.linspace(0.9, 4.0, 700), np.linspace(4.0, 0.9, 700)])

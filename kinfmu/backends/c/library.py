@@ -15,6 +15,7 @@ from kinfmu.backends.c.lanes import emit_lanes
 from kinfmu.backends.c.model import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
+from kinfmu.solver.status import Status
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -58,7 +59,7 @@ class _Job(ctypes.Structure):
 @dataclass(frozen=True, eq=False)
 class Told:
     """What a sweep tells besides its tables: see Run. failures: first sample and message of each stretch without
-    numbers; side_by_side: how many samples were solved in lanes.
+    numbers, and after MOST_FAILURES of them how many more there are; side_by_side: how many samples went through lanes.
     """
 
     status: IntArray
@@ -114,14 +115,8 @@ class Library:
         NaN.
         """
         count, watches = len(driven[0]), len(self.plan.watches)
-        told = Told(
-            np.empty(count, dtype=np.int64),
-            np.empty(count, dtype=np.int64),
-            np.empty(count),
-            np.empty((count, watches)),
-            (),
-            0,
-        )
+        whole = np.empty((2, count), dtype=np.int64)  # in one piece: malloc keeps it for the next sweep
+        told = Told(whole[0], whole[1], np.empty(count), np.empty((count, watches)), (), 0)
         failures = np.zeros(MOST_FAILURES, dtype=np.int64)
         messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
         job = self._job(driven, tables)
@@ -129,13 +124,20 @@ class Library:
         job.residual, job.watches = _start(told.residual), _start(told.watch)
         job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
         job.messages = ctypes.cast(messages, ctypes.c_char_p)
-        with _Memory(self._library, tolerance, parameters) as memory:
+        with _Memory(self._library, self._refusal(count), tolerance, parameters) as memory:
             if not self._library.kf_sweep_run(memory, ctypes.byref(job)):
-                raise MemoryError
+                raise KinfmuError(self._refusal(count))
         failed = []
         for k, sample in enumerate(failures[: min(job.failure_count, MOST_FAILURES)].tolist()):
             text = messages.raw[k * MESSAGE : (k + 1) * MESSAGE].split(b"\0", 1)[0]
             failed.append((sample, text.decode()))
+        more = job.failure_count - MOST_FAILURES
+        if more > 0:
+            bad = told.status > Status.BRIDGED
+            first = int(np.flatnonzero(bad & ~np.concatenate([[False], bad[:-1]]))[MOST_FAILURES])
+            failed.append(
+                (first, f"{more} more stretches without numbers begin here or later: {MOST_FAILURES} are told")
+            )
         return replace(told, failures=tuple(failed), side_by_side=job.side_by_side)
 
     def diagnose(
@@ -147,9 +149,15 @@ class Library:
         """Margins (n,) and estimated errors (n, 3) of samples."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
         job = self._job(driven, (None, None, None))
-        with _Memory(self._library, tolerance, parameters) as memory:
+        with _Memory(self._library, self._refusal(len(margins)), tolerance, parameters) as memory:
             self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors))
         return margins, errors
+
+    def _refusal(self, count: int) -> str:
+        return (
+            f"no memory is left for a sweep of {count} samples of '{self.plan.mechanism.name}' by the native engine, "
+            "which may need 200 MB beside its tables; sweep fewer samples at a time, or with engine 'python'"
+        )
 
     def _job(self, driven: tuple[FloatArray, ...], tables: Sequence[FloatArray | None]) -> _Job:
         job = _Job(count=len(driven[0]))
@@ -163,13 +171,13 @@ class Library:
 
 
 class _Memory:
-    """Memory of a sweep, with its parameters bound."""
+    """Memory of a sweep, with its parameters bound. refusal: what to say if there is none."""
 
-    def __init__(self, library: Any, tolerance: float, parameters: Sequence[float]) -> None:
+    def __init__(self, library: Any, refusal: str, tolerance: float, parameters: Sequence[float]) -> None:
         self._library = library
         self._memory = library.kf_sweep_new(tolerance)
         if not self._memory:
-            raise MemoryError
+            raise KinfmuError(refusal)
         if parameters and not library.kf_sweep_bind(self._memory, (_double * len(parameters))(*parameters)):
             message = library.kf_sweep_message(self._memory).decode()
             library.kf_sweep_free(self._memory)

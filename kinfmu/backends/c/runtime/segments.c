@@ -254,28 +254,26 @@ double kf_turns_after(const kf_segments *segments, double u)
     return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
 }
 
-/* A run of lanes in one segment, from `from` on, `count` rounded up to whole vectors. */
-static void predict_run(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
-                        int count, kf_lanes *lanes)
+/* KF_VECTOR lanes in one segment, from `from` on: a fixed number, so that the processor knows what comes. */
+static void predict_at_once(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
+                            kf_lanes *lanes)
 {
-    const double per_half = 2.0 / segments->width, high = turns * HIGH, low = turns * LOW;
-    double x[KF_LANES + KF_VECTOR];
+    const double per_half = 2.0 / segments->width, high = turns * HIGH, low = turns * LOW, centre = segment->centre;
+    double x[KF_VECTOR];
     int i, k;
-    count = (count + KF_VECTOR - 1) / KF_VECTOR * KF_VECTOR;
     if (kf_driver_is_angle[0]) {
         const double s = segment->sine[KF_UNKNOWNS], c = segment->cosine[KF_UNKNOWNS];
-        double *const sine = lanes->angles[0][KF_UNKNOWNS] + from;
-        double *const cosine = lanes->angles[1][KF_UNKNOWNS] + from;
+        double *const sine = lanes->angles[0][KF_UNKNOWNS] + from, *const cosine = lanes->angles[1][KF_UNKNOWNS] + from;
         KF_SIDE_BY_SIDE
-        for (i = 0; i < count; ++i) {
-            const double step = u[from + i] - high - segment->centre - low;
+        for (i = 0; i < KF_VECTOR; ++i) {
+            const double step = u[from + i] - high - centre - low;
             x[i] = step * per_half;
             kf_turn(step, s, c, &sine[i], &cosine[i]);
         }
     } else {
         KF_SIDE_BY_SIDE
-        for (i = 0; i < count; ++i) {
-            x[i] = (u[from + i] - segment->centre) * per_half;
+        for (i = 0; i < KF_VECTOR; ++i) {
+            x[i] = (u[from + i] - centre) * per_half;
         }
     }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
@@ -285,20 +283,22 @@ static void predict_run(const kf_segments *segments, const kf_segment *segment, 
         const double s = segment->sine[k], c = segment->cosine[k];
         double *const z = lanes->z[k] + from;
         double *const sine = lanes->angles[0][k] + from, *const cosine = lanes->angles[1][k] + from;
-        const bool turns_on = kf_unknown_is_angle[k] && !segment->is_steep[k];
+        double step[KF_VECTOR];
         KF_SIDE_BY_SIDE
-        for (i = 0; i < count; ++i) {
+        for (i = 0; i < KF_VECTOR; ++i) {
             const double at = x[i];
-            const double p = KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, c7, c6), c5), c4),
-                c3), c2), c1), c0) * at;
-            z[i] = base + p;
-            if (turns_on) {
-                kf_turn(p, s, c, &sine[i], &cosine[i]);
-            }
+            step[i] = at * KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, c7, c6), c5), c4),
+                c3), c2), c1), c0);
+            z[i] = base + step[i];
         }
-        if (kf_unknown_is_angle[k] && segment->is_steep[k]) {
+        if (kf_unknown_is_angle[k] && !segment->is_steep[k]) {
             KF_SIDE_BY_SIDE
-            for (i = 0; i < count; ++i) {
+            for (i = 0; i < KF_VECTOR; ++i) {
+                kf_turn(step[i], s, c, &sine[i], &cosine[i]);
+            }
+        } else if (kf_unknown_is_angle[k]) {
+            KF_SIDE_BY_SIDE
+            for (i = 0; i < KF_VECTOR; ++i) {
                 kf_sincos(z[i], &sine[i], &cosine[i]);
             }
         }
@@ -329,7 +329,9 @@ void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, i
         for (i = from; i < to && !segment->is_plain; ++i) {
             alone[i] = 1;
         }
-        predict_run(segments, segment, turns, own, from, to - from, lanes);
+        for (i = from; i < to; i += KF_VECTOR) {
+            predict_at_once(segments, segment, turns, own, i, lanes);
+        }
     }
 }
 

@@ -1,0 +1,266 @@
+/* Side by side: the samples of a sweep in lanes, predicted and corrected, or read from the windows of bridges. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "stream.h"
+#include "sweeping.h"
+#include "way.h"
+
+#define SURE 0.05           /* determinant from which samples may be solved here: it leaves nine digits of qdd */
+#define MOST_MOVED 1e-3     /* correction beyond which one does not arrive, nor rotations do */
+#define CLOSED 1e-30        /* squared residual of what has arrived, for angles of some radians */
+#define BRIDGED 1e-24       /* squared residual of what closes in a window */
+#define MOST_CACHED 4000000 /* [bytes] of tables up to which they go through the caches */
+#define FEWEST 8            /* samples in a window that are worth lanes */
+
+#if KF_HAS_LANES
+
+/* Room for lanes; false if there is no memory. */
+bool kf_lanes_made(kf_sweep *sweep)
+{
+    kf_lanes *const lanes = sweep->lanes = sweep->lanes == NULL ? calloc(1, sizeof *lanes) : sweep->lanes;
+    int k;
+    for (k = 0; lanes != NULL && k < KF_COORDINATES; ++k) {
+        const int angle = kf_lane_angles[k];
+        lanes->sine[k] = angle < 0 ? NULL : lanes->angles[0][angle];
+        lanes->cosine[k] = angle < 0 ? NULL : lanes->angles[1][angle];
+    }
+    return lanes != NULL;
+}
+
+/* Numbers of eight bytes to their place in the caller's arrays. */
+static void write(void *to, const void *from, int count, bool streams)
+{
+    if (streams) {
+        kf_stream(to, from, count);
+    } else {
+        memcpy(to, from, (size_t)count * sizeof(double));
+    }
+}
+
+/* Numbers that lanes will need soon, on their way from memory. */
+static void fetch(const double *from)
+{
+#if defined(__GNUC__)
+    int i;
+    for (i = 0; i < KF_LANES; i += KF_LINE) {
+        __builtin_prefetch(from + i);
+    }
+#else
+    (void)from;
+#endif
+}
+
+/* Where an output of lanes stands. */
+static const double *standing(const kf_lanes *lanes, int order, int output)
+{
+    static const int *const places[3] = {kf_outputs_places, kf_rates_places, kf_accelerations_places};
+    const int place = places[order][output];
+    return place < 0 ? lanes->outputs[order][output] : order == 0 ? lanes->x[place] : order == 1 ? lanes->x1[place]
+                                                                                                 : lanes->x2[place];
+}
+
+/* Fill KF_LANES rows of a table, if it is wanted. */
+static void fill(kf_lanes *lanes, int order, const kf_table *table, int64_t start, bool streams)
+{
+    double *const rows = lanes->rows;
+    double *to;
+    int i, k;
+    if (table->start == NULL) {
+        return;
+    }
+    to = table->start + (ptrdiff_t)start * table->row;
+    if (table->column == 1 && table->row == KF_OUTPUTS) {
+        for (k = 0; k < KF_OUTPUTS; ++k) {
+            const double *const from = standing(lanes, order, k);
+            for (i = 0; i < KF_LANES; ++i) {
+                rows[i * KF_OUTPUTS + k] = from[i];
+            }
+        }
+        write(to, rows, KF_LANES * KF_OUTPUTS, streams);
+        return;
+    }
+    for (k = 0; k < KF_OUTPUTS; ++k, to += table->column) {
+        const double *const from = standing(lanes, order, k);
+        if (table->row == 1) {
+            write(to, from, KF_LANES, streams);
+            continue;
+        }
+        for (i = 0; i < KF_LANES; ++i) {
+            to[i * table->row] = from[i];
+        }
+    }
+}
+
+static bool has_motion(const kf_job *job)
+{
+    return job->tables[1].start != NULL || job->tables[2].start != NULL;
+}
+
+/* Correct and check what is predicted at driver values u: how many passes it took. alone[i]: in doubt. */
+static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
+{
+    const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
+    kf_lanes *const lanes = sweep->lanes;
+    int i, k, passes;
+    for (passes = 1;; ++passes) {
+        int open = 0;
+        kf_lanes_position(&sweep->follower.solver.model, lanes, NULL);
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_LANES; ++i) {
+            const double margin = lanes->margin[i], moved = lanes->moved[i];
+            const bool is_trusted = (margin >= SURE) & (KF_TRUST * moved <= margin) & (moved <= MOST_MOVED);
+            const bool has_arrived = lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i] * per_square);
+            open += is_trusted & !has_arrived & !alone[i];
+            alone[i] |= !(is_trusted & (has_arrived | (passes == 1)));
+        }
+        if (open == 0 || passes == 2) {
+            return passes;
+        }
+        for (k = 0; k < KF_UNKNOWNS; ++k) { /* once more for all if one of them has not arrived */
+            memcpy(lanes->z[k], lanes->x[k], sizeof lanes->x[k]);
+        }
+    }
+}
+
+/* KF_LANES samples from `start` on; false if memory ran out. */
+bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
+{
+    const double tolerance = sweep->follower.solver.tolerance;
+    kf_lanes *const lanes = sweep->lanes;
+    const double *const u = job->u + start;
+    const bool streams = job->count * (int64_t)sizeof(double) * (3 * KF_OUTPUTS) > MOST_CACHED;
+    int64_t status[KF_LANES], iterations[KF_LANES];
+    double residual[KF_LANES];
+    int32_t alone[KF_LANES];
+    int i, k, passes, left = 0;
+    if (start + 2 * KF_LANES <= job->count) {
+        fetch(u + KF_LANES);
+    }
+    memcpy(lanes->x[KF_COORDINATES - 1], u, sizeof lanes->x[0]);
+    kf_predict(&sweep->segments, u, lanes, alone);
+    passes = correct(sweep, u, alone);
+    KF_SIDE_BY_SIDE
+    for (i = 0; i < KF_LANES; ++i) {
+        status[i] = KF_OK;
+        iterations[i] = passes;
+        residual[i] = sqrt(lanes->error[i]);
+    }
+    write(job->status + start, status, KF_LANES, streams);
+    write(job->iterations + start, iterations, KF_LANES, streams);
+    write(job->residual + start, residual, KF_LANES, streams);
+    for (k = 0; k < KF_WATCHES; ++k) {
+        for (i = 0; i < KF_LANES; ++i) {
+            const double watch = lanes->watches[k][i];
+            job->watches[(start + i) * KF_WATCHES + k] = watch;
+            alone[i] |= !(fabs(watch) <= tolerance);
+        }
+    }
+    fill(lanes, 0, &job->tables[0], start, streams);
+    if (has_motion(job)) {
+        memcpy(lanes->x1[KF_COORDINATES - 1], job->ud + start, sizeof lanes->x1[0]);
+        memcpy(lanes->x2[KF_COORDINATES - 1], job->udd + start, sizeof lanes->x2[0]);
+        if (start + 2 * KF_LANES <= job->count) {
+            fetch(job->ud + start + KF_LANES);
+            fetch(job->udd + start + KF_LANES);
+        }
+        kf_lanes_motion(&sweep->follower.solver.model, lanes, NULL);
+        fill(lanes, 1, &job->tables[1], start, streams);
+        fill(lanes, 2, &job->tables[2], start, streams);
+    }
+    for (i = 0; i < KF_LANES; ++i) {
+        left += alone[i];
+    }
+    for (i = 0; i < KF_LANES && left > 0; ++i) {
+        if (alone[i] && !kf_leave(sweep, job, start + i)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Samples in a window, KF_LANES at most; those that do not close are kept for later. */
+static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *window, const kf_left *samples, int count)
+{
+    const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
+    const kf_model *const model = &sweep->follower.solver.model;
+    const double tolerance = sweep->follower.solver.tolerance;
+    kf_lanes *const lanes = sweep->lanes;
+    double u[KF_LANES], turns[KF_LANES];
+    int i, j, k, order;
+    for (i = 0; i < KF_LANES; ++i) {
+        const kf_left *const one = &samples[i < count ? i : 0];
+        u[i] = one->u;
+        turns[i] = one->turns;
+        lanes->x[KF_COORDINATES - 1][i] = job->u[one->sample];
+        lanes->x1[KF_COORDINATES - 1][i] = job->ud[one->sample];
+        lanes->x2[KF_COORDINATES - 1][i] = job->udd[one->sample];
+    }
+    kf_window_read(&sweep->segments, window, u, turns, lanes);
+    kf_lanes_position(model, lanes, window->held);
+    if (has_motion(job)) {
+        kf_lanes_motion(model, lanes, window->held);
+    }
+    for (i = 0; i < count; ++i) {
+        const int64_t sample = samples[i].sample;
+        const double error = lanes->error[i], margin = lanes->margin[i], moved = lanes->moved[i];
+        bool is_good = error <= BRIDGED * (1.0 + u[i] * u[i] * per_square) && margin >= SURE && KF_TRUST * moved <= margin
+            && moved <= MOST_MOVED;
+        for (k = 0; k < KF_WATCHES; ++k) {
+            is_good = is_good && fabs(lanes->watches[k][i]) <= tolerance;
+        }
+        if (!is_good) {
+            sweep->alone.samples[sweep->alone.count++] = samples[i]; /* where it or one before it stood */
+            continue;
+        }
+        for (order = 0; order < 3; ++order) {
+            const kf_table *const table = &job->tables[order];
+            for (j = 0; j < KF_OUTPUTS && table->start != NULL; ++j) {
+                table->start[(ptrdiff_t)sample * table->row + j * table->column] = standing(lanes, order, j)[i];
+            }
+        }
+        job->status[sample] = KF_BRIDGED;
+        job->iterations[sample] = 1;
+        job->residual[sample] = sqrt(error);
+        for (k = 0; k < KF_WATCHES; ++k) {
+            job->watches[sample * KF_WATCHES + k] = lanes->watches[k][i];
+        }
+    }
+}
+
+/* Those of the samples left that lie in windows of bridges, side by side. */
+void kf_in_windows(kf_sweep *sweep, kf_job *job)
+{
+    kf_list *const alone = &sweep->alone;
+    kf_left batch[KF_LANES];
+    int number, count;
+    kf_stream_end();
+    for (number = 0; number < sweep->segments.window_count; ++number) {
+        const kf_window *const window = &sweep->segments.windows[number];
+        const int64_t left = alone->count;
+        int64_t k;
+        count = 0;
+        alone->count = 0;
+        for (k = 0; k < left; ++k) {
+            const kf_left one = alone->samples[k];
+            if (window->low < one.u && one.u < window->high) {
+                batch[count++] = one;
+            } else {
+                alone->samples[alone->count++] = one;
+            }
+            if (count == KF_LANES) {
+                solve_in_window(sweep, job, window, batch, count);
+                count = 0;
+            }
+        }
+        for (k = 0; k < count && count < FEWEST; ++k) {
+            alone->samples[alone->count++] = batch[k];
+        }
+        if (count >= FEWEST) {
+            solve_in_window(sweep, job, window, batch, count);
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,35 @@
+/* What the files of a sweep know of each other; nothing here is for others. */
+#ifndef KF_SWEEPING_H
+#define KF_SWEEPING_H
+
+#include "segments.h"
+#include "sweep.h"
+
+/* A sample that is left for later: at driver value u, `turns` before where it lies. */
+typedef struct {
+    double u, turns;
+    int64_t sample;
+} kf_left;
+
+typedef struct {
+    kf_left *samples;
+    int64_t count, room;
+} kf_list;
+
+struct kf_sweep {
+    kf_follower follower;
+    kf_pose raised_pose;
+    kf_segments segments;
+    kf_lanes *lanes;
+    kf_list alone;
+};
+
+/* sweep.c */
+bool kf_leave(kf_sweep *sweep, kf_job *job, int64_t sample);
+
+/* side_by_side.c */
+bool kf_lanes_made(kf_sweep *sweep);
+bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start);
+void kf_in_windows(kf_sweep *sweep, kf_job *job);
+
+#endif
