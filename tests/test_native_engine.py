@@ -97,6 +97,19 @@ def test_windows_of_bridges_are_read_side_by_side() -> None:
     assert told.residual.max() <= 1e-12
 
 
+def test_what_an_earlier_sweep_told_may_be_written_over() -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    compiled = library.Library(plan)
+    first = compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs))
+    expected = first.residual.copy()
+    first.residual[:] = -1.0
+    again = compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs), room=first)
+    assert again.residual is first.residual
+    np.testing.assert_array_equal(again.residual, expected)
+    with pytest.raises(KinfmuError, match=r"room for \(1100, 0\) samples and rows set aside, not for \(2, 0\)"):
+        compiled.sweep(driven(np.zeros(2)), [np.zeros((2, len(plan.outputs)))] * 3, room=first)
+
+
 def test_more_stretches_than_are_told_one_by_one_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "MOST_FAILURES", 2)
     plan = compile_plan(kinfmu.load("triple_rocker"))

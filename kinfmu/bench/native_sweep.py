@@ -1,4 +1,6 @@
-"""A sweep by the native engine beside a four-bar's closed form written by hand, and beside what numba makes of one."""
+"""A sweep by the native engine beside a four-bar's closed form written by hand, beside what numba makes of one,
+and beside pylinkage, which numba compiles too.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +27,11 @@ ROUNDS = 9
 SAMPLES = 360_000  # a thousand turns by one degree
 CHAIN_SAMPLES = 2000
 LENGTHS = (40.0, 20.0, 50.0, 50.0)  # ground, crank, coupler, rocker of the gallery's crank_rocker
+CLOSED = "closed form by hand, laid side by side"
+WHOLE = "crank-rocker, q, qd, qdd"
+ALONE = "the same, q alone"
+LOOP = "closed form in a loop, by numba"
+PYLINKAGE = "pylinkage, by numba: points, not angles"
 COORDINATES = ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
 
 
@@ -36,19 +43,23 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     columns = np.empty((15, samples))
     tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
     by_samples = [np.empty((samples, 5)) for _ in range(3)]
+    room, fourbar_room = (compiled.sweep(driven, tables) for compiled in (crank_rocker, fourbar))
+    plan = compile_plan(load("crank_rocker"), COORDINATES)
     ways: dict[str, Callable[[], object]] = {
-        "closed form by hand, laid side by side": closed_form(u, columns),
-        "crank-rocker, q, qd, qdd": lambda: crank_rocker.sweep(driven, tables),
-        "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples),
-        "the same, q alone": lambda: crank_rocker.sweep(driven, (tables[0], None, None)),
-        "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables),
-        "kinfmu.solve: a Run of its own": lambda: solve(load("crank_rocker"), crank_angle=u, engine="native"),
+        CLOSED: closed_form(u, columns),
+        WHOLE: lambda: crank_rocker.sweep(driven, tables, room=room),
+        "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples, room=room),
+        ALONE: lambda: crank_rocker.sweep(driven, (tables[0], None, None), room=room),
+        "the same, q, qd, qdd, all arrays allocated": lambda: crank_rocker.sweep(driven, _allocated(samples)),
+        "the same, by kinfmu.solve of a plan": lambda: solve(plan, crank_angle=u, engine="native"),
+        "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, room=fourbar_room),
     }
     absent = ""
-    try:
-        ways["closed form in a loop, by numba"] = _numba_loop(u, columns)
-    except MissingPackageError as error:
-        absent = f"\n{error}"
+    for name, way in ((LOOP, _numba_loop), (PYLINKAGE, _pylinkage)):
+        try:
+            ways[name] = way(u, columns)
+        except MissingPackageError as error:
+            absent += f"\n{error}"
     times = [
         spread([value / samples * 1e9 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
@@ -57,7 +68,16 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     lines.append(f"{'':44}{'median':>9}{'min':>9}{'max':>9}{'times closed form':>19}")
     for name, of in zip(ways, times, strict=True):
         lines.append(f"{name:44}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}{of.median / times[0].median:19.2f}")
+    medians = dict(zip(ways, (time.median for time in times), strict=True))
+    lines.append(f"q alone takes {medians[ALONE] / medians[WHOLE]:.2f} of the time of q, qd, qdd")
+    lines += [
+        f"{name}: {medians[name] / medians[WHOLE]:.1f} times that time" for name in (LOOP, PYLINKAGE) if name in medians
+    ]
     return "\n".join([*lines, *_chain(rounds, loops)]) + absent
+
+
+def _allocated(samples: int) -> list[FloatArray]:
+    return [np.empty((samples, len(COORDINATES)), order="F") for _ in range(3)]
 
 
 def _chain(rounds: int, count: int) -> list[str]:
@@ -90,6 +110,32 @@ def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
     def way() -> object:
         library.closed_form(ctypes.c_int64(len(u)), *pointers, *lengths, out)
         return (u, ud, udd)  # to live as long as what points at them
+
+    return way
+
+
+def _pylinkage(u: FloatArray, columns: FloatArray) -> Callable[[], object]:  # noqa: ARG001  it makes arrays of its own
+    """Positions, velocities and accelerations of the two moving joints."""
+    if find_spec("pylinkage") is None or find_spec("numba") is None:
+        raise MissingPackageError("pylinkage with numba is not installed: pip install 'kinfmu[bench]'")
+    from pylinkage.actuators import Crank
+    from pylinkage.components import Ground
+    from pylinkage.dyads import RRRDyad
+    from pylinkage.simulation import Linkage
+
+    ground, crank, coupler, rocker = LENGTHS
+    step = float(u[1] - u[0])
+    parts = [Ground(0.0, 0.0), Ground(ground, 0.0)]
+    parts.append(Crank(parts[0], crank, step, float(u[0]) - step))
+    parts.append(RRRDyad(parts[2].output, parts[1], coupler, rocker, 30.0, 50.0))  # where the circles meet: above
+    linkage = Linkage(parts)
+    linkage.set_input_velocity(parts[2], 1.0, 0.0)
+    start = [(part.x, part.y) for part in parts]
+
+    def way() -> object:
+        for part, (x, y) in zip(parts, start, strict=True):
+            part.x, part.y = x, y
+        return linkage.step_fast_with_kinematics(len(u))
 
     return way
 

@@ -216,6 +216,8 @@ def test_a_sweep_is_set_beside_the_closed_form(monkeypatch: pytest.MonkeyPatch, 
     table = native_sweep.run(rounds=1, samples=2000, loops=3)
     assert table.splitlines()[2].split()[-1] == "1.00"
     assert "crank-rocker, q, qd, qdd" in table
+    assert "q alone takes 0." in table or "q alone takes 1." in table
+    assert re.search(r"pylinkage, by numba: .* times that time|pylinkage with numba is not installed", table)
     assert "chain of 3 four-bars" in table
 
 

@@ -108,15 +108,21 @@ class Library:
         tables: Sequence[FloatArray | None],
         parameters: Sequence[float] = (),
         tolerance: float = 1e-9,
+        room: Told | None = None,
     ) -> Told:
         """Fill tables (n, outputs) of values, rates and accelerations at (n, d) driver values, speeds, accelerations.
 
         A table may be laid out by samples or by outputs; None: not wanted. Where the samples cannot be reached it is
-        NaN.
+        NaN. room: what a sweep of as many samples told, whose arrays are written over.
         """
         count, watches = len(driven[0]), len(self.plan.watches)
-        whole = np.empty((2, count), dtype=np.int64)  # in one piece: malloc keeps it for the next sweep
-        told = Told(whole[0], whole[1], np.empty(count), np.empty((count, watches)), (), 0)
+        if room is None:
+            whole = np.empty((3, count), dtype=np.int64)  # in one piece: the system hands large pieces over faster
+            told = Told(whole[0], whole[1], whole[2].view(np.float64), np.empty((count, watches)), (), 0)
+        elif room.watch.shape == (count, watches):
+            told = room
+        else:
+            raise KinfmuError(f"room for {room.watch.shape} samples and rows set aside, not for {(count, watches)}")
         failures = np.zeros(MOST_FAILURES, dtype=np.int64)
         messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
         job = self._job(driven, tables)
