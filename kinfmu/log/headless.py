@@ -135,6 +135,7 @@ def viewer(size: tuple[int, int] = (1600, 900)) -> Iterator[Viewer]:
             with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
                 _await_answer(process, client, complaints)
                 try:
+                    client.take_screenshot(max_size=_PROBE_SIZE)  # a viewer that cannot draw ends when it first does
                     yield Viewer(client)
                 except OSError as error:  # what the client raises when the viewer is gone
                     with suppress(subprocess.TimeoutExpired):

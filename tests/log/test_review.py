@@ -94,6 +94,14 @@ def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypa
     assert [path.name for path in mcap.parent.iterdir()] == ["run.mcap"]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
+def test_a_viewer_that_cannot_draw_is_told_before_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
+    with pytest.raises(LogError, match="no graphics driver"), headless.viewer((320, 200)):
+        pytest.fail("a viewer was given that cannot draw")
+
+
 @pytest.mark.usefixtures("graphics")
 def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
     mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
