@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -95,6 +96,28 @@ def test_windows_of_bridges_are_read_side_by_side() -> None:
     exact = np.stack([-np.cos(u) * speed**2 - np.sin(u) * acceleration, acceleration], axis=1)
     np.testing.assert_allclose(accelerations, exact, rtol=0, atol=1e-8)
     assert told.residual.max() <= 1e-12
+
+
+@pytest.mark.parametrize("offset", [0, 3, 7])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_large_tables_are_filled_wherever_they_begin(offset: int, order: Literal["C", "F"]) -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    compiled = library.Library(plan)
+    count, columns = 24_037, len(plan.outputs)  # more than goes through the caches, and no whole number of lanes
+    assert count * columns * 3 * 8 > 4e6
+    u = np.linspace(0.0, 70.0, count)
+    rooms = [np.full(count * columns + offset + 1, 7.0) for _ in range(3)]
+    large = [room[offset:-1].reshape((count, columns), order=order) for room in rooms]
+    told = compiled.sweep(driven(u), large)
+    assert all((room[:offset] == 7.0).all() and room[-1] == 7.0 for room in rooms)
+    assert (told.status == 0).all()
+    for part in np.array_split(np.arange(count), 5):
+        small = [np.empty((len(part), columns), order=order) for _ in range(3)]
+        few = compiled.sweep(driven(u[part]), small)
+        np.testing.assert_array_equal(told.iterations[part] > 0, few.iterations > 0)
+        for one, other in zip(large, small, strict=True):
+            np.testing.assert_allclose(one[part], other, rtol=0, atol=1e-11)
+            assert np.abs(other).max() > 1.0
 
 
 def test_what_an_earlier_sweep_told_may_be_written_over() -> None:

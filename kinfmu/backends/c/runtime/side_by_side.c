@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "stream.h"
 #include "sweeping.h"
 #include "way.h"
 
@@ -29,14 +28,26 @@ bool kf_lanes_made(kf_sweep *sweep)
     return lanes != NULL;
 }
 
-/* Numbers of eight bytes to their place in the caller's arrays. */
-static void write(void *to, const void *from, int count, bool streams)
+/* Columns that are streamed: status, iterations, residuals, then those of the tables. */
+static kf_column *column_of(kf_sweep *sweep, int order, int output)
 {
-    if (streams) {
-        kf_stream(to, from, count);
+    return &sweep->columns[3 + order * KF_OUTPUTS + output];
+}
+
+/* Numbers of eight bytes to their place in the caller's arrays; column: NULL if they go through the caches. */
+static void write(kf_column *column, void *to, const void *from, int count, bool is_first)
+{
+    if (column != NULL) {
+        kf_stream(column, to, from, count, is_first);
     } else {
         memcpy(to, from, (size_t)count * sizeof(double));
     }
+}
+
+/* True for a table of samples one after another without gaps. */
+static bool is_by_samples(const kf_table *table)
+{
+    return table->column == 1 && table->row == KF_OUTPUTS;
 }
 
 /* Numbers that lanes will need soon, on their way from memory. */
@@ -62,8 +73,10 @@ static const double *standing(const kf_lanes *lanes, int order, int output)
 }
 
 /* Fill KF_LANES rows of a table, if it is wanted. */
-static void fill(kf_lanes *lanes, int order, const kf_table *table, int64_t start, bool streams)
+static void fill(kf_sweep *sweep, const kf_job *job, int order, int64_t start, bool streams)
 {
+    const kf_table *const table = &job->tables[order];
+    kf_lanes *const lanes = sweep->lanes;
     double *const rows = lanes->rows;
     double *to;
     int i, k;
@@ -71,26 +84,57 @@ static void fill(kf_lanes *lanes, int order, const kf_table *table, int64_t star
         return;
     }
     to = table->start + (ptrdiff_t)start * table->row;
-    if (table->column == 1 && table->row == KF_OUTPUTS) {
+    if (is_by_samples(table)) {
         for (k = 0; k < KF_OUTPUTS; ++k) {
             const double *const from = standing(lanes, order, k);
             for (i = 0; i < KF_LANES; ++i) {
                 rows[i * KF_OUTPUTS + k] = from[i];
             }
         }
-        write(to, rows, KF_LANES * KF_OUTPUTS, streams);
+        write(streams ? column_of(sweep, order, 0) : NULL, to, rows, KF_LANES * KF_OUTPUTS, start == 0);
         return;
     }
     for (k = 0; k < KF_OUTPUTS; ++k, to += table->column) {
         const double *const from = standing(lanes, order, k);
         if (table->row == 1) {
-            write(to, from, KF_LANES, streams);
+            write(streams ? column_of(sweep, order, k) : NULL, to, from, KF_LANES, start == 0);
             continue;
         }
         for (i = 0; i < KF_LANES; ++i) {
             to[i * table->row] = from[i];
         }
     }
+}
+
+/* True if tables are larger than the caches, and numbers in them stand where numbers may be streamed to. */
+static bool does_stream(const kf_job *job)
+{
+    bool is_aligned = true;
+    int k;
+    for (k = 0; k < 3; ++k) {
+        is_aligned = is_aligned && (uintptr_t)job->tables[k].start % sizeof(double) == 0;
+    }
+    return is_aligned && job->count * (int64_t)sizeof(double) * (3 * KF_OUTPUTS) > MOST_CACHED;
+}
+
+/* What was streamed stands in the arrays, up to sample `end`. */
+static void finish(kf_sweep *sweep, const kf_job *job, int64_t end)
+{
+    int k, order;
+    if (end == 0 || !does_stream(job)) {
+        return;
+    }
+    kf_stream_rest(&sweep->columns[0], job->status + end);
+    kf_stream_rest(&sweep->columns[1], job->iterations + end);
+    kf_stream_rest(&sweep->columns[2], job->residual + end);
+    for (order = 0; order < 3; ++order) {
+        const kf_table *const table = &job->tables[order];
+        const int columns = is_by_samples(table) ? 1 : table->row == 1 ? KF_OUTPUTS : 0;
+        for (k = 0; table->start != NULL && k < columns; ++k) {
+            kf_stream_rest(column_of(sweep, order, k), table->start + (ptrdiff_t)end * table->row + k * table->column);
+        }
+    }
+    kf_stream_end();
 }
 
 static bool has_motion(const kf_job *job)
@@ -130,7 +174,7 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     const double tolerance = sweep->follower.solver.tolerance;
     kf_lanes *const lanes = sweep->lanes;
     const double *const u = job->u + start;
-    const bool streams = job->count * (int64_t)sizeof(double) * (3 * KF_OUTPUTS) > MOST_CACHED;
+    const bool streams = does_stream(job);
     int64_t status[KF_LANES], iterations[KF_LANES];
     double residual[KF_LANES];
     int32_t alone[KF_LANES];
@@ -147,9 +191,9 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
         iterations[i] = passes;
         residual[i] = sqrt(lanes->error[i]);
     }
-    write(job->status + start, status, KF_LANES, streams);
-    write(job->iterations + start, iterations, KF_LANES, streams);
-    write(job->residual + start, residual, KF_LANES, streams);
+    write(streams ? &sweep->columns[0] : NULL, job->status + start, status, KF_LANES, start == 0);
+    write(streams ? &sweep->columns[1] : NULL, job->iterations + start, iterations, KF_LANES, start == 0);
+    write(streams ? &sweep->columns[2] : NULL, job->residual + start, residual, KF_LANES, start == 0);
     for (k = 0; k < KF_WATCHES; ++k) {
         for (i = 0; i < KF_LANES; ++i) {
             const double watch = lanes->watches[k][i];
@@ -157,7 +201,7 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
             alone[i] |= !(fabs(watch) <= tolerance);
         }
     }
-    fill(lanes, 0, &job->tables[0], start, streams);
+    fill(sweep, job, 0, start, streams);
     if (has_motion(job)) {
         memcpy(lanes->x1[KF_COORDINATES - 1], job->ud + start, sizeof lanes->x1[0]);
         memcpy(lanes->x2[KF_COORDINATES - 1], job->udd + start, sizeof lanes->x2[0]);
@@ -166,8 +210,8 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
             fetch(job->udd + start + KF_LANES);
         }
         kf_lanes_motion(&sweep->follower.solver.model, lanes, NULL);
-        fill(lanes, 1, &job->tables[1], start, streams);
-        fill(lanes, 2, &job->tables[2], start, streams);
+        fill(sweep, job, 1, start, streams);
+        fill(sweep, job, 2, start, streams);
     }
     for (i = 0; i < KF_LANES; ++i) {
         left += alone[i];
@@ -235,7 +279,7 @@ void kf_in_windows(kf_sweep *sweep, kf_job *job)
     kf_list *const alone = &sweep->alone;
     kf_left batch[KF_LANES];
     int number, count;
-    kf_stream_end();
+    finish(sweep, job, job->count / KF_LANES * KF_LANES);
     for (number = 0; number < sweep->segments.window_count; ++number) {
         const kf_window *const window = &sweep->segments.windows[number];
         const int64_t left = alone->count;

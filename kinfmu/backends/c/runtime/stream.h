@@ -2,6 +2,7 @@
 #ifndef KF_STREAM_H
 #define KF_STREAM_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -31,16 +32,41 @@ static inline void kf_stream_line(double *to, const double *from)
 #endif
 }
 
-/* Whole lines are streamed; those that stand in two parts of a column are written through the caches. */
-static inline void kf_stream(double *to, const double *from, int count)
+/* A column that is streamed piece after piece: what came last, of which up to a line is still to be written. */
+typedef struct {
+    double last[KF_LINE];
+} kf_column;
+
+/* The numbers between the line that `to` stands in and `to`. */
+static inline int kf_odd(const void *to)
 {
-    const int odd = (int)((uintptr_t)to / sizeof(double) % KF_LINE), head = odd == 0 ? 0 : KF_LINE - odd;
-    int i = head < count ? head : count;
-    memcpy(to, from, (size_t)i * sizeof(double));
-    for (; i + KF_LINE <= count; i += KF_LINE) {
+    return (int)((uintptr_t)to / sizeof(double) % KF_LINE);
+}
+
+/* The next piece of a column: whole lines, the first one with what the last piece left. count: of whole lines too. */
+static inline void kf_stream(kf_column *column, double *to, const double *from, int count, bool is_first)
+{
+    const int odd = kf_odd(to), lead = odd == 0 ? 0 : KF_LINE - odd;
+    int i;
+    if (odd > 0 && is_first) {
+        memcpy(to, from, (size_t)lead * sizeof(double));
+    } else if (odd > 0) {
+        double both[2 * KF_LINE];
+        memcpy(both, column->last, sizeof column->last);
+        memcpy(both + KF_LINE, from, sizeof column->last);
+        kf_stream_line(to - odd, both + KF_LINE - odd);
+    }
+    for (i = lead; i + KF_LINE <= count; i += KF_LINE) {
         kf_stream_line(to + i, from + i);
     }
-    memcpy(to + i, from + i, (size_t)(count - i) * sizeof(double));
+    memcpy(column->last, from + count - KF_LINE, sizeof column->last);
+}
+
+/* What the last piece left, up to where the next one would stand. */
+static inline void kf_stream_rest(const kf_column *column, void *to)
+{
+    const int odd = kf_odd(to);
+    memcpy((double *)to - odd, column->last + KF_LINE - odd, (size_t)odd * sizeof(double));
 }
 
 /* What was streamed stands before what is written from now on. */

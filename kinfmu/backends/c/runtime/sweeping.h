@@ -3,6 +3,7 @@
 #define KF_SWEEPING_H
 
 #include "segments.h"
+#include "stream.h"
 #include "sweep.h"
 
 /* A sample that is left for later: at driver value u, `turns` before where it lies. */
@@ -22,6 +23,7 @@ struct kf_sweep {
     kf_segments segments;
     kf_lanes *lanes;
     kf_list alone;
+    kf_column columns[3 + 3 * KF_ROOM(KF_OUTPUTS)];
 };
 
 /* sweep.c */
