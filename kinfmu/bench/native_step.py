@@ -16,6 +16,7 @@ from kinfmu.backends.c import compiler
 from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.fmu import description
 from kinfmu.fmu.build import build
+from kinfmu.fmu.native.archive import OPTIMIZED
 from kinfmu.mechanism import Mechanism
 from kinfmu.naming import derivative_name
 
@@ -85,9 +86,9 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], No
 
 
 def _closed_form(fmi: int) -> Callable[[], None]:
-    """A round of the closed forms."""
+    """A round of the closed forms, compiled as the FMU is."""
     sources = {"closed_form.c": (_SOURCES / "closed_form.c").read_text("utf-8")}
-    library = ctypes.CDLL(str(compiler.shared_library(sources, (f"-DFMI={fmi}",))))
+    library = ctypes.CDLL(str(compiler.shared_library(sources, (*OPTIMIZED, f"-DFMI={fmi}"))))
     library.instantiate.restype = ctypes.c_void_p
     return _rounds(fmi, library, ctypes.c_void_p(library.instantiate()), CLOSED_FORM_OUTPUTS)
 

@@ -24,7 +24,9 @@ from kinfmu.backends.c import compiler
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver import Solver, Status, with_parameters
+from kinfmu.solver.hermite import weights
 from kinfmu.solver.pose import ALONE, AT_REST
+from kinfmu.solver.span import PLACES
 from kinfmu.sweep import run_times
 from tests.backends.native import STRICT, Native
 from tests.fmu.test_parameters import geared, linkage
@@ -264,3 +266,12 @@ def test_what_is_not_wanted_is_not_written_and_what_is_wanted_is_the_same() -> N
             full = c.motion((0.7,) * drivers, (0.2,) * drivers)
             assert rows == [row if letter in wanted else None for letter, row in zip("pva", full, strict=True)]
             c.restart()
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("inner", PLACES[1:5]), ("outer", (*PLACES[:2], *PLACES[4:]))])
+def test_weights_of_the_centre_of_a_span_are_written_down_as_they_are_computed(
+    name: str, nodes: tuple[float, ...]
+) -> None:
+    (text,) = re.findall(rf"{name}_weights\[4\]\[3\] = {{(.*?)}};", compiler.sources(["span.c"])["span.c"], re.S)
+    written = [float(number) for number in re.findall(r"-?[0-9.e-]+", text)]
+    assert written == [number for row in weights(nodes, 0.0) for number in row]

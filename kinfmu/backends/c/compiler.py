@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -40,6 +41,12 @@ def runtime() -> dict[str, str]:
     return sources(sorted(path.name for path in RUNTIME.iterdir() if path.suffix in (".c", ".h")))
 
 
+def units(files: Mapping[str, str]) -> list[str]:
+    """Names of the C files to be compiled, in order: all but headers and what another one includes."""
+    included = {name for text in files.values() for name in _included(text)}
+    return sorted(name for name in files if name.endswith(".c") and name not in included)
+
+
 def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
     """A shared library of C files (and the headers that they include), by name; compiled if the cache has it not.
 
@@ -67,13 +74,31 @@ def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[
     with tempfile.TemporaryDirectory() as scratch:
         for name, text in files.items():
             (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
-        units = sorted((name for name in files if name.endswith(".c")), key=lambda name: (-len(files[name]), name))
+        names = units(files)
         libraries = [] if os.name == "nt" else ["-lm"]
         if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles side by side itself
-            shares = [units[k :: os.cpu_count() or 1] for k in range(os.cpu_count() or 1)]
-            _run([[*compiler, *flags, "-c", *share] for share in shares if share], scratch)
-            units = [f"{name.removesuffix('.c')}.o" for name in units]
-        _run([[*compiler, *flags, *sorted(units), "-o", str(output.resolve()), *libraries]], scratch)
+            _run([[*compiler, *flags, "-c", *share] for share in _shares(files, names, os.cpu_count() or 1)], scratch)
+            names = [f"{name.removesuffix('.c')}.o" for name in names]
+        _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
+
+
+def _shares(files: Mapping[str, str], names: Sequence[str], count: int) -> list[list[str]]:
+    """C files in so many shares, or fewer, of about the same length: the longest first, each to the shortest share."""
+    whole = {name: _length(files, name) for name in names}
+    shares: list[list[str]] = [[] for _ in range(min(count, len(names)))]
+    for name in sorted(names, key=lambda name: (-whole[name], name)):
+        min(shares, key=lambda share: sum(whole[one] for one in share)).append(name)
+    return shares
+
+
+def _length(files: Mapping[str, str], name: str) -> int:
+    """Of a C file with what it includes of other C files."""
+    return len(files[name]) + sum(_length(files, one) for one in _included(files[name]))
+
+
+def _included(text: str) -> list[str]:
+    """The C files that a C file includes."""
+    return re.findall(r'^#include "(\w+\.c)"', text, re.MULTILINE)
 
 
 def _run(commands: Sequence[Sequence[str]], folder: str) -> None:

@@ -88,7 +88,7 @@ class _Model(Lists):
             *self._names(),
             *self._curves(),
             "typedef struct {",
-            "    double largest, failed; /* residual, relative to the size and squared */",
+            "    double largest, total, failed; /* residual, relative to the size and squared */",
             "    int iterations;",
             "} kf_newton;",
             "",
@@ -239,9 +239,9 @@ class _Model(Lists):
 
     def _position(self) -> list[str]:
         lines = [
-            "kf_newton newton = {0.0, 0.0, 0};",
+            "kf_newton newton = {0.0, 0.0, 0.0, 0};",
             "double predicted[KF_ROOM(KF_UNKNOWNS)];",
-            "double watches[KF_ROOM(KF_WATCHES)];",
+            "double watches[KF_ROOM(KF_WATCHES)], open = 0.0;",
             "double *const x = found->x;",
             "double *const hold = found->hold;",
             "int k;",
@@ -278,7 +278,7 @@ class _Model(Lists):
             "    size = fabs(found->determinants[k]);",
             "    found->margin = k == 0 || size < found->margin ? size : found->margin;",
             "}",
-            "found->residual = sqrt(newton.largest);",
+            "found->residual = sqrt(newton.total < INFINITY ? newton.largest : newton.total);",
             "found->iterations = newton.iterations;",
             "found->moved = 0.0;",
             "for (k = 0; newton.iterations && k < KF_UNKNOWNS; ++k) {",
@@ -288,13 +288,15 @@ class _Model(Lists):
             "kf_watches(model, found, watches);",
             "found->watch = 0.0;",
             "for (k = 0; k < KF_WATCHES; ++k) {",
-            "    const double open = fabs(watches[k]);",
-            "    found->watch = open > found->watch || open != open ? open : found->watch; /* a NaN stays */",
+            "    const double gap = fabs(watches[k]);",
+            "    found->watch = found->watch > gap ? found->watch : gap;",
+            "    open += gap; /* a NaN stays */",
             "}",
+            "found->watch = open < INFINITY ? found->watch : open;",
             "return -1;",
         ]
         signature = (
-            "int kf_position(const kf_model *model, const double *u, const double *z, const double *zd,"
+            "inline int kf_position(const kf_model *model, const double *u, const double *z, const double *zd,"
             " const double *zdd,\n                double s, const bool *held, kf_found *found)"
         )
         unused = [] if self.solved else ["held"]
@@ -313,7 +315,7 @@ class _Model(Lists):
         out, driver = LISTS[order], "u" + "d" * order
         ready = " const double *x1," if order == 2 else ""
         signature = (
-            f"void kf_{name}(const kf_model *model, const kf_found *found, const double *{driver},{ready}\n"
+            f"inline void kf_{name}(const kf_model *model, const kf_found *found, const double *{driver},{ready}\n"
             f"    const double *given, const bool *held, double *{out})"
         )
         lines = ["const double *const x = found->x;", "const double *const hold = found->hold;", "int k;"]
@@ -375,14 +377,14 @@ class _Model(Lists):
         lines += [f"{out}[{k}] = {text};" for k, text in zip(rest, expressions, strict=True)]
         name = ("kf_outputs", "kf_output_rates", "kf_output_accelerations")[order]
         lists = "".join(f" const double *{one}," for one in LISTS[1 : order + 1])
-        signature = f"void {name}(const kf_model *model, const kf_found *found,{lists}\n    double *{out})"
+        signature = f"inline void {name}(const kf_model *model, const kf_found *found,{lists}\n    double *{out})"
         unused = _unused(lines, "model", "found", *LISTS[1 : order + 1])
         return [*table, "", *self._function(signature, lines, unused, ["int k;"] if is_copied else ())]
 
     def _watches(self) -> list[str]:
         expressions, lines = self._expressions([node for _, node in self.plan.watches])
         lines += [f"watches[{k}] = {text};" for k, text in enumerate(expressions)]
-        signature = "void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
+        signature = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
         return self._function(signature, lines, _unused(lines, "model", "found", "watches"))
 
     def _fixed(self) -> list[str]:

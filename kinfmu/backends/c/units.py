@@ -167,9 +167,8 @@ class Units:
         lines += [f"{self._kept} = det;"] if self.keeps_determinant else []
         lines += ["*determinant = det;", "newton->iterations += iteration;"]
         lines += [
-            "if (error > newton->largest || error != error) { /* a NaN stays */",
-            "    newton->largest = error;",
-            "}",
+            "newton->largest = newton->largest > error ? newton->largest : error;",
+            "newton->total += error; /* a NaN stays */",
         ]
         lines.append("return true;")
         signature = (

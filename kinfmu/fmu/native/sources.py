@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib.resources import files
+from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 
@@ -20,6 +20,15 @@ HEADERS = {
     "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
 }
 _WORDS = {"2.0": ("Real", "Integer", "Integer"), "3.0": ("Float64", "Int64", "Int32")}
+_STEP = (
+    "model.c",
+    "pose.c",
+    "advance.c",
+    "solver.c",
+    "drive.c",
+    "instance.c",
+    "variables.c",
+)  # what a step goes through
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
@@ -28,15 +37,24 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
     tables = {"interface.h": _header(variables, version, token), "interface.c": _tables(variables)}
+    tables["step.c"] = _step(version)
     return dict(sorted((emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables).items()))
+
+
+def _step(version: str) -> str:
+    """step.c: files that the compiler shall see as one, so that a step is not a way through many small functions."""
+    lines = ["/* What set, step and get go through, as one unit. Files included here are not compiled on their own. */"]
+    lines += [f'#include "{name}"' for name in (*_STEP, f"fmi{version[0]}.c")]
+    return "\n".join(lines) + "\n"
 
 
 def headers(version: str) -> dict[str, str]:
     """The headers of FMI by name, as fmpy carries them. They stay outside of FMUs: importers have their own."""
+    found = find_spec("fmpy")  # not imported: that takes longer than a unit takes to compile
+    places = found.submodule_search_locations if found is not None else None
     try:
-        folder = files("fmpy").joinpath("c-code")
-        return {name: folder.joinpath(name).read_text("utf-8") for name in HEADERS[version]}
-    except (ImportError, OSError):
+        return {name: Path(places[0] if places else "", "c-code", name).read_text("utf-8") for name in HEADERS[version]}
+    except OSError:
         raise MissingPackageError(
             "building native FMUs needs the headers that fmpy carries; pip install fmpy"
         ) from None

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import kinfmu
+from kinfmu.backends.c import compiler
 from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan
@@ -37,9 +38,9 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
     }
     for name, text in sources_and_host.items():
         (folder / name).write_text(text, "utf-8")
-    units = sorted(name for name in sources_and_host if name.endswith(".c"))
     command = [str(CC), "-std=c99", "-g", "-O1", "-ffp-contract=off", *flags]
-    command += [*(f"-D{name}={value}" for name, value in defined.items()), *units, "-o", str(program), "-lm"]
+    command += [*(f"-D{name}={value}" for name, value in defined.items()), *compiler.units(sources_and_host), "-o"]
+    command += [str(program), "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if "cannot find" in done.stderr:
         pytest.skip(f"this compiler has no {flags}")

@@ -11,7 +11,7 @@
 #define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
 
 /* One step of predict and correct; false if it cannot be trusted to stay on the branch. */
-bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
+inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial)
 {
     const kf_model *const model = &solver->model;

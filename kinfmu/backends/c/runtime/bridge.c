@@ -72,7 +72,7 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     const kf_bridge *const bridge = &solver->bridges[number];
     const kf_span *const span = &solver->spans[bridge->span];
     double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
-    kf_span_read(span, place(bridge, span, u[0]), z, zd, zdd);
+    kf_span_read(span, &solver->scratch.inner, place(bridge, span, u[0]), z, zd, zdd);
     turn_on(bridge, z, z);
     kf_fresh(pose, -1, INFINITY, -INFINITY);
     if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
@@ -107,7 +107,7 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
 {
     const kf_bridge *const bridge = &solver->bridges[number];
     const kf_span *const span = &solver->spans[bridge->span];
-    kf_span_difference(span, place(bridge, span, u), z, zd, zdd);
+    kf_span_difference(span, &solver->scratch.inner, place(bridge, span, u), z, zd, zdd);
 }
 
 /* The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats; or -1.
@@ -214,7 +214,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
         const double u = span->centre + side * places[node] * span->half;
         double weights[KF_MOST_NODES][3];
         kf_weights(count, places + first, places[node], weights);
-        kf_combined(span, side * span->half, count, order + first, weights, solver->scratch.z);
+        kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
         kf_fresh(pose, -1, -INFINITY, INFINITY);
         if (!kf_evaluated(&solver->model, &u, solver->scratch.z, NULL, &pose->found)
             || pose->found.moved > STEADY * pose->found.margin) {

@@ -5,7 +5,7 @@ const double kf_alone[KF_DRIVERS] = {1.0};
 const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)] = {0.0};
 
 /* A pose just found: nothing is known of it but its road. */
-void kf_fresh(kf_pose *pose, int road, double low, double high)
+inline void kf_fresh(kf_pose *pose, int road, double low, double high)
 {
     pose->low = low;
     pose->high = high;
@@ -33,7 +33,7 @@ bool kf_evaluated_as_given(const kf_model *model, const double *u, const double 
 }
 
 /* First and second derivative of all coordinates with respect to the only driver. */
-void kf_tangent(const kf_model *model, kf_pose *pose)
+inline void kf_tangent(const kf_model *model, kf_pose *pose)
 {
     if (pose->derivatives < 1) {
         kf_velocity(model, &pose->found, kf_alone, NULL, NULL, pose->x1);

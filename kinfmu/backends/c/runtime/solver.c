@@ -8,6 +8,7 @@ void kf_solver_start(kf_solver *solver)
     kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
     solver->tolerance = TOLERANCE;
     solver->stuck = false;
+    solver->scratch.inner.half = 0.0; /* nothing was read */
     solver->message[0] = '\0';
     kf_fresh(&solver->anchor, -1, -INFINITY, INFINITY);
     kf_evaluated(&solver->model, kf_anchor_u, kf_anchor_z, NULL, &solver->anchor.found);
@@ -79,7 +80,7 @@ static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose 
     return false;
 }
 
-kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     kf_pose *found;
     kf_limit limit;
@@ -126,10 +127,11 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
  * With one driver these are with respect to it, and the same goes for the outputs y: yd = y' ud, ydd = y'' ud^2 + y'
  * udd.
  */
-void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
-                   double *rates, double *accelerations)
+inline void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd,
+                          double *outputs, double *rates, double *restrict accelerations)
 {
-    const bool one = KF_DRIVERS == 1;
+    double slopes[KF_ROOM(KF_OUTPUTS)];
+    double *restrict const slope = rates != NULL ? rates : slopes;
     int k;
     if (outputs != NULL) {
         kf_outputs(model, &pose->found, outputs);
@@ -137,23 +139,25 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
     if (accelerations != NULL) {
         kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, accelerations);
     }
-    if (one && accelerations != NULL) {
-        double slopes[KF_ROOM(KF_OUTPUTS)];
-        double *const slope = rates != NULL ? rates : slopes;
+    if (rates != NULL || (KF_DRIVERS == 1 && accelerations != NULL)) {
         kf_output_rates(model, &pose->found, pose->x1, slope);
-        for (k = 0; k < KF_OUTPUTS; ++k) {
-            accelerations[k] = accelerations[k] * (ud[0] * ud[0]) + slope[k] * udd[0];
-        }
-    } else if (rates != NULL) {
-        kf_output_rates(model, &pose->found, pose->x1, rates);
     }
-    for (k = 0; one && rates != NULL && k < KF_OUTPUTS; ++k) {
-        rates[k] *= ud[0];
+    if (KF_DRIVERS == 1 && accelerations != NULL) {
+        const double v = ud[0], square = v * v, a = udd[0];
+        for (k = 0; k < KF_OUTPUTS; ++k) {
+            accelerations[k] = accelerations[k] * square + slope[k] * a;
+            slope[k] *= v;
+        }
+    } else if (KF_DRIVERS == 1 && rates != NULL) {
+        const double v = ud[0];
+        for (k = 0; k < KF_OUTPUTS; ++k) {
+            rates[k] *= v;
+        }
     }
 }
 
-void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
-               double *rates, double *accelerations)
+inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
+                      double *rates, double *accelerations)
 {
     const kf_model *const model = &solver->model;
     const bool one = KF_DRIVERS == 1;

@@ -71,6 +71,22 @@ typedef struct {
     bool held[KF_ROOM(KF_BLOCKS)];
 } kf_span;
 
+/* A polynomial in Newton's form: see kinfmu/solver/hermite.py. */
+#define KF_MOST_NODES 4
+typedef struct {
+    int count; /* of the terms, three a node */
+    double coefficients[3 * KF_MOST_NODES], nodes[3 * KF_MOST_NODES];
+} kf_hermite;
+
+/* The polynomials of the unknowns through a span's inner nodes, and what they were made from. */
+typedef struct {
+    double half;
+    double z[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zd[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zdd[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    kf_hermite polynomials[KF_ROOM(KF_UNKNOWNS)];
+} kf_inner;
+
 /* A span, moved by whole turns of the driver and of each unknown: see kinfmu/solver/bridge.py. */
 typedef struct {
     int span; /* its number in the solver */
@@ -110,8 +126,9 @@ typedef struct {
     bool is_given;
 } kf_source;
 
-/* What does not outlive a call. */
+/* What does not outlive a call, but for the polynomials read last, which may be of use again. */
 typedef struct {
+    kf_inner inner;
     kf_pose base, way[4], walk[2], beside, located;
     kf_model ahead;
     kf_source source;

@@ -31,11 +31,6 @@ double kf_turned(double angle, double turns);
 double kf_whole_turns(double angle);
 
 /* hermite.c */
-#define KF_MOST_NODES 4
-typedef struct {
-    int count; /* of the terms, three a node */
-    double coefficients[3 * KF_MOST_NODES], nodes[3 * KF_MOST_NODES];
-} kf_hermite;
 void kf_hermite_through(int count, const double *nodes, const double samples[][3], kf_hermite *polynomial);
 void kf_hermite_at(const kf_hermite *polynomial, double x, double values[3]);
 void kf_weights(int count, const double *nodes, double x, double weights[][3]);
@@ -44,11 +39,12 @@ void kf_weights(int count, const double *nodes, double x, double weights[][3]);
 void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model);
 void kf_span_reverse(kf_span *span);
 void kf_span_hold(kf_span *span, const double *before, const double *after);
-void kf_combined(const kf_span *span, double half, int count, const int *nodes, double weights[][3], double *z);
+void kf_combined(const kf_span *span, double half, int count, const int *nodes, const double weights[][3],
+                 double *z);
 double kf_span_apart(const kf_span *span);
 void kf_span_middle(const kf_span *span, double *z);
-void kf_span_read(const kf_span *span, double x, double *z, double *zd, double *zdd);
-void kf_span_difference(const kf_span *span, double x, double *z, double *zd, double *zdd);
+void kf_span_read(const kf_span *span, kf_inner *inner, double x, double *z, double *zd, double *zdd);
+void kf_span_difference(const kf_span *span, kf_inner *inner, double x, double *z, double *zd, double *zdd);
 
 /* bridge.c */
 bool kf_covers(const kf_bridge *bridge, double u);

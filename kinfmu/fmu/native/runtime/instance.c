@@ -32,22 +32,16 @@ void kf_start(kf_instance *instance, bool model_exchange)
 
 /* What is asked for */
 
-void kf_forget_motion(kf_state *s)
+inline void kf_forget_motion(kf_state *s)
 {
     s->known = KF_GIVEN_PARTS;
     s->drive_known = false;
 }
 
-void kf_forget(kf_state *s)
+inline void kf_forget(kf_state *s)
 {
     s->solved = s->ahead = false;
     kf_forget_motion(s);
-}
-
-/* A place for a pose beside two others. */
-static int beside(int a, int b)
-{
-    return a == b ? (a + 1) % 3 : 3 - a - b;
 }
 
 static kf_answer bind(kf_instance *instance)
@@ -72,7 +66,7 @@ static void solve(kf_state *s, const double *u)
         s->asked = s->committed;
         s->status = s->committed_status;
     } else {
-        s->asked = beside(s->committed, s->committed);
+        s->asked = !s->committed;
         s->status = kf_solve(&s->solver, &s->poses[s->committed], u, &s->poses[s->asked]);
     }
     if (KF_GOOD(s->status)) {
@@ -83,7 +77,7 @@ static void solve(kf_state *s, const double *u)
     s->solved = true;
 }
 
-kf_status kf_ask(kf_instance *instance)
+inline kf_status kf_ask(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
     if (!s->solved) {
@@ -104,7 +98,7 @@ kf_status kf_ask(kf_instance *instance)
     return s->status;
 }
 
-kf_pose *kf_shown(kf_state *s)
+inline kf_pose *kf_shown(kf_state *s)
 {
     return &s->poses[KF_GOOD(s->status) ? s->asked : s->committed];
 }
@@ -120,7 +114,9 @@ static void commit(kf_state *s, double t)
         --s->samples;
     }
     if (s->samples == KF_SAMPLES) {
-        memmove(s->history, s->history + 1, (KF_SAMPLES - 1) * sizeof s->history[0]);
+        kf_sample kept[KF_SAMPLES - 1];
+        memcpy(kept, s->history + 1, sizeof kept);
+        memcpy(s->history, kept, sizeof kept);
         --s->samples;
     }
     sample = &s->history[s->samples++];

@@ -36,7 +36,7 @@ typedef struct {
  * Real variables stand in `real` by their value references; a bit of `known` says that those of a part are up to date.
  */
 typedef struct {
-    kf_pose poses[3];
+    kf_pose poses[2];
     int committed, asked; /* which of the poses; the same one if what is asked for is what was committed */
     bool solved;          /* poses[asked] is what is asked for */
     kf_status status, committed_status;
@@ -66,6 +66,14 @@ typedef struct {
 
 #define KF_STATE_SIZE (offsetof(kf_state, solver) + KF_SOLVER_STATE)
 
+/* The list of variables that was asked for last, and the parts that they belong to: hosts ask for the same over and over. */
+#define KF_LISTED 96
+typedef struct {
+    size_t count;
+    unsigned parts;
+    unsigned references[KF_LISTED];
+} kf_list;
+
 typedef void (*kf_tell)(const void *host, kf_answer answer, const char *category, const char *message);
 
 typedef struct {
@@ -74,6 +82,7 @@ typedef struct {
     const void *host;
     bool silent;
     unsigned muted; /* a bit a category */
+    kf_list list;
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 

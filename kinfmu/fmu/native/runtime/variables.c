@@ -4,6 +4,12 @@
 #include <math.h>
 #include <string.h>
 
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
+#define KF_UNROLLED _Pragma("GCC unroll 4") /* lists are short, and most of the work of a get */
+#else
+#define KF_UNROLLED
+#endif
+
 const char *kf_name_of(unsigned reference)
 {
     return reference < KF_VARIABLES ? kf_variable_names[reference] : NULL;
@@ -118,21 +124,38 @@ static kf_answer get_unusual(kf_instance *instance, const unsigned *references, 
     return answer;
 }
 
-kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
+/* The parts that variables belong to, a bit each. */
+static unsigned parts_of(kf_list *list, const unsigned *references, size_t count)
 {
-    const double *const real = instance->now.real;
-    kf_answer answer = KF_DONE;
     unsigned parts = 0;
     size_t k;
+    if (count == list->count && count && memcmp(references, list->references, count * sizeof *references) == 0) {
+        return list->parts;
+    }
     for (k = 0; k < count; ++k) {
         parts |= kf_bit_of[references[k] < KF_VARIABLES ? references[k] : KF_VARIABLES];
     }
+    if (count && count <= KF_LISTED) {
+        list->count = count;
+        list->parts = parts;
+        memcpy(list->references, references, count * sizeof *references);
+    }
+    return parts;
+}
+
+kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
+{
+    const double *const real = instance->now.real;
+    const unsigned parts = parts_of(&instance->list, references, count);
+    kf_answer answer = KF_DONE;
+    size_t k;
     if (parts & KF_NOT_REAL) {
         return get_unusual(instance, references, count, values);
     }
     if (parts & ~instance->now.known || !KF_GOOD(instance->now.status)) {
         answer = kf_read(instance, parts);
     }
+    KF_UNROLLED
     for (k = 0; k < count; ++k) {
         values[k] = real[references[k]];
     }
