@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from kinfmu.errors import FmuError
+from kinfmu.fmu.linear import linear_inputs
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.status import Status
@@ -35,8 +36,8 @@ class Variable:
     """One variable of an FMU, in FMI's words.
 
     derivative_of: the variable of which this is the time derivative. dependencies: the inputs that an output depends on
-    structurally (all of kind `dependent`), None where FMI lists none; initial_dependencies: inputs and parameters that
-    it depends on when the FMU is initialized.
+    structurally, None where FMI lists none; linear_in: those of them whose factor depends on fixed parameters alone;
+    initial_dependencies: inputs and parameters that it depends on when the FMU is initialized.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Variable:
     maximum: float | None = None
     derivative_of: str | None = None
     dependencies: tuple[str, ...] | None = None
+    linear_in: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] | None = None
 
     @property
@@ -113,9 +115,10 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
     mechanism = plan.mechanism
     every = tuple(range(len(plan.drivers)))
     depends = {name: plan.depends(name) for name in plan.outputs}
+    linear = linear_inputs(plan)
     parts: tuple[Part, ...] = (
         Part("inputs", tuple(_inputs(plan))),
-        Part("values", tuple(_output(plan, name, 0, depends[name]) for name in plan.outputs)),
+        Part("values", tuple(_output(plan, name, 0, depends[name], linear[name]) for name in plan.outputs)),
         Part("rates", tuple(_output(plan, name, 1, depends[name]) for name in plan.outputs)),
         Part("accelerations", tuple(_output(plan, name, 2, depends[name]) for name in plan.outputs)),
         Part("residual", (_residual(plan, every),)),
@@ -214,7 +217,9 @@ def _inputs(plan: SolvePlan) -> Iterator[Variable]:
             )
 
 
-def _output(plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...]) -> Variable:
+def _output(
+    plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...], linear_in: tuple[str, ...] = ()
+) -> Variable:
     owner, _, coordinate = name.rpartition(".")
     kind = "body" if owner in {body.name for body in plan.mechanism.bodies} else "point"
     return Variable(
@@ -227,6 +232,7 @@ def _output(plan: SolvePlan, name: str, order: int, drivers: tuple[int, ...]) ->
         unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
         derivative_of=derivative_name(name, order - 1) if order else None,
         dependencies=_input_names(plan, drivers, order),
+        linear_in=linear_in,
         initial_dependencies=(*_initial_names(plan, drivers, order), *plan.parameters_of(name)),
     )
 

@@ -99,7 +99,7 @@ def simulate(
         if table is not None:
             samples.extend(input_notes(interface, table, start, stop))
         with interruptible() as interrupted, slave(about, folder, samples.log) as one:
-            _initialize(one, settings, t, samples.said)
+            _initialize(one, settings, t, samples.first_error)
             samples.read_fixed(one)
             samples.begin(channels, sink)
             try:
@@ -188,8 +188,12 @@ def _time_drives(interface: Interface, parameters: Mapping[str, float | bool]) -
 
 
 def _initialize(
-    slave: Slave, parameters: Mapping[str, float | bool], t: NDArray[np.float64], messages: Callable[[], str]
+    slave: Slave, parameters: Mapping[str, float | bool], t: NDArray[np.float64], complaint: Callable[[], str]
 ) -> None:
+    """Set the parameters and initialize; FmuError if one is refused or if they cannot be had.
+
+    FMUs of the python flavour cannot answer Error there: what they tell is what counts.
+    """
     from fmpy.fmi1 import FMICallException
 
     try:
@@ -200,7 +204,9 @@ def _initialize(
                 slave.set([slave.references[name]], [value])
         slave.initialize(float(t[0]))
     except FMICallException as failure:
-        raise FmuError(messages() or str(failure)) from None
+        raise FmuError(complaint() or str(failure)) from None
+    if complaint():
+        raise FmuError(complaint())
 
 
 def _step_through(
@@ -284,9 +290,9 @@ class _Samples:
         """Events of their own times."""
         self._events.extend(events)
 
-    def said(self) -> str:
-        """The last message."""
-        return self._events[-1].text if self._events else ""
+    def first_error(self) -> str:
+        """The first message that tells of an error, empty if there is none."""
+        return next((event.text for event in self._events if event.level == "error"), "")
 
     def read_fixed(self, slave: Slave) -> None:
         """Coordinates that never move: constants, or what follows from the parameters."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
@@ -26,6 +27,9 @@ _STATUS_WORDS = {
     Status.NOT_CONVERGED: "no solution found",
 }
 UnknownKind = Literal["outputs", "initial"]
+Unknowns = dict[
+    str, tuple[tuple[str, str], ...] | None
+]  # by name what it depends on, each with its kind, or nothing told
 
 
 def text(value: float | bool) -> str:
@@ -102,11 +106,72 @@ def annotation(parent: Element, interface: Interface) -> None:
         SubElement(parts, "Part", name=part.name, variables=str(len(part.variables)))
 
 
-def unknowns(interface: Interface, kind: UnknownKind) -> list[tuple[Variable, tuple[str, ...] | None]]:
-    """What the model structure lists, with what it depends on: outputs, at first also what follows from parameters."""
+def attributes(variable: Variable, references: Mapping[str, int]) -> dict[str, str]:
+    """The attributes that every variable has, whatever its type."""
+    told = {
+        "name": variable.name,
+        "valueReference": str(references[variable.name]),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    return told | ({"initial": variable.initial} if variable.initial else {})
+
+
+def typed(variable: Variable) -> dict[str, str]:
+    """The attributes that depend on its type, but for what it is the derivative of."""
+    told: dict[str, str] = {}
+    if variable.type == "Enumeration":
+        told["declaredType"] = STATUS_TYPE
+    if variable.unit:
+        told["unit"] = variable.unit
+    if variable.display_unit:
+        told["displayUnit"] = variable.display_unit
+    return told | limits(variable)
+
+
+def unknowns(
+    interface: Interface, kind: UnknownKind, places: Mapping[str, int]
+) -> list[tuple[Variable, dict[str, str]]]:
+    """What the model structure lists, with the attributes that tell what it depends on.
+
+    These are the outputs, and at first also what follows from parameters. places: by which variables are told. A kind
+    `fixed` says that the factor depends on fixed parameters alone, `driven_by_time` among them; of initial unknowns FMI
+    wants none but `dependent` and `constant`.
+    """
     causalities = ("output",) if kind == "outputs" else ("output", "calculatedParameter")
-    return [
-        (variable, variable.dependencies if kind == "outputs" else variable.initial_dependencies)
-        for variable in interface
-        if variable.causality in causalities
-    ]
+    found = []
+    for variable in interface:
+        if variable.causality in causalities:
+            names = variable.dependencies if kind == "outputs" else variable.initial_dependencies
+            linear_in = variable.linear_in if kind == "outputs" else ()
+            told: dict[str, str] = {}
+            if names is not None:
+                ordered = sorted(names, key=places.__getitem__)
+                told["dependencies"] = " ".join(str(places[name]) for name in ordered)
+                told["dependenciesKind"] = " ".join("fixed" if name in linear_in else "dependent" for name in ordered)
+            found.append((variable, told))
+    return found
+
+
+def read_unknowns(elements: Iterable[Element], place: str, names: Mapping[str, str]) -> Unknowns:
+    """What elements of the model structure tell; place: the attribute that names the unknown, names: of the places."""
+    found: Unknowns = {}
+    for unknown in elements:
+        listed = unknown.get("dependencies")
+        depends = None
+        if listed is not None:
+            kinds = unknown.get("dependenciesKind", "").split()
+            depends = tuple((names[one], kind) for one, kind in zip(listed.split(), kinds, strict=True))
+        found[names[unknown.get(place, "")]] = depends
+    return found
+
+
+def dependencies(name: str, outputs: Unknowns, initial: Unknowns) -> dict[str, tuple[str, ...] | None]:
+    """The fields of a variable that tell what it depends on."""
+    now, first = outputs.get(name), initial.get(name)
+    return {
+        "dependencies": None if now is None else tuple(one for one, _ in now),
+        "linear_in": tuple(one for one, kind in now or () if kind == "fixed"),
+        "initial_dependencies": None if first is None else tuple(one for one, _ in first),
+    }

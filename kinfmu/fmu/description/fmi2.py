@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -36,24 +36,8 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
 
 
 def _variable(parent: Element, variable: Variable, references: Mapping[str, int]) -> None:
-    attributes = {
-        "name": variable.name,
-        "valueReference": str(references[variable.name]),
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-    }
-    if variable.initial:
-        attributes["initial"] = variable.initial
-    scalar = SubElement(parent, "ScalarVariable", attributes)
-    kind: dict[str, str] = {}
-    if variable.type == "Enumeration":
-        kind["declaredType"] = common.STATUS_TYPE
-    if variable.unit:
-        kind["unit"] = variable.unit
-    if variable.display_unit:
-        kind["displayUnit"] = variable.display_unit
-    kind |= common.limits(variable)
+    scalar = SubElement(parent, "ScalarVariable", common.attributes(variable, references))
+    kind = common.typed(variable)
     if variable.derivative_of:
         kind["derivative"] = str(references[variable.derivative_of] + 1)
     SubElement(scalar, variable.type, kind)
@@ -62,15 +46,12 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
     """Outputs and InitialUnknowns. An index is the place in the list, counted from 1."""
     structure = SubElement(root, "ModelStructure")
+    places = {name: reference + 1 for name, reference in references.items()}
     lists: tuple[tuple[str, common.UnknownKind], ...] = (("Outputs", "outputs"), ("InitialUnknowns", "initial"))
     for element, kind in lists:
         parent = SubElement(structure, element)
-        for variable, names in common.unknowns(interface, kind):
-            unknown = {"index": str(references[variable.name] + 1)}
-            if names is not None:
-                unknown["dependencies"] = " ".join(str(k) for k in sorted(references[name] + 1 for name in names))
-                unknown["dependenciesKind"] = " ".join("dependent" for _ in names)
-            SubElement(parent, "Unknown", unknown)
+        for variable, depends in common.unknowns(interface, kind, places):
+            SubElement(parent, "Unknown", {"index": str(places[variable.name])} | depends)
 
 
 def parts(root: Element) -> Element | None:
@@ -82,28 +63,16 @@ def variables(root: Element) -> list[dict[str, Any]]:
     """The fields of each variable."""
     scalars = list(root.iterfind("ModelVariables/ScalarVariable"))
     names = [scalar.get("name", "") for scalar in scalars]
-    outputs = _unknowns(root.iterfind("ModelStructure/Outputs/Unknown"), names)
-    initial = _unknowns(root.iterfind("ModelStructure/InitialUnknowns/Unknown"), names)
+    places = {str(k): name for k, name in enumerate(names, start=1)}
+    outputs = common.read_unknowns(root.iterfind("ModelStructure/Outputs/Unknown"), "index", places)
+    initial = common.read_unknowns(root.iterfind("ModelStructure/InitialUnknowns/Unknown"), "index", places)
     found = []
     for name, scalar in zip(names, scalars, strict=True):
         kind = next(child for child in scalar if child.tag in TYPES)
-        derivative = kind.get("derivative")
-        found.append(
-            {
-                "attributes": {**scalar.attrib, **kind.attrib},
-                "type": kind.tag,
-                "derivative_of": None if derivative is None else names[int(derivative) - 1],
-                "dependencies": outputs.get(name),
-                "initial_dependencies": initial.get(name),
-            }
-        )
-    return found
-
-
-def _unknowns(elements: Iterable[Element], names: Sequence[str]) -> dict[str, tuple[str, ...] | None]:
-    found: dict[str, tuple[str, ...] | None] = {}
-    for unknown in elements:
-        listed = unknown.get("dependencies")
-        depends = None if listed is None else tuple(names[int(index) - 1] for index in listed.split())
-        found[names[int(unknown.get("index", "0")) - 1]] = depends
+        fields = {
+            "attributes": {**scalar.attrib, **kind.attrib},
+            "type": kind.tag,
+            "derivative_of": places.get(kind.get("derivative", "none")),
+        }
+        found.append(fields | common.dependencies(name, outputs, initial))
     return found

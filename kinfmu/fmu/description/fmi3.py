@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -39,22 +39,7 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
 
 
 def _variable(parent: Element, variable: Variable, references: Mapping[str, int]) -> None:
-    attributes = {
-        "name": variable.name,
-        "valueReference": str(references[variable.name]),
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-    }
-    if variable.initial:
-        attributes["initial"] = variable.initial
-    if variable.type == "Enumeration":
-        attributes["declaredType"] = common.STATUS_TYPE
-    if variable.unit:
-        attributes["unit"] = variable.unit
-    if variable.display_unit:
-        attributes["displayUnit"] = variable.display_unit
-    attributes |= common.limits(variable)
+    attributes = common.attributes(variable, references) | common.typed(variable)
     if variable.derivative_of:
         attributes["derivative"] = str(references[variable.derivative_of])
     SubElement(parent, TYPES[variable.type], attributes)
@@ -65,12 +50,8 @@ def _structure(root: Element, interface: Interface, references: Mapping[str, int
     structure = SubElement(root, "ModelStructure")
     lists: tuple[tuple[str, common.UnknownKind], ...] = (("Output", "outputs"), ("InitialUnknown", "initial"))
     for element, kind in lists:
-        for variable, names in common.unknowns(interface, kind):
-            unknown = {"valueReference": str(references[variable.name])}
-            if names is not None:
-                unknown["dependencies"] = " ".join(str(k) for k in sorted(references[name] for name in names))
-                unknown["dependenciesKind"] = " ".join("dependent" for _ in names)
-            SubElement(structure, element, unknown)
+        for variable, depends in common.unknowns(interface, kind, references):
+            SubElement(structure, element, {"valueReference": str(references[variable.name])} | depends)
 
 
 def parts(root: Element) -> Element | None:
@@ -82,24 +63,14 @@ def variables(root: Element) -> list[dict[str, Any]]:
     """The fields of each variable."""
     elements = list(root.iterfind("ModelVariables/*"))
     names = {element.get("valueReference", ""): element.get("name", "") for element in elements}
-    outputs = _unknowns(root.iterfind("ModelStructure/Output"), names)
-    initial = _unknowns(root.iterfind("ModelStructure/InitialUnknown"), names)
+    outputs = common.read_unknowns(root.iterfind("ModelStructure/Output"), "valueReference", names)
+    initial = common.read_unknowns(root.iterfind("ModelStructure/InitialUnknown"), "valueReference", names)
     return [
         {
             "attributes": element.attrib,
             "type": _TYPES_BACK[element.tag],
             "derivative_of": names.get(element.get("derivative", "none")),
-            "dependencies": outputs.get(element.get("name", "")),
-            "initial_dependencies": initial.get(element.get("name", "")),
         }
+        | common.dependencies(element.get("name", ""), outputs, initial)
         for element in elements
     ]
-
-
-def _unknowns(elements: Iterable[Element], names: Mapping[str, str]) -> dict[str, tuple[str, ...] | None]:
-    found: dict[str, tuple[str, ...] | None] = {}
-    for unknown in elements:
-        listed = unknown.get("dependencies")
-        depends = None if listed is None else tuple(names[reference] for reference in listed.split())
-        found[names[unknown.get("valueReference", "")]] = depends
-    return found

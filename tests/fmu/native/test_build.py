@@ -15,7 +15,7 @@ import pytest
 
 import kinfmu
 from kinfmu.backends.c import compiler
-from kinfmu.errors import CompilerError, FmuError
+from kinfmu.errors import CompilerError, FmuError, RequestError
 from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native import archive
 from kinfmu.fmu.native.platforms import PLATFORMS, host
@@ -134,7 +134,7 @@ def test_other_platforms_without_zig_are_refused_with_what_brings_it(
     ],
 )
 def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, object], words: str) -> None:
-    with pytest.raises(FmuError, match=words):
+    with pytest.raises(RequestError, match=words):
         kinfmu.build(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
 
 

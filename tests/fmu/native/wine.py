@@ -1,0 +1,76 @@
+"""The Windows library of a native FMU, stepped under wine beside that of Linux: `scripts/wine` runs it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.backends.c import compiler
+from kinfmu.fmu import description
+from kinfmu.fmu.native.platforms import PLATFORMS, Platform
+
+AGREED = 1e-12  # largest difference of positions and rates: sines of another C library differ in the last digit
+HOST = Path(__file__).with_name("walk.c")
+WINE = ("wine64", "wine", "/usr/lib/wine/wine64")  # Debian keeps it out of the path
+
+
+def main() -> int:
+    """Exit status 0 if both libraries say the same, in both versions of FMI."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("mechanism", nargs="?", default="fourbar", choices=gallery.names(), help="of the gallery")
+    name = parser.parse_args().mechanism
+    wine = next((found for one in WINE if (found := shutil.which(one))), None)
+    if wine is None:
+        print("wine is not there; Debian's package is wine64", file=sys.stderr)
+        return 1
+    linux, windows = (
+        next(one for one in PLATFORMS if one.name == tuple_) for tuple_ in ("x86_64-linux", "x86_64-windows")
+    )
+    worst = 0.0
+    for fmi in (2, 3):
+        with tempfile.TemporaryDirectory() as folder:
+            here = Path(folder)
+            fmu = kinfmu.build(
+                kinfmu.load(name), here / "it.fmu", flavour="native", drive="inputs", fmi=fmi, platforms="all"
+            )
+            with zipfile.ZipFile(fmu) as zipped:
+                zipped.extractall(here)
+            ours = _walked(here, fmi, linux, [])
+            theirs = _walked(here, fmi, windows, [wine])
+        gap = float(np.abs(ours - theirs).max())
+        worst = max(worst, gap)
+        print(f"{name}, FMI {fmi}.0: {ours.shape[1]} outputs at {len(ours)} poses, largest difference {gap:.2g}")
+    return 0 if worst <= AGREED else 1
+
+
+def _walked(folder: Path, fmi: int, platform: Platform, by: Sequence[str]) -> NDArray[np.float64]:
+    """(361, outputs): all outputs of the platform's library over a turn; `by` runs the host."""
+    about = description.read((folder / "modelDescription.xml").read_bytes(), "it")
+    references = about.interface.value_references()
+    outputs = [v.name for part in ("values", "rates", "accelerations") for v in about.interface.part(part)]
+    suffix = ".exe" if platform.suffix == ".dll" else ""
+    host = folder / f"walk{suffix}"
+    compiler.compiled(compiler.zig(platform.target), {HOST.name: HOST.read_text("utf-8")}, (f"-DFMI={fmi}",), host)
+    library = folder / "binaries" / platform.folder(f"{fmi}.0") / f"{about.model_identifier}{platform.suffix}"
+    command = [*by, str(host), str(library), about.token, str(references[outputs[0]]), str(len(outputs))]
+    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(folder / "wine")}
+    done = subprocess.run(command, capture_output=True, text=True, env=quiet, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"{host.name} fails: {done.stdout}{done.stderr}")
+    return np.array([line.split() for line in done.stdout.splitlines()], dtype=np.float64)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

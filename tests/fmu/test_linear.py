@@ -1,0 +1,44 @@
+"""What outputs are linear in, structurally: what model descriptions call a dependency of kind `fixed`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.fmu.linear import linear_inputs
+from kinfmu.plan import compile_plan
+from tests.fmu.test_parameters import geared
+
+
+def _linear(mechanism: kinfmu.Mechanism) -> dict[str, tuple[str, ...]]:
+    return {name: inputs for name, inputs in linear_inputs(compile_plan(mechanism)).items() if inputs}
+
+
+@pytest.mark.parametrize(
+    ("name", "linear"),
+    [
+        ("fourbar", {"crank.phi": ("crank_angle",)}),  # and not rocker.phi, which Newton finds
+        ("five_bar", {"left_arm.phi": ("left_angle",), "right_arm.phi": ("right_angle",)}),
+        ("geared_five_bar", {"gear.phi": ("gear_angle",), "pinion.phi": ("gear_angle",)}),
+        ("excavator", {}),
+    ],
+)
+def test_gallery_mechanism_is_linear_in_what_turns_with_its_drivers(name: str, linear: dict[str, object]) -> None:
+    assert _linear(kinfmu.load(name)) == linear
+
+
+def test_factor_may_hold_a_parameter() -> None:
+    assert _linear(geared()) == {"crank.phi": ("crank_angle",), "wheel.phi": ("crank_angle",)}
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_what_is_called_linear_is_a_straight_line_over_the_run(name: str) -> None:
+    run = kinfmu.solve(kinfmu.load(name))
+    for output, inputs in _linear(kinfmu.load(name)).items():
+        columns = [run.inputs[:, run.input_names.index(one)] for one in inputs]
+        line = np.column_stack([np.ones_like(run.t), *columns])[run.good]
+        values = run[output][run.good]
+        factors, *_ = np.linalg.lstsq(line, values)
+        np.testing.assert_allclose(line @ factors, values, rtol=0, atol=1e-12 * max(1.0, np.abs(values).max()))
