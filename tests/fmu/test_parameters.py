@@ -181,7 +181,7 @@ def test_lengths_of_zero_that_leave_rows_dependent_are_told(tmp_path: Path) -> N
             Revolute("T", ("third.T", "coupler.M")),
         ),
     )
-    with pytest.raises(FmuError, match="^parameters crank = 0: lie behind a singular point, where rows "):
+    with pytest.raises(FmuError, match=r"^parameters crank = 0: lie behind a singular point, where rows "):
         kinfmu.simulate(kinfmu.build(changed, tmp_path), parameters={"crank": 0.0})
     with pytest.raises(MobilityError, match="mobility is 3"):
         kinfmu.solve(changed, parameters={"crank": 0.0})
