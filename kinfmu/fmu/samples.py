@@ -1,0 +1,177 @@
+"""The samples of a run while an FMU is stepped: read, kept, and passed on to a sink in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from time import perf_counter
+
+import numpy as np
+
+from kinfmu.channels import absent_columns
+from kinfmu.fmu.description import Description
+from kinfmu.fmu.slaves import Slave
+from kinfmu.run import Event, Run
+from kinfmu.sink import Sink
+from kinfmu.solver.status import Status
+
+PIECE = 64 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
+FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own
+PERIOD = 0.5  # [s] by the clock
+DISCARD, ERROR = 2, 3  # of FMI's statuses
+_LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
+_REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
+
+
+class Samples:
+    """Rows of a run as they come, and what the FMU says meanwhile."""
+
+    def __init__(
+        self,
+        about: Description,
+        count: int,
+        *,
+        settings: Mapping[str, float | bool],
+        mechanism_text: str,
+        model_description: str,
+    ) -> None:
+        interface = self._interface = about.interface
+        self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
+        most = count + 1  # and one without numbers
+        self._reals = np.full((most, self._ends[-1]), np.nan)
+        self._t = np.empty(most)
+        self._counts = np.empty((most, 2), dtype=np.int64)
+        self._size = 0
+        self._names = [variable.name for part in _REALS for variable in interface.part(part)]
+        self._absent: frozenset[str] = frozenset()
+        self._mechanism_text, self._model_description = mechanism_text, model_description
+        self._info = {
+            "name": interface.name,
+            "title": interface.title,
+            "generation_tool": about.generation_tool,
+            "token": about.token,
+            "parameters": ", ".join(f"{name} = {value!r}" for name, value in settings.items()),
+        }
+        self._events: list[Event] = []
+        self.now = 0.0
+        self.fixed: dict[str, float] = {}
+        self._sink: Sink | None = None
+        self._passed_on = self._events_passed_on = 0  # samples and events that the sink has
+        self._piece = 1  # samples that the sink gets at once
+        self._last_time = 0.0  # when it got some, by the clock
+
+    def log(self, status: int, text: str) -> None:
+        """A message of the FMU becomes an event at the current time."""
+        event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
+        if not self._events or self._events[-1] != event:
+            self._events.append(event)
+
+    def extend(self, events: Iterable[Event]) -> None:
+        """Events of their own times."""
+        self._events.extend(events)
+
+    def first_error(self) -> str:
+        """The first message that tells of an error, empty if there is none."""
+        return next((event.text for event in self._events if event.level == "error"), "")
+
+    def read_fixed(self, slave: Slave) -> None:
+        """Coordinates that never move: constants, or what follows from the parameters."""
+        names = [variable.name for variable in self._interface.part("fixed")]
+        values = slave.get([slave.references[name] for name in names]) if names else []
+        self.fixed = dict(zip(names, values, strict=True))
+
+    def begin(self, channels: Sequence[str] | None, sink: Sink | None) -> None:
+        """Choose the variables to ask for, and begin the sink's run."""
+        run = self._run(slice(0, 0))
+        self._absent = absent_columns(run, channels)
+        references = self._interface.value_references()
+        columns = [name.removeprefix("driven.") for name in self._names]  # what a run calls them
+        self._asked = np.array([k for k, name in enumerate(columns) if name not in self._absent], dtype=np.int64)
+        first = _REALS.index("driven")
+        drives = (self._ends[first - 1] <= self._asked) & (self._asked < self._ends[first])
+        self._asked_of_drivers = self._asked[drives]
+        self._references, self._references_of_drivers = (
+            [references[self._names[k]] for k in asked] for asked in (self._asked, self._asked_of_drivers)
+        )
+        self._sink = sink
+        if sink is not None:
+            self._piece = max(FEWEST, PIECE // (8 * (len(self._asked) + 3)))
+            self._last_time = perf_counter()
+            sink.begin(self._run(slice(0, 0)))
+
+    def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
+        """Read a sample if it is to be kept; False if it holds no numbers but the drivers' values asked for."""
+        status, iterations = slave.counts()
+        good = status <= Status.BRIDGED
+        if good and not is_kept:
+            self._pass_on_what_is_due()
+            return True
+        row = self._reals[self._size]
+        if good:
+            if self._references:
+                row[self._asked] = slave.get(self._references)
+        elif self._references_of_drivers:
+            row[self._asked_of_drivers] = slave.get(self._references_of_drivers)
+        self._t[self._size] = t
+        self._counts[self._size] = status, iterations
+        self._size += 1
+        self._pass_on_what_is_due()
+        return good
+
+    def _pass_on_what_is_due(self) -> None:
+        """The sink gets a piece when there is one, and what there is when PERIOD has passed."""
+        waiting = self._size - self._passed_on
+        if self._sink is not None and (waiting >= self._piece or perf_counter() - self._last_time > PERIOD):
+            self._pass_on()
+
+    def end(self, reason: str = "") -> Run:
+        """All rows as a Run; reason: why it ended by an error."""
+        if reason:
+            self.log(ERROR, reason)
+        run = self._run(slice(0, self._size), tuple(self._events))
+        self._pass_on()
+        if self._sink is not None:
+            self._sink.end(run, reason)
+        return run
+
+    def _pass_on(self) -> None:
+        """The sink gets what it has not got yet."""
+        rows = slice(self._passed_on, self._size)
+        events = tuple(self._events[self._events_passed_on :])
+        self._passed_on, self._events_passed_on = self._size, len(self._events)
+        sink, self._sink = self._sink, None  # one that fails is not called again
+        if sink is not None and (events or rows.start < rows.stop):
+            sink.add(self._run(rows, events))
+        self._sink = sink
+        self._last_time = perf_counter()
+
+    def _run(self, rows: slice, events: tuple[Event, ...] = ()) -> Run:
+        pieces = np.split(self._reals[rows].copy(), self._ends[:-1], axis=1)
+        part = dict(zip(_REALS, pieces, strict=True))
+        counts = self._counts[rows].copy()
+        if "solver.iterations" in self._absent:
+            counts[:, 1] = 0
+        interface = self._interface
+        return Run(
+            t=self._t[rows].copy(),
+            outputs=tuple(variable.name for variable in interface.part("values")),
+            coordinate_count=interface.coordinate_count,
+            values=part["values"],
+            rates=part["rates"],
+            accelerations=part["accelerations"],
+            fixed=self.fixed,
+            input_names=tuple(variable.name for variable in interface.part("inputs")),
+            inputs=part["driven"],
+            status=counts[:, 0],
+            iterations=counts[:, 1],
+            residual=part["residual"][:, 0],
+            margin=part["margin"][:, 0],
+            error=part["errors"],
+            watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
+            watch=part["watch"],
+            length_unit=interface.length_unit,
+            mechanism_text=self._mechanism_text,
+            model_description=self._model_description,
+            info=self._info,
+            events=events,
+            absent=self._absent,
+        )
