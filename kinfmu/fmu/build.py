@@ -41,22 +41,8 @@ def build(
     The same mechanism, compiled by the same compiler, gives the same bytes. CompilerError if there is no compiler.
     """
     refuse_other(mechanism, "build")
-    if flavour not in FLAVOURS:
-        raise RequestError(
-            f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"
-        )
     drive = default_drive(mechanism) if drive is None else drive
-    if drive not in DRIVES:
-        raise RequestError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
-    if fmi not in FMI_VERSIONS:
-        raise RequestError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
-    if platforms not in PLATFORMS:
-        raise RequestError(
-            f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
-        )
-    if flavour == "python" and (fmi != 2 or platforms != "host"):
-        said = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
-        raise RequestError(f"{said} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")
+    _check(flavour, drive, fmi, platforms)
     from kinfmu import VERSION
     from kinfmu.plan import compile_plan
 
@@ -70,15 +56,27 @@ def build(
         from kinfmu.fmu import native
 
         data = native.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress)
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.write_bytes(data)
-        unfinished.replace(path)  # a host never sees half an FMU
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
+    _write(path, data)
     return path
+
+
+def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
+    """Raise a RequestError for choices that are not there, or not together."""
+    if flavour not in FLAVOURS:
+        raise RequestError(
+            f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"
+        )
+    if drive not in DRIVES:
+        raise RequestError(f"drive = '{drive}' is not known{suggestion(drive, DRIVES)}; known: {listed(DRIVES)}")
+    if fmi not in FMI_VERSIONS:
+        raise RequestError(f"fmi = {fmi!r} is not known; known: {listed(map(str, FMI_VERSIONS))}")
+    if platforms not in PLATFORMS:
+        raise RequestError(
+            f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
+        )
+    if flavour == "python" and (fmi != 2 or platforms != "host"):
+        said = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
+        raise RequestError(f"{said} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")
 
 
 def default_drive(mechanism: Mechanism) -> Drive:
@@ -93,3 +91,15 @@ def _file(path: str | Path | None, name: str) -> Path:
     if path.suffix != ".fmu":
         raise RequestError(f"{path}: is no folder, and the file of an FMU ends in .fmu")
     return path
+
+
+def _write(path: Path, data: bytes) -> None:
+    """The whole file or none: a host never sees half an FMU."""
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_bytes(data)
+        unfinished.replace(path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise FmuError(f"{path}: cannot be written ({error.strerror})") from None
