@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinfmu.log.blocks import send
+from kinfmu.log.frames import Frames
+from kinfmu.log.ground import MOST_NAMES, log_ground
 from kinfmu.log.scene import DrawnBody, Scene
 from kinfmu.log.strokes import BROAD, LINK, Stroke
 from kinfmu.run import FloatArray, Run
@@ -17,12 +18,10 @@ if TYPE_CHECKING:
     import rerun as rr
 
 MARGIN = 0.12  # around the linkage, as a part of its size
-MOST_NAMES = 12  # more names than this would hide the linkage; they show when pointed at
 TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
 _BAR, _PIN, _POINT = 0.006, 0.012, 0.015  # radii, as parts of the size
-_HATCH = 0.05  # height of a support, as a part of the size
 _SUPPORT_NAMES = 0.04  # more room below, for the names of supports
 
 
@@ -81,23 +80,24 @@ class _Linkage:
         self.colour, self.layer = colour, layer
         self.size = width * scene.stroke
         self.width = width
-        self.good = np.flatnonzero(run.good)
+        self.frames = Frames(rec, run, self.size, layer)
         self.named = colour is None and len(scene.bodies) <= MOST_NAMES
 
     def log(self) -> None:
+        """Everything, the ground first."""
         import rerun as rr
 
         # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
         self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
-        self._ground()
+        log_ground(self.rec, self.root, self.scene, _PIN * self.size)
         for body in self.scene.bodies:
             self._body(body)
         for bar in self.scene.bars:
             path = f"{self.root}/bars/{bar.name}"
             along = bar.ends[:, 1] - bar.ends[:, 0]
-            self._move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
+            self.frames.move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
             line = np.array([[0.0, 0.0], [bar.length, 0.0]])
-            self._lines(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name)
+            self.frames.line(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name, self.named)
         self._cylinders()
         for index, (name, points) in enumerate(self.scene.paths.items()):
             own = self.colour or palette.body(len(self.scene.bodies) + index)
@@ -110,10 +110,10 @@ class _Linkage:
         path = f"{self.root}/bodies/{body.name}"
         own = self.colour or palette.body(body.index)
         order = 20.0 + body.index / 100.0
-        self._move(path, body.pose)
+        self.frames.move(path, body.pose)
         has_link = len(body.outline) > 1
         if has_link:
-            self._lines(path, body.outline, LINK, own, order, body.name)
+            self.frames.line(path, body.outline, LINK, own, order, body.name, self.named)
         for k, stroke in enumerate(body.strokes):
             label = body.name if k == 0 and not has_link else None
             self._stroke(path, stroke, own, order, label)
@@ -122,13 +122,15 @@ class _Linkage:
         names = list(self.scene.paths)
         for name, at in body.points.items():
             tint = self.colour or palette.body(first + names.index(name))
-            self._points(f"{path}/points/{name}", at[None], _POINT, tint, 40.0, [name], self.colour is None)
+            self.frames.points(f"{path}/points/{name}", at[None], _POINT, tint, 40.0, [name], self.colour is None)
 
     def _stroke(self, path: str, stroke: Stroke, own: palette.Colour, order: float, label: str | None = None) -> None:
         tones = {"own": own, "grey": palette.GROUND, "dark": palette.BACKDROP}
         tint = self.colour if self.colour and stroke.tone != "dark" else tones[stroke.tone]
         below = -0.5 if stroke.tone == "own" and not stroke.layer else 0.0  # a cam lies under the link through its pins
-        self._lines(f"{path}/{stroke.name}", stroke.points, stroke.radius, tint, order + stroke.layer + below, label)
+        self.frames.line(
+            f"{path}/{stroke.name}", stroke.points, stroke.radius, tint, order + stroke.layer + below, label, self.named
+        )
 
     def _cylinders(self) -> None:
         for cylinder in self.scene.cylinders:
@@ -136,94 +138,20 @@ class _Linkage:
             a, b = cylinder.ends[:, 0], cylinder.ends[:, 1]
             angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
             rod = np.array([[-shape.rod, 0.0], [0.0, 0.0]])
-            self._move(f"{path}/rod", np.column_stack([b, angle]))
-            self._lines(f"{path}/rod", rod, _BAR, self.colour or palette.lighter(palette.BAR), 26.0)
+            self.frames.move(f"{path}/rod", np.column_stack([b, angle]))
+            self.frames.line(f"{path}/rod", rod, _BAR, self.colour or palette.lighter(palette.BAR), 26.0)
             barrel = np.array([[0.0, 0.0], [shape.barrel, 0.0]])
-            self._move(f"{path}/barrel", np.column_stack([a, angle]))
-            self._lines(f"{path}/barrel", barrel, 0.8 * BROAD, self.colour or palette.GROUND, 27.0)
+            self.frames.move(f"{path}/barrel", np.column_stack([a, angle]))
+            self.frames.line(f"{path}/barrel", barrel, 0.8 * BROAD, self.colour or palette.GROUND, 27.0)
             pin = np.zeros((1, 2))
             for part in ("rod", "barrel"):
-                self._points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
-
-    def _move(self, path: str, pose: FloatArray) -> None:
-        """Frames (n, 3) of an entity, at the samples that hold numbers."""
-        import rerun as rr
-
-        known = pose[self.good]
-        zero = np.zeros(len(known))
-        half = 0.5 * known[:, 2]
-        turn = np.column_stack([zero, zero, np.sin(half), np.cos(half)]).astype(np.float32)
-        shift = np.column_stack([known[:, :2], zero]).astype(np.float32)
-        send(
-            self.rec,
-            path,
-            self.run.t[self.good],
-            lambda rows: rr.Transform3D.columns(translation=shift[rows], quaternion=turn[rows]),
-        )
-
-    def _lines(
-        self, path: str, line: FloatArray, radius: float, colour: palette.Colour, order: float, label: str | None = None
-    ) -> None:
-        """A line that stands still in its frame, from the first pose on; grey where the last pose stands in."""
-        import rerun as rr
-
-        if not len(self.good):
-            return
-        look: dict[str, Any] = {
-            "radii": [radius * self.size],
-            "labels": [label] if label else None,
-            "show_labels": self.named if label else None,
-            "draw_order": self.layer + order,
-        }
-        strip = [line.astype(np.float32)]
-        if self.run.good.all():
-            self.rec.log(path, rr.LineStrips2D(strip, colors=[colour], **look), static=True)
-            return
-        self.rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
-        send(self.rec, path, self.run.t[self.good[:1]], lambda _: rr.LineStrips2D.columns(strips=strip))
-        turns = self._turns()
-        colours = np.array([colour if good else palette.OUT_OF_REACH for good in self.run.good[turns]], np.uint8)
-        send(self.rec, path, self.run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
-
-    def _turns(self) -> NDArray[np.int64]:
-        """The first sample of each stretch with numbers, and of each without."""
-        return np.flatnonzero(np.diff(self.run.good.astype(int), prepend=-1))
+                self.frames.points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
 
     def _pins(self, path: str, pins: tuple[tuple[str, FloatArray], ...]) -> None:
         """Pins with the names of their joints, which show when pointed at."""
         if pins:
             names, at = zip(*pins, strict=True)
-            self._points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
-
-    def _points(
-        self,
-        path: str,
-        points: FloatArray,
-        radius: float,
-        colour: palette.Colour,
-        order: float,
-        names: list[str],
-        shown: bool,
-    ) -> None:
-        """Points (k, 2) that stand still in their frame, from the first pose on."""
-        import rerun as rr
-
-        if not len(self.good):
-            return
-        look: dict[str, Any] = {
-            "radii": [radius * self.size],
-            "colors": [colour],
-            "labels": names,
-            "show_labels": shown,
-            "draw_order": self.layer + order,
-        }
-        at = points.astype(np.float32)
-        if self.run.good.all():
-            self.rec.log(path, rr.Points2D(at, **look), static=True)
-            return
-        self.rec.log(path, rr.Points2D.from_fields(**look), static=True)
-        columns = rr.Points2D.columns(positions=at).partition([len(at)])
-        send(self.rec, path, self.run.t[self.good[:1]], lambda _: columns)
+            self.frames.points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
         """Where a point goes over the run, in one piece for each stretch without a gap."""
@@ -271,7 +199,7 @@ class _Linkage:
         place = [(scene.low[0] + scene.high[0]) / 2, scene.high[1] + 0.6 * MARGIN * scene.size]
         look = rr.Points2D.from_fields(colors=[palette.STATUS[3]], radii=[0.0], show_labels=True)
         self.rec.log(path, look, static=True)
-        turns = self._turns()
+        turns = self.frames.turns()
         lost = ~run.good[turns]
         before = ~np.maximum.accumulate(run.good)[turns]
         texts = [
@@ -289,67 +217,9 @@ class _Linkage:
 
         send(self.rec, path, run.t[turns], columns)
 
-    def _ground(self) -> None:
-        """Supports as triangles on hatched lines, rails, and what else joints add to the ground."""
-        import rerun as rr
-
-        root, scene = self.root, self.scene
-        height = _HATCH * scene.stroke
-        strips: list[NDArray[Any]] = [
-            np.array(point) + height * stroke for point in scene.supports.values() for stroke in _support()
-        ]
-        for stroke in scene.ground:
-            strips += _rail(stroke, height) if stroke.name.startswith("rail/") else [stroke.points]
-        if strips:
-            lines = rr.LineStrips2D(strips, colors=[palette.GROUND], radii=rr.Radius.ui_points(0.9), draw_order=0.0)
-            self.rec.log(f"{root}/ground", lines, static=True)
-        if scene.supports:
-            names = list(scene.supports)
-            below = np.array(list(scene.supports.values())) - [0.0, 1.7 * height]
-            labels = rr.Points2D(
-                below, labels=names, colors=[palette.GROUND], radii=[0.0], show_labels=len(names) <= MOST_NAMES
-            )
-            self.rec.log(f"{root}/ground/names", labels, static=True)
-        if scene.pins:
-            names, at = map(list, zip(*scene.pins, strict=True))
-            pins = rr.Points2D(
-                at, labels=names, colors=[palette.PIN], radii=[_PIN * self.size], show_labels=False, draw_order=30.0
-            )
-            self.rec.log(f"{root}/ground/pins", pins, static=True)
-
 
 def stretches(points: FloatArray) -> list[FloatArray]:
     """The parts of a path (n, 2) between its gaps, those of more than one point."""
     known = np.isfinite(points).all(axis=1)
     pieces = [piece[np.isfinite(piece).all(axis=1)] for piece in np.split(points, np.flatnonzero(~known)) if len(piece)]
     return [piece for piece in pieces if len(piece) > 1]
-
-
-def _support() -> list[FloatArray]:
-    """Strokes of a support for a pin at (0, 0), height 1: a triangle on a line with hatching below."""
-    feet = np.array([[-0.6, -1.0], [0.6, -1.0]])
-    triangle = np.vstack([[0.0, 0.0], feet, [0.0, 0.0]])
-    line = np.array([[-1.0, -1.0], [1.0, -1.0]])
-    return [triangle, line, *_hatching(line[0], line[1], 0.45)]
-
-
-def _rail(rail: Stroke, height: float) -> list[FloatArray]:
-    """A rail beyond the way of its slide, with hatching on the side of the ground."""
-    first, last = rail.points
-    length = float(np.hypot(*(last - first)))
-    along = (last - first) / length if length > 0.0 else np.array([1.0, 0.0])
-    if along[0] < 0.0:
-        first, last, along = last, first, -along  # so that the ground is below
-    down = 0.5 * height * np.array([along[1], -along[0]])
-    line = np.array([first - 0.8 * height * along, last + 0.8 * height * along]) + down
-    return [line, *_hatching(line[0], line[1], 0.45 * height)]
-
-
-def _hatching(first: FloatArray, last: FloatArray, depth: float) -> list[FloatArray]:
-    """Strokes to the right of a line, looking along it."""
-    length = float(np.hypot(*(last - first)))
-    along = (last - first) / length
-    count = max(round(length / (0.8 * depth)), 3)
-    right = np.array([along[1], -along[0]])
-    tops = first + np.linspace(0.12, 1.0, count)[:, None] * (last - first)
-    return [np.array([top, top + depth * (right - 0.75 * along)]) for top in tops]

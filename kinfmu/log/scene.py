@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Distance
+from kinfmu.joints.placement import body_of
 from kinfmu.log.strokes import Stroke, strokes
 from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.body import GROUND_NAME
@@ -114,11 +115,9 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
     shown = _instant(run, mechanism, poses)
     added = strokes(shown) if shown else {}
     cylinders = cylinder_shapes(shown) if shown else []
-    used = {name for joint in mechanism.joints for name in supported(joint)}
-    used |= {end for cylinder in cylinders for end in cylinder.between}
 
     def track(point: str) -> FloatArray | None:
-        body = point.partition(".")[0]
+        body = body_of(point)
         if body == GROUND_NAME:
             return np.tile(np.array(points[point]), (len(run), 1))
         return world(poses[body], points[point]) if body in poses else None
@@ -127,10 +126,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         a, b = map(track, between)
         return None if a is None or b is None else np.stack([a, b], axis=1)
 
-    pins: dict[str, list[tuple[str, FloatArray]]] = {}
-    for joint in mechanism.joints:
-        for name in pins_of(joint):
-            pins.setdefault(name.partition(".")[0], []).append((joint.name, np.array(points[name])))
+    pins = _pins(mechanism)
     bodies = tuple(
         DrawnBody(
             body.name,
@@ -138,7 +134,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
             outline(points_of(body)),
             tuple(added.get(body.name, ())),
             tuple(pins.get(body.name, ())),
-            {name: np.array(points[p]) for name, p in mechanism.points.items() if p.partition(".")[0] == body.name},
+            {name: np.array(points[p]) for name, p in mechanism.points.items() if body_of(p) == body.name},
             poses[body.name],
         )
         for index, body in enumerate(mechanism.moving_bodies)
@@ -150,11 +146,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         if isinstance(joint, Distance) and (ends := ends_of(joint.between)) is not None
     )
     driven = tuple(DrawnCylinder(shape, ends) for shape in cylinders if (ends := ends_of(shape.between)) is not None)
-    supports = {
-        name.partition(".")[2]: (point[0], point[1])
-        for name, point in points.items()
-        if name in used and name.startswith(f"{GROUND_NAME}.")
-    }
+    supports = _supports(mechanism, cylinders)
     ground = tuple(added.get(GROUND_NAME, ()))
     return Scene(
         bodies,
@@ -167,6 +159,24 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
         left_out,
         *_bounds(bodies, ground, supports),
     )
+
+
+def _pins(mechanism: Mechanism) -> dict[str, list[tuple[str, FloatArray]]]:
+    """Pins by body, in its frame, each with the name of its joint."""
+    points = mechanism.body_points
+    pins: dict[str, list[tuple[str, FloatArray]]] = {}
+    for joint in mechanism.joints:
+        for name in pins_of(joint):
+            pins.setdefault(body_of(name), []).append((joint.name, np.array(points[name])))
+    return pins
+
+
+def _supports(mechanism: Mechanism, cylinders: Sequence[CylinderShape]) -> dict[str, tuple[float, float]]:
+    """Points of the ground, by name, that hold joints or cylinders."""
+    used = {name for joint in mechanism.joints for name in supported(joint)}
+    used |= {end for cylinder in cylinders for end in cylinder.between}
+    points = mechanism.body_points.items()
+    return {name.partition(".")[2]: at for name, at in points if name in used and body_of(name) == GROUND_NAME}
 
 
 def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> Instant | None:
