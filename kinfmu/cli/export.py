@@ -44,6 +44,7 @@ FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
     ".png": _plot,
     ".gif": _animation,
 }
+PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
 
 
 def _between(run: Run, start: float | None, stop: float | None) -> Run:
@@ -56,9 +57,6 @@ def _between(run: Run, start: float | None, stop: float | None) -> Run:
         told = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run) else "none"
         raise RequestError(f"--start, --stop: the run has no samples from {first:g} to {last:g} s; its samples: {told}")
     return run.part(rows, events=tuple(event for event in run.events if first <= event.t <= last))
-
-
-PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
 
 
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -69,9 +69,7 @@ def simulate(
     from tempfile import TemporaryDirectory
 
     from kinfmu.channels import is_drawn
-    from kinfmu.fmu import build as built
     from kinfmu.fmu import simulate as simulated
-    from kinfmu.fmu.build import default_drive
     from kinfmu.log import McapLog, write_rrd
 
     if wrap and inputs is None:
@@ -82,14 +80,7 @@ def simulate(
         if path is not None and not is_logged:
             raise click.UsageError(f"--channels none keeps nothing to write to {path}")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
-        fmu, parameters = Path(model), as_values(settings)
-        if fmu.suffix != ".fmu":
-            mech = gallery.load(model)
-            given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
-            parameters = {**given.constants, **given.of_run}
-            with about(model):
-                mech = mech.with_parameters(given.parameters)
-                fmu = built(mech, Path(folder), drive="inputs" if inputs else default_drive(mech))
+        fmu, parameters = _fmu(model, settings, Path(folder), has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
         needs_room = is_logged and (mcap is None or rrd is None)
@@ -107,16 +98,31 @@ def simulate(
                 sink=McapLog(record, drawn=is_drawn(names)) if record else None,
                 progress=progress,
             )
-    if record and recording:
+    if recording:
         write_rrd(run, recording)
     tell_of(run)
-    if record and recording:
-        replaced = " (an older run of that name was replaced)" if is_replaced else ""
-        click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}")
+    replaced = " (an older run of that name was replaced)" if is_replaced else ""
+    click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}" if record else verdict(run))
+    if record:
         click.echo(f"to look at it: kinfmu review {record}")
-    else:
-        click.echo(verdict(run))
     fail_if_failed(run)
+
+
+def _fmu(
+    model: str, settings: Sequence[tuple[str, str]], folder: Path, *, has_inputs: bool
+) -> tuple[Path, dict[str, float | str | bool]]:
+    """The FMU that is asked for, built in `folder` if a mechanism is, and the parameters to set in it."""
+    from kinfmu.fmu import build
+    from kinfmu.fmu.build import default_drive
+
+    if model.endswith(".fmu"):
+        return Path(model), as_values(settings)
+    mech = gallery.load(model)
+    given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
+    with about(model):
+        mech = mech.with_parameters(given.parameters)
+        fmu = build(mech, folder, drive="inputs" if has_inputs else default_drive(mech))
+    return fmu, {**given.constants, **given.of_run}
 
 
 def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:

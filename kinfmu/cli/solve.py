@@ -12,7 +12,7 @@ from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, names_in, set_option
 from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import TOLERANCE, settled, tolerance_of
+from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
 from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
@@ -80,11 +80,7 @@ def solve(
     given = settled(mechanism, mech, settings, (TOLERANCE,))
     t, samples = None, {}
     if angle:
-        if len(mech.drivers) != 1:
-            names = listed(driver.name for driver in mech.drivers)
-            raise click.UsageError(f"--angle drives one driver, {mechanism} has {names}; simulate --input drives them")
-        for name in given.constants:
-            raise click.UsageError(f"--set {name} changes the law, which --angle does not use")
+        _check_one_driver(mechanism, given)
         samples = _driver_values(angle, mech.drivers[0], mech.length_unit, wrap)
     else:
         t = run_times(RunSettings(*times)) if times else None
@@ -104,6 +100,16 @@ def solve(
     tell_of(run)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run, by_samples=angle is not None)
+
+
+def _check_one_driver(name: str, given: Settings) -> None:
+    """UsageError if --angle cannot drive the mechanism of that name alone, or --set changes the law it replaces."""
+    drivers = given.mechanism.drivers
+    if len(drivers) != 1:
+        names = listed(driver.name for driver in drivers)
+        raise click.UsageError(f"--angle drives one driver, {name} has {names}; simulate --input drives them")
+    for constant in given.constants:
+        raise click.UsageError(f"--set {constant} changes the law, which --angle does not use")
 
 
 def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> dict[str, Any]:
