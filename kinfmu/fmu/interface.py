@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from kinfmu.errors import FmuError
-from kinfmu.fmu.linear import linear_inputs
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.status import Status
@@ -112,6 +111,8 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
 
     has_time: time is a variable, too, the last one, as FMI 3.0 wants it; what the drivers move depends on it.
     """
+    from kinfmu.fmu.linear import linear_inputs  # with scipy, which stepping an FMU does not need
+
     mechanism = plan.mechanism
     every = tuple(range(len(plan.drivers)))
     depends = {name: plan.depends(name) for name in plan.outputs}
