@@ -12,6 +12,7 @@ from kinfmu.joints.laws import RISES, Law, MotionSequence, Polynomial, Segment, 
 from kinfmu.joints.laws.law import number_fields
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.table_file import read_table
+from kinfmu.mechanism.toml_tables import text_of
 
 _SEGMENT_KEYS = ("law", "rise", "duration")
 
@@ -53,9 +54,7 @@ def _read(where: str, value: Any, law: type[Law], key: str) -> Any:
     if law is MotionSequence:
         return _truth(where, value) if key == "repeat" else _segments(where, value)
     if key == "ends":
-        if not isinstance(value, str):
-            raise MechanismError(f"{where} = {quoted(value)} must be text")
-        return value
+        return text_of(where, value)
     if not isinstance(value, list) or any(not isinstance(point, list) or len(point) != 2 for point in value):
         raise MechanismError(f"{where} = {quoted(value)} must be a list of points [[x, u], [x, u], ...]")
     return tuple(tuple(point) for point in value)
@@ -79,8 +78,7 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
         if key not in _SEGMENT_KEYS:
             near = suggestion(key, _SEGMENT_KEYS)
             raise MechanismError(f"{where} {quoted(key)} is no key{near}; keys: {listed(_SEGMENT_KEYS)}")
-    if not isinstance(table.get("law", ""), str):
-        raise MechanismError(f"{where} law = {quoted(table['law'])} must be text")
+    text_of(f"{where} law", table.get("law", ""))
     words = [rise.type for rise in RISES]
     needed = ("law", "duration") if table.get("law") not in words else _SEGMENT_KEYS
     for key in needed:

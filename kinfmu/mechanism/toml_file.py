@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from kinfmu.drivers import DRIVERS, Driver
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, listed
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.joints.laws import LAWS, External, Law
 from kinfmu.joints.measures import MEASURES, Measure
@@ -23,6 +23,16 @@ from kinfmu.mechanism.number import written
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.run_settings import RunSettings
+from kinfmu.mechanism.toml_tables import (
+    check_keys,
+    chosen,
+    member_keys,
+    named,
+    subtable,
+    table_of,
+    tables_of,
+    text_of,
+)
 from kinfmu.mechanism.valid import check_name
 from kinfmu.units import METRES, Quantity, unit_of
 
@@ -73,15 +83,15 @@ def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mecha
 
 
 def _mechanism(document: dict[str, Any], folder: Path) -> Mechanism:
-    _known_keys("", document, _TABLES)
-    units = _table(document, "units")
-    _known_keys("[units]", units, ("length",))
-    unit = _text("[units] length", units.get("length", "m"))
-    outputs = _table(document, "outputs")
-    _known_keys("[outputs]", outputs, ("coordinates",))
+    check_keys("", document, _TABLES)
+    units = table_of(document, "units")
+    check_keys("[units]", units, ("length",))
+    unit = text_of("[units] length", units.get("length", "m"))
+    outputs = table_of(document, "outputs")
+    check_keys("[outputs]", outputs, ("coordinates",))
     coordinates = outputs.get("coordinates", "moving")
     if isinstance(coordinates, list):
-        coordinates = tuple(_text("[outputs] coordinates", name, "text such as 'crank.phi'") for name in coordinates)
+        coordinates = tuple(text_of("[outputs] coordinates", name, "text such as 'crank.phi'") for name in coordinates)
     elif not isinstance(coordinates, str):
         raise MechanismError(
             f"[outputs] coordinates = {quoted(coordinates)} must be 'moving', 'all' or a list of names"
@@ -90,19 +100,19 @@ def _mechanism(document: dict[str, Any], folder: Path) -> Mechanism:
         raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
     reader = _Reader(_checked_unit(unit), folder)
     return Mechanism(
-        name=_text("name", document["name"]),
-        title=_text("title", document.get("title", "")),
+        name=text_of("name", document["name"]),
+        title=text_of("title", document.get("title", "")),
         length_unit=unit,
-        bodies=tuple(reader.body(name, body) for name, body in _tables(document, "bodies")),
-        joints=tuple(reader.joint(name, joint) for name, joint in _tables(document, "joints")),
-        drivers=tuple(reader.driver(name, driver) for name, driver in _tables(document, "drivers")),
+        bodies=tuple(reader.body(name, body) for name, body in tables_of(document, "bodies")),
+        joints=tuple(reader.joint(name, joint) for name, joint in tables_of(document, "joints")),
+        drivers=tuple(reader.driver(name, driver) for name, driver in tables_of(document, "drivers")),
         points={
-            name: _text(f"[points] {name}", target, "text such as 'body.point'")
-            for name, target in _named(document, "points")
+            name: text_of(f"[points] {name}", target, "text such as 'body.point'")
+            for name, target in named(document, "points")
         },
         coordinates=coordinates,
-        parameters={name: _parameter(name, value) for name, value in _named(document, "parameters")},
-        run=reader.run(_table(document, "run")),
+        parameters={name: _parameter(name, value) for name, value in named(document, "parameters")},
+        run=reader.run(table_of(document, "run")),
     )
 
 
@@ -126,15 +136,15 @@ class _Reader:
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
         where = f"[bodies.{name}]"
-        _known_keys(where, table, ("points", "start"))
+        check_keys(where, table, ("points", "start"))
         points = {}
-        for point, value in _subtable(where, table, "points").items():
+        for point, value in subtable(where, table, "points").items():
             check_name(f"{where} points", point)
             if not isinstance(value, list) or len(value) != 2:
                 raise MechanismError(f"{where} points.{point} = {quoted(value)} must be two numbers [x, y]")
             points[point] = Point(*(self.number(f"{where} points.{point}", v, _LENGTH) for v in value))
-        start = _subtable(where, table, "start")
-        _known_keys(f"{where} start", start, ("x", "y", "phi"))
+        start = subtable(where, table, "start")
+        check_keys(f"{where} start", start, ("x", "y", "phi"))
         quantities = {"x": _LENGTH, "y": _LENGTH, "phi": _ANGLE}
         return Body(
             name, points, Start(**{k: self.number(f"{where} start.{k}", v, quantities[k]) for k, v in start.items()})
@@ -153,19 +163,19 @@ class _Reader:
         self, where: str, name: str, table: Mapping[str, Any], classes: Iterable[Any], laws: Iterable[type[Law]]
     ) -> Any:
         """A joint or driver; one that has a law finds the law's keys in its own table."""
-        cls = _chosen(where, table, "type", classes)
-        keys = _keys(cls)
+        cls = chosen(where, table, "type", classes)
+        keys = member_keys(cls)
         values: dict[str, Any] = {}
         if "law" in keys:
-            law = _chosen(where, table, "law", laws)
-            _known_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *law_keys(law)))
+            law = chosen(where, table, "law", laws)
+            check_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *law_keys(law)))
             values["law"] = read_law(where, table, law, self.folder)
         else:
-            _known_keys(where, table, ("type", *keys))
+            check_keys(where, table, ("type", *keys))
         return cls(name=name, **values, **self.values(where, cls, table, skip=("law",)))
 
     def run(self, table: Mapping[str, Any]) -> RunSettings:
-        _known_keys("[run]", table, ("start", "stop", "step"))
+        check_keys("[run]", table, ("start", "stop", "step"))
         return RunSettings(**{key: self.number(f"[run] {key}", value, _TIME) for key, value in table.items()})
 
     def values(self, where: str, cls: type, table: Mapping[str, Any], skip: Iterable[str] = ()) -> dict[str, Any]:
@@ -177,7 +187,7 @@ class _Reader:
                 continue
             if key.name not in table:
                 if key.default is MISSING and key.default_factory is MISSING:
-                    raise MechanismError(f"{where} needs the key '{key.name}'; keys: {listed(_keys(cls))}")
+                    raise MechanismError(f"{where} needs the key '{key.name}'; keys: {listed(member_keys(cls))}")
                 continue
             value, spot = table[key.name], f"{where} {key.name}"
             quantity = next((m for m in getattr(hints[key.name], "__metadata__", ()) if isinstance(m, Quantity)), None)
@@ -186,11 +196,11 @@ class _Reader:
             elif hints[key.name] is Measure:
                 values[key.name] = self.measure(spot, value)
             elif not is_pair(hints[key.name]):
-                values[key.name] = _text(spot, value)
+                values[key.name] = text_of(spot, value)
             else:
                 if not isinstance(value, list) or len(value) != 2:
                     raise MechanismError(f"{spot} = {quoted(value)} must be two points ['body.point', 'body.point']")
-                values[key.name] = tuple(_text(spot, v, "text such as 'body.point'") for v in value)
+                values[key.name] = tuple(text_of(spot, v, "text such as 'body.point'") for v in value)
         return values
 
     def measure(self, where: str, table: Any) -> Measure:
@@ -198,8 +208,8 @@ class _Reader:
         if not isinstance(table, dict):
             example = '{ measure = "angle", of = "rocker" }'
             raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
-        cls = _chosen(where, table, "measure", MEASURES)
-        _known_keys(where, table, ("measure", *_keys(cls)))
+        cls = chosen(where, table, "measure", MEASURES)
+        check_keys(where, table, ("measure", *member_keys(cls)))
         measure: Measure = cls(**self.values(where, cls, table))
         return measure
 
@@ -209,72 +219,10 @@ def _parameter(name: str, value: Any) -> Parameter:
     if not isinstance(value, dict):
         return Parameter(value)
     where = f"[parameters.{name}]"
-    _known_keys(where, value, ("value", "description"))
+    check_keys(where, value, ("value", "description"))
     if "value" not in value:
         raise MechanismError(f"{where} needs the key 'value'; keys: value, description")
-    return Parameter(value["value"], description=_text(f"{where} description", value.get("description", "")))
-
-
-def _keys(cls: type) -> list[str]:
-    return [key.name for key in fields(cls) if key.name != "name"]
-
-
-def _chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
-    """The class whose `type` the table names under `key`."""
-    known = {cls.type: cls for cls in classes}
-    if key not in table:
-        raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
-    word = _text(f"{where} {key}", table[key], f"one of {listed(known)}")
-    if word not in known:
-        raise MechanismError(
-            f"{where} {key} = {quoted(word)} is not known{suggestion(word, known)}; known: {listed(known)}"
-        )
-    return known[word]
-
-
-def _known_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
-    known = list(known)
-    for key in table:
-        if key not in known:
-            shown = key if key.isidentifier() and len(key) < 100 else quoted(key)
-            place = f"{where} {shown}" if where else f"[{shown}]" if isinstance(table[key], dict) else shown
-            raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
-
-
-def _table(document: Mapping[str, Any], name: str) -> dict[str, Any]:
-    table = document.get(name, {})
-    if isinstance(table, list) and table and all(isinstance(one, dict) for one in table):
-        raise MechanismError(f"[[{name}]] must be tables with names of their own, such as [{name}.A]")
-    if not isinstance(table, dict):
-        raise MechanismError(f"{name} = {quoted(table)} must be a table [{name}]")
-    return table
-
-
-def _named(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
-    for key, value in _table(document, name).items():
-        check_name(f"[{name}]", key)
-        yield key, value
-
-
-def _tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
-    for key, table in _named(document, name):
-        if not isinstance(table, dict):
-            raise MechanismError(f"[{name}] {key} = {quoted(table)} must be a table [{name}.{key}]")
-        yield key, table
-
-
-def _subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
-    value = table.get(key, {})
-    if not isinstance(value, dict):
-        example = "{ P = [1, 0] }" if key == "points" else "{ x = 0, y = 0, phi = 0 }"
-        raise MechanismError(f"{where} {key} = {quoted(value)} must be a table such as {example}")
-    return value
-
-
-def _text(where: str, value: object, valid: str = "text") -> str:
-    if not isinstance(value, str):
-        raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
-    return value
+    return Parameter(value["value"], description=text_of(f"{where} description", value.get("description", "")))
 
 
 def text(mechanism: Mechanism) -> str:
@@ -297,7 +245,7 @@ def text(mechanism: Mechanism) -> str:
     for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
         for member in members:
             lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}"]
-            for key in _keys(type(member)):
+            for key in member_keys(type(member)):
                 value = getattr(member, key)
                 if key == "law":
                     lines += law_lines(value, _toml)
@@ -323,7 +271,7 @@ def _toml(value: object) -> str:
     if isinstance(value, Computed):
         value = value.expression.text
     if isinstance(value, Measure):
-        keys = {key: getattr(value, key) for key in _keys(type(value))}
+        keys = {key: getattr(value, key) for key in member_keys(type(value))}
         said = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in said.items()) + " }"
     if isinstance(value, str):

@@ -1,0 +1,80 @@
+"""Tables of a TOML document: what is unknown, missing or of another kind is told with its place and what is valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_name
+
+
+def member_keys(cls: type) -> list[str]:
+    """Keys of a joint, driver or measure in its table: the fields of its class, but its name."""
+    return [key.name for key in fields(cls) if key.name != "name"]
+
+
+def chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
+    """The class whose `type` the table names under `key`."""
+    known = {cls.type: cls for cls in classes}
+    if key not in table:
+        raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
+    word = text_of(f"{where} {key}", table[key], f"one of {listed(known)}")
+    if word not in known:
+        raise MechanismError(
+            f"{where} {key} = {quoted(word)} is not known{suggestion(word, known)}; known: {listed(known)}"
+        )
+    return known[word]
+
+
+def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Raise a MechanismError for a key that is not known; where: empty for the document itself."""
+    known = list(known)
+    for key in table:
+        if key not in known:
+            shown = key if key.isidentifier() and len(key) < 100 else quoted(key)
+            place = f"{where} {shown}" if where else f"[{shown}]" if isinstance(table[key], dict) else shown
+            raise MechanismError(f"{place}: unknown key{suggestion(key, known)}; keys: {listed(known)}")
+
+
+def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The table [name], empty if it is not there."""
+    table = document.get(name, {})
+    if isinstance(table, list) and table and all(isinstance(one, dict) for one in table):
+        raise MechanismError(f"[[{name}]] must be tables with names of their own, such as [{name}.A]")
+    if not isinstance(table, dict):
+        raise MechanismError(f"{name} = {quoted(table)} must be a table [{name}]")
+    return table
+
+
+def named(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
+    """What stands in the table [name], by names that can be names."""
+    for key, value in table_of(document, name).items():
+        check_name(f"[{name}]", key)
+        yield key, value
+
+
+def tables_of(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
+    """The tables [name.KEY]."""
+    for key, table in named(document, name):
+        if not isinstance(table, dict):
+            raise MechanismError(f"[{name}] {key} = {quoted(table)} must be a table [{name}.{key}]")
+        yield key, table
+
+
+def subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """The table under a key, points or a start pose, empty if it is not there."""
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        example = "{ P = [1, 0] }" if key == "points" else "{ x = 0, y = 0, phi = 0 }"
+        raise MechanismError(f"{where} {key} = {quoted(value)} must be a table such as {example}")
+    return value
+
+
+def text_of(where: str, value: object, valid: str = "text") -> str:
+    """The value, if it is text; valid: what it must be, as the message says it."""
+    if not isinstance(value, str):
+        raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
+    return value
