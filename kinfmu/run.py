@@ -199,10 +199,7 @@ class Run:
 
     def to_arrow(self) -> Any:
         """The columns as a pyarrow.Table, with the unit of each in the metadata of its field."""
-        pa = _optional("pyarrow")
-        columns = list(self.columns())
-        fields = [pa.field(c.name, pa.from_numpy_dtype(c.values.dtype), False, {"unit": c.unit}) for c in columns]
-        return pa.table([pa.array(c.values) for c in columns], schema=pa.schema(fields))
+        return arrow_table(self.columns())
 
     def to_pandas(self) -> Any:
         """The columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
@@ -237,6 +234,16 @@ class Run:
                 return self._column(place)
             names.append(place.name)
         raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")
+
+
+def arrow_table(columns: Iterable[Column]) -> Any:
+    """Columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
+    pa = _optional("pyarrow")
+    arrays, fields = [], []
+    for column in columns:
+        arrays.append(pa.array(column.values))
+        fields.append(pa.field(column.name, arrays[-1].type, False, {"unit": column.unit}))
+    return pa.table(arrays, schema=pa.schema(fields))
 
 
 def _optional(package: str) -> Any:

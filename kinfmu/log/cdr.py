@@ -26,21 +26,25 @@ class Template:
         self._words: list[tuple[int, int]] = []  # where slots stand side by side, and how many
 
     def uint8(self, value: int) -> Template:
+        """A fixed number of one byte."""
         self._bytes.append(value)
         return self
 
     def uint32(self, value: int) -> Template:
+        """A fixed number of four bytes."""
         self._align(4)
         self._bytes += value.to_bytes(4, "little")
         return self
 
     def string(self, text: str) -> Template:
+        """A fixed text: its length with the zero that ends it, then its UTF-8."""
         encoded = text.encode() + b"\0"
         self.uint32(len(encoded))
         self._bytes += encoded
         return self
 
     def strings(self, texts: tuple[str, ...]) -> Template:
+        """A sequence of fixed texts."""
         self.uint32(len(texts))
         for text in texts:
             self.string(text)

@@ -34,19 +34,7 @@ def review(
     recording is, None if there was only a picture.
     """
     run = Path(run)
-    for path in (run, *([Path(other)] if other else [])):
-        if path.suffix not in (".mcap", ".rrd"):
-            raise LogError(f"{path}: a run to review is an .mcap or .rrd file")
-        if not path.is_file():
-            raise LogError(f"{path}: there is no such file")
-    if run.suffix == ".rrd" and (other or save):
-        what = "compared" if other else "saved as another"
-        raise LogError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
-    if other and Path(other).suffix == ".rrd":
-        raise LogError(f"{other}: a recording cannot be compared; give the run's .mcap file")
-    for target, suffix in ((save, ".rrd"), (screenshot, ".png")):
-        if target and Path(target).suffix != suffix:
-            raise LogError(f"{target}: the name must end in {suffix}")
+    _check(run, other, save, screenshot)
     if not save and not screenshot:
         _need_display(run)
     if screenshot and not save:
@@ -67,6 +55,23 @@ def review(
     elif not save:
         _open(recording)
     return recording
+
+
+def _check(run: Path, other: str | Path | None, save: str | Path | None, screenshot: str | Path | None) -> None:
+    """Raise a LogError for files that cannot be reviewed or written, or that do not go together."""
+    for path in (run, *([Path(other)] if other else [])):
+        if path.suffix not in (".mcap", ".rrd"):
+            raise LogError(f"{path}: a run to review is an .mcap or .rrd file")
+        if not path.is_file():
+            raise LogError(f"{path}: there is no such file")
+    if run.suffix == ".rrd" and (other or save):
+        what = "compared" if other else "saved as another"
+        raise LogError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
+    if other and Path(other).suffix == ".rrd":
+        raise LogError(f"{other}: a recording cannot be compared; give the run's .mcap file")
+    for target, suffix in ((save, ".rrd"), (screenshot, ".png")):
+        if target and Path(target).suffix != suffix:
+            raise LogError(f"{target}: the name must end in {suffix}")
 
 
 def _beside(run: Path, other: str | Path | None) -> str:

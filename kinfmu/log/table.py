@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.errors import LogError, MissingPackageError, listed
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
-from kinfmu.run import Column, Run
+from kinfmu.run import Column, Run, arrow_table
 
 ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
 
@@ -52,22 +52,13 @@ def _quoted(name: str) -> str:
 
 def _write_parquet(run: Run, path: Path) -> None:
     try:
-        import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
         raise MissingPackageError(f"{path}: writing Parquet needs pyarrow: pip install pyarrow") from None
 
-    columns = _columns(run)
     info = {f"info.{key}": value for key, value in run.info.items()}
     about = description(run) | ending(run) | {"mechanism": run.mechanism_text} | info
-    schema = pa.schema(
-        [
-            pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), False, {"unit": column.unit})
-            for column in columns
-        ],
-        metadata={f"kinfmu.{key}": value for key, value in about.items()},
-    )
-    table = pa.table([pa.array(column.values) for column in columns], schema=schema)
+    table = arrow_table(_columns(run)).replace_schema_metadata({f"kinfmu.{key}": text for key, text in about.items()})
     pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
 
 
