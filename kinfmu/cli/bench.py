@@ -1,4 +1,4 @@
-"""kinfmu bench: run time against error, and what a sample, a step, an import and long chains cost."""
+"""kinfmu bench: run time against error, and what a sample, a sweep, a step, a record, an import and chains cost."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     accuracy  run time against error of every engine in every setting, and past
               singular points: tables and charts as in docs/accuracy.md; minutes
     sample    a sample of solve beside a dense numpy Newton
-    sweep     a sweep by the native engine beside a closed form written by hand
+    sweep     a sweep by the native engine beside closed forms by hand and pylinkage
     step      a step of the FMU beside the smallest pythonfmu FMU
     native    a step of the native FMU in a C host beside closed forms by hand
     log       records of a million samples, written and read back, beside mcap's writer
