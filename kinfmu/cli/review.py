@@ -25,9 +25,6 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
     """
     from kinfmu.log import review as reviewed
 
-    if run.suffix == ".rrd" and (other or save):
-        what = "compared" if other else "saved as another"
-        raise click.UsageError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
     if at is not None and screenshot is None:
         raise click.UsageError("--at is the time of --screenshot, which is not given")
     recording = reviewed(run, other, save=save, screenshot=screenshot, at=at)

@@ -32,9 +32,12 @@ def review(
     run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s].
     Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
     recording is, None if there was only a picture.
+
+    Raises a RequestError for files and times that cannot be meant, a LogError for a run that cannot be read, a file
+    that cannot be written, and a viewer that does not open or cannot draw.
     """
     run = Path(run)
-    _check(run, other, save, screenshot)
+    _check(run, other, save, screenshot, at)
     if not save and not screenshot:
         _need_display(run)
     if screenshot and not save:
@@ -57,21 +60,25 @@ def review(
     return recording
 
 
-def _check(run: Path, other: str | Path | None, save: str | Path | None, screenshot: str | Path | None) -> None:
-    """Raise a LogError for files that cannot be reviewed or written, or that do not go together."""
+def _check(
+    run: Path, other: str | Path | None, save: str | Path | None, screenshot: str | Path | None, at: float | None
+) -> None:
+    """Raise a RequestError for files that cannot be reviewed or written, or that do not go together."""
+    if at is not None and not screenshot:
+        raise RequestError(f"at = {at:g} s is the time of a screenshot, and none is asked for")
     for path in (run, *([Path(other)] if other else [])):
         if path.suffix not in (".mcap", ".rrd"):
-            raise LogError(f"{path}: a run to review is an .mcap or .rrd file")
+            raise RequestError(f"{path}: a run to review is an .mcap or .rrd file")
         if not path.is_file():
-            raise LogError(f"{path}: there is no such file")
+            raise RequestError(f"{path}: there is no such file")
     if run.suffix == ".rrd" and (other or save):
         what = "compared" if other else "saved as another"
-        raise LogError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
+        raise RequestError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
     if other and Path(other).suffix == ".rrd":
-        raise LogError(f"{other}: a recording cannot be compared; give the run's .mcap file")
+        raise RequestError(f"{other}: a recording cannot be compared; give the run's .mcap file")
     for target, suffix in ((save, ".rrd"), (screenshot, ".png")):
         if target and Path(target).suffix != suffix:
-            raise LogError(f"{target}: the name must end in {suffix}")
+            raise RequestError(f"{target}: the name must end in {suffix}")
 
 
 def _beside(run: Path, other: str | Path | None) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.errors import LogError
+from kinfmu.errors import LogError, RequestError
 from kinfmu.log import headless, review, reviewing, write_mcap
 from kinfmu.run import Run
 from kinfmu.shapes import palette
@@ -73,15 +73,17 @@ def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
-    with pytest.raises(LogError, match=r"run\.csv: a run to review is an \.mcap or \.rrd file"):
+    with pytest.raises(RequestError, match=r"run\.csv: a run to review is an \.mcap or \.rrd file"):
         review(tmp_path / "run.csv")
-    with pytest.raises(LogError, match=r"shot\.jpg: the name must end in \.png"):
+    with pytest.raises(RequestError, match=r"shot\.jpg: the name must end in \.png"):
         review(mcap, screenshot=tmp_path / "shot.jpg")
-    with pytest.raises(LogError, match=r"none\.mcap: there is no such file"):
+    with pytest.raises(RequestError, match=r"none\.mcap: there is no such file"):
         review(mcap, tmp_path / "none.mcap")
     review(mcap, save=tmp_path / "run.rrd")
-    with pytest.raises(LogError, match=r"a recording cannot be compared; give the run's \.mcap file"):
+    with pytest.raises(RequestError, match=r"a recording cannot be compared; give the run's \.mcap file"):
         review(tmp_path / "run.rrd", mcap)
+    with pytest.raises(RequestError, match=r"at = 4 s is the time of a screenshot, and none is asked for"):
+        review(mcap, save=tmp_path / "run.rrd", at=4.0)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
