@@ -21,6 +21,7 @@ from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 from kinfmu.short_way import short_way
 from kinfmu.solver import Solver, Stuck, with_parameters
 from kinfmu.solver.pose import Vector
+from kinfmu.solver.solver import TOLERANCE
 from kinfmu.swept import Driven, Engine, Tables
 
 ENGINES = ("auto", "python", "native")
@@ -34,7 +35,7 @@ def solve(
     parameters: Mapping[str, float | str] | None = None,
     outputs: Sequence[str] | None = None,
     engine: str = "auto",
-    tolerance: float = 1e-9,
+    tolerance: float = TOLERANCE,
     wrap: bool = False,
     out: Tables | None = None,
     **inputs: ArrayLike,
@@ -47,19 +48,24 @@ def solve(
     parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
     if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
-    and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there. wrap:
-    angles given as inputs are followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump
-    is a turn back. out: three arrays (n, outputs), by samples or by outputs (order="F": faster), that take values,
-    rates and accelerations.
+    and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there.
+    tolerance: residual relative to the size above which a sample is not ok. wrap: angles given as inputs are followed
+    the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three arrays
+    (n, outputs), by samples or by outputs (order="F": faster), that take values, rates and accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
-    last good sample.
+    last good sample. Raises a RequestError for what is not there or cannot be meant, and what compiling a plan raises
+    for a mechanism that cannot be solved; a CompilerError if engine 'native' is asked for and there is no compiler.
     """
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
-    if not isinstance(mechanism, SolvePlan):
+    if isinstance(mechanism, SolvePlan):
+        if outputs is not None:
+            raise RequestError("outputs are chosen when a plan is compiled: compile_plan(mechanism, outputs)")
+        plan = mechanism
+    else:
         refuse_other(mechanism, "solve")
-    plan = mechanism if isinstance(mechanism, SolvePlan) else compile_plan(mechanism, outputs)
+        plan = compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
     plan, bound, solver = _with_geometry(plan, geometry, tolerance)
     if t is None and not inputs:

@@ -5,6 +5,7 @@ import pytest
 
 import kinfmu
 from kinfmu import KinfmuError
+from kinfmu.plan import compile_plan
 from tests.mechanisms import bar_linkage, five_bar, fourbar, slider_crank
 from tests.oracle import fourbar as exact_fourbar
 from tests.oracle import largest_error
@@ -64,6 +65,9 @@ def test_chosen_outputs_are_all_that_is_solved() -> None:
     run = kinfmu.solve(kinfmu.load("fourbar"), [40.0], outputs=["coupler.x", "A.y"])
     assert run.outputs == ("coupler.x", "A.y")
     assert run.names == ("coupler.x",)
+    plan = compile_plan(kinfmu.load("fourbar"))
+    with pytest.raises(KinfmuError, match=r"^outputs are chosen when a plan is compiled: compile_plan\(mechanism, out"):
+        kinfmu.solve(plan, [40.0], outputs=["coupler.x"])
 
 
 def test_two_drivers_take_arrays_and_numbers() -> None:
