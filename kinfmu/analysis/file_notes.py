@@ -37,9 +37,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
     large: list[tuple[Place, float]] = []
 
     def look(place: Place, value: Any, quantity: Quantity) -> Any:
-        is_turns = (
-            "law" in place or place[0] == "drivers"
-        )  # laws go on for many turns; whole fifteens are degrees there
+        is_turns = "law" in place or place[0] == "drivers"  # they go on for many turns; whole fifteens are degrees
         if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or like_degrees(value)):
             large.append((place, float(value)))
         return value

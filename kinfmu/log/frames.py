@@ -56,12 +56,7 @@ class Frames:
 
         if not len(self._good):
             return
-        look: dict[str, Any] = {
-            "radii": [radius * self._size],
-            "labels": [label] if label else None,
-            "show_labels": shown if label else None,
-            "draw_order": self._layer + order,
-        }
+        look = self._look(radius, order, [label] if label else [], shown)
         strip = [points.astype(np.float32)]
         if self._run.good.all():
             self._rec.log(path, rr.LineStrips2D(strip, colors=[colour], **look), static=True)
@@ -87,13 +82,7 @@ class Frames:
 
         if not len(self._good):
             return
-        look: dict[str, Any] = {
-            "radii": [radius * self._size],
-            "colors": [colour],
-            "labels": names,
-            "show_labels": shown,
-            "draw_order": self._layer + order,
-        }
+        look = {"colors": [colour], **self._look(radius, order, names, shown)}
         at = points.astype(np.float32)
         if self._run.good.all():
             self._rec.log(path, rr.Points2D(at, **look), static=True)
@@ -105,3 +94,12 @@ class Frames:
     def turns(self) -> NDArray[np.int64]:
         """The first sample of each stretch with numbers, and of each without."""
         return np.flatnonzero(np.diff(self._run.good.astype(int), prepend=-1))
+
+    def _look(self, radius: float, order: float, names: list[str], shown: bool) -> dict[str, Any]:
+        """What lines and points are told alike."""
+        return {
+            "radii": [radius * self._size],
+            "labels": names or None,
+            "show_labels": shown if names else None,
+            "draw_order": self._layer + order,
+        }

@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from kinfmu.joints import Distance
+from kinfmu.joints.placement import body_of
 from kinfmu.log.scene import Scene
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
@@ -71,7 +72,7 @@ def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
     points = mechanism.body_points
     for joint in mechanism.joints:
         if isinstance(joint, Distance):
-            bodies = [point.partition(".")[0] for point in joint.between]
+            bodies = [body_of(point) for point in joint.between]
             if all(body in poses or body == GROUND_NAME for body in bodies):
                 a, b = (
                     np.broadcast_to(points[point], (len(run), 2))
