@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import RunSettings as RunSettings
     from kinfmu.mechanism import Start as Start
     from kinfmu.run import Run as Run
+    from kinfmu.sink import Sink as Sink
     from kinfmu.solver.status import Status as Status
     from kinfmu.sweep import solve as solve
 
@@ -117,6 +118,7 @@ _HOME = {
     "RunSettings": "kinfmu.mechanism",
     "Segment": "kinfmu.joints.laws",
     "SimpleHarmonic": "kinfmu.joints.laws",
+    "Sink": "kinfmu.sink",
     "SlideDriver": "kinfmu.drivers",
     "Spline": "kinfmu.joints.laws",
     "Start": "kinfmu.mechanism",
@@ -176,6 +178,7 @@ __all__ = [
     "RunSettings",
     "Segment",
     "SimpleHarmonic",
+    "Sink",
     "SlideDriver",
     "Spline",
     "Start",

@@ -61,7 +61,7 @@ def simulate(
     where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. channels: what to keep of every
     sample, such as ["q", "qd"] or ["-error", "-margin"], as kinfmu.channels.absent_columns tells; the FMU is not asked
     for the rest. rate: samples to keep in a second of the run, all if None. sink: takes the run while it goes on, such
-    as kinfmu.log.McapLog("run.mcap"). progress: called with (samples done, samples in all).
+    as kinfmu.log.McapLog("run.mcap"), or any other kinfmu.Sink. progress: called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
 
