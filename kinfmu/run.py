@@ -198,7 +198,10 @@ class Run:
         return table if place.column is None else table[:, place.column]
 
     def to_arrow(self) -> Any:
-        """The columns as a pyarrow.Table, with the unit of each in the metadata of its field."""
+        """The columns as a pyarrow.Table, with the unit of each in the metadata of its field.
+
+        This, to_pandas and to_polars raise a MissingPackageError without their package.
+        """
         return arrow_table(self.columns())
 
     def to_pandas(self) -> Any:

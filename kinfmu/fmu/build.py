@@ -38,7 +38,9 @@ def build(
     3; the python flavour is FMI 2.0 only. platforms: of the native flavour, 'host' (by the system's compiler) or 'all'
     (by zig). progress: called with (platforms done, platforms in all) while they compile.
 
-    The same mechanism, compiled by the same compiler, gives the same bytes. CompilerError if there is no compiler.
+    The same mechanism, compiled by the same compiler, gives the same bytes. Raises a RequestError for choices that are
+    not there or not together, a MechanismError or AssemblyError for a mechanism that cannot be solved, a CompilerError
+    if there is no compiler, an FmuError if the file cannot be written.
     """
     refuse_other(mechanism, "build")
     drive = default_drive(mechanism) if drive is None else drive

@@ -70,6 +70,9 @@ def simulate(
 
     Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
     of level "error" names driver, value and limit.
+
+    Raises a RequestError for times, inputs, parameters and channels that cannot be meant; an FmuError for what is no
+    FMU of kinfmu, for faulty tables of inputs, and for parameters that the mechanism cannot have.
     """
     if isinstance(fmu_path, Mechanism):
         raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")

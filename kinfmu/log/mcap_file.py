@@ -51,6 +51,9 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
 
     channels: what to keep of every sample, all if None, such as ["q", "drawn"] or ["-error"]; ["-drawn"]: the record
     alone, less than half as large. rate: samples to keep in a second of the run. Both as kinfmu.channels tells.
+
+    Raises a LogError for a file that cannot be written, which leaves an older one as it was, and for times that a log
+    cannot hold; a RequestError for channels and rates that cannot be meant.
     """
     run = select(run, channels, rate)
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun

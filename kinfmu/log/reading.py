@@ -31,7 +31,10 @@ from kinfmu.run import Event, FloatArray, Run
 
 
 def read(path: str | Path) -> Run:
-    """The run that was written to `path`, equal in every bit."""
+    """The run that was written to `path`, equal in every bit.
+
+    Raises a LogError for a file that cannot be read, is no record of kinfmu, or is cut off or damaged, with the place.
+    """
     scan = _scan(path)
     if scan.fault:
         raise LogError(f"{path}: not a whole MCAP file: {scan.fault}{_advice(scan, path)}")
@@ -47,7 +50,8 @@ def read(path: str | Path) -> Run:
 def recover(path: str | Path, output: str | Path) -> Run:
     """Write what is in a file that was cut off or damaged, up to there, as a whole file; returns that run.
 
-    An event of level "warning" says where the samples end and why.
+    An event of level "warning" says where the samples end and why. Raises a LogError if there is no beginning of a run,
+    or if a file cannot be read or written.
     """
     scan = _scan(path)
     try:

@@ -52,7 +52,8 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it.
 
     Of more than thinned.MOST_ROWS samples the recording holds that many and all that tell something, and says so; the
-    lane of states and the log come from all of them.
+    lane of states and the log come from all of them. Raises a LogError for a file that cannot be written, which leaves
+    an older one as it was, and for times that a log cannot hold.
     """
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     shown = thinned(run)

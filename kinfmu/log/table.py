@@ -17,10 +17,11 @@ ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memo
 def write_table(run: Run, path: str | Path) -> None:
     """Write all columns of `run` to a .csv, .parquet or .npz file.
 
-    CSV: one line of names, then one a sample; numbers read back to the same bits, but -0.0, which is written as 0.0; a
-    sample without numbers says nan.
-    Nothing but names and numbers, so that `pandas.read_csv(path)` does; Parquet (metadata of fields and table) and npz
-    (`kinfmu.units` beside `kinfmu.columns`) carry the units and the mechanism too.
+    CSV: one line of names, then one a sample, and nothing else, so that `pandas.read_csv(path)` reads it; a sample
+    without numbers says nan. Parquet (metadata of fields and table) and npz (`kinfmu.units` beside `kinfmu.columns`)
+    carry the units and the mechanism too. Numbers read back to the same bits, but -0.0, which is written as 0.0.
+
+    Raises a LogError for another suffix or a file that cannot be written, MissingPackageError without pyarrow.
     """
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
     suffix = Path(path).suffix.lower()
