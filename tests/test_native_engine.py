@@ -120,6 +120,24 @@ def test_large_tables_are_filled_wherever_they_begin(offset: int, order: Literal
             assert np.abs(other).max() > 1.0
 
 
+@pytest.mark.parametrize("offset", range(4))
+def test_what_is_no_number_is_told_in_large_tables_too(offset: int) -> None:
+    plan = compile_plan(kinfmu.load("crank_rocker"))
+    count, columns = 24_037, len(plan.outputs)
+    u = np.linspace(0.0, 70.0, count)
+    for k, nothing in enumerate((np.nan, np.inf, -np.inf)):
+        u[60 + k :: 64] = nothing  # at the end of the lanes, where a line of the tables may still be to be written
+    room = np.full((3, count * columns + offset), 7.0)
+    large = [one[offset:].reshape((count, columns), order="F") for one in room]
+    told = library.Library(plan).sweep(driven(u), large)
+    np.testing.assert_array_equal(told.status, np.where(np.isfinite(u), 0, 3))
+    for table in large:
+        np.testing.assert_array_equal(np.isfinite(table).all(axis=1), np.isfinite(u))
+        np.testing.assert_array_equal(np.isnan(table).all(axis=1), ~np.isfinite(u))
+    np.testing.assert_array_equal(np.isfinite(told.residual), np.isfinite(u))
+    assert told.failures[0] == (60, "crank = nan rad (nan deg) is not a finite number")
+
+
 def test_what_an_earlier_sweep_told_may_be_written_over() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     compiled = library.Library(plan)

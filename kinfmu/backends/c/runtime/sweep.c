@@ -140,13 +140,9 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
 /* Keep a sample for later; false if memory ran out. */
 bool kf_leave(kf_sweep *sweep, kf_job *job, int64_t sample)
 {
-    const double u = job->u[sample];
+    const double u = isnan(job->u[sample]) ? INFINITY : job->u[sample]; /* what has no place in the order comes last */
     kf_list *const list = &sweep->alone;
     double turns;
-    if (!isfinite(u)) { /* no place in the order */
-        put_gap(job, sample, KF_OUTSIDE);
-        return true;
-    }
     if (list->count == list->room) {
         const int64_t room = 2 * list->room + 1024;
         kf_left *const more = realloc(list->samples, (size_t)room * sizeof *more);
