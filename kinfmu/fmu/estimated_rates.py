@@ -16,7 +16,7 @@ def estimated_rates(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Speed and acceleration of each driver at t, from the parabola through its last three samples.
 
-        a = 2 (d2 - d1) / (t2 - t0),   v = d2 + a (t2 - t1) / 2,   d1, d2 the slopes of the two intervals
+        a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
 
     Backward differences on a non-uniform grid: v is O(h^2), a is O(h). samples: committed ones, oldest first, of which
     those before t count; one of them gives a slope, none gives 0.
@@ -25,8 +25,8 @@ def estimated_rates(
     if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:  # most calls: at the last of all samples
         (first, (a,)), (second, (b,)) = samples[1], samples[2]
         slope = (u[0] - b) / (t - second)
-        curve = 2.0 * (slope - (b - a) / (second - first)) / (t - first)
-        return (slope + 0.5 * curve * (t - second),), (curve,)
+        bend, share = slope - (b - a) / (second - first), 1.0 / (t - first)
+        return (slope + bend * ((t - second) * share),), (bend * (2.0 * share),)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
@@ -37,12 +37,13 @@ def estimated_rates(
     if count == 1:
         return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = samples[count - 2]
+    share = 1.0 / (t - t0)
     speeds, accelerations = [], []
     for a, b, c in zip(u0, u1, u, strict=True):
         d2 = (c - b) / h2
-        acceleration = 2.0 * (d2 - (b - a) / (t1 - t0)) / (t - t0)
-        speeds.append(d2 + 0.5 * acceleration * h2)
-        accelerations.append(acceleration)
+        bend = d2 - (b - a) / (t1 - t0)
+        speeds.append(d2 + bend * (h2 * share))
+        accelerations.append(bend * (2.0 * share))
     return tuple(speeds), tuple(accelerations)
 
 

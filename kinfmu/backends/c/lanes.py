@@ -453,8 +453,8 @@ class _LaneUnit:
             self.jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
             lines.append(f"per_det = 1.0 / hold[{self.handed_on(None)}][i];")
         z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-        values = opposite_solution(self.jacobian, b, "det")
-        return lines + [f"{one} = {text.replace(' / det', ' * per_det')};" for one, text in zip(z, values, strict=True)]
+        values = opposite_solution(self.jacobian, b, "per_det")
+        return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]
 
 
 def _is_turned(node: Node, angles: Collection[str]) -> bool:

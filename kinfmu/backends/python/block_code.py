@@ -100,8 +100,8 @@ def solution_lines(label: str, jacobian: Sequence[Sequence[str]], b: Sequence[st
     """Z = -J^-1 b."""
     m, n = len(jacobian), len(z)
     if m == n <= 2:
-        solved = opposite_solution(jacobian, b, f"det{label}")
-        return [f"{name} = {value}" for name, value in zip(z, solved, strict=True)]
+        solved = opposite_solution(jacobian, b, "per_det")
+        return [f"per_det = 1.0 / det{label}", *(f"{name} = {value}" for name, value in zip(z, solved, strict=True))]
     solve = "lu_solve" if m == n else "qr_solve"
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
 

@@ -1,6 +1,6 @@
 /* What drives: the law, the inputs, or rates estimated from samples of the inputs, for hosts that wire no rates.
  *
- *     a = 2 (d2 - d1) / (t2 - t0),   v = d2 + a (t2 - t1) / 2,   d1, d2 the slopes of the two intervals
+ *     a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
  *
  * See kinfmu/fmu/estimated_rates.py and kinfmu/solver/estimate.py.
  */
@@ -21,14 +21,14 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
     for (k = 0; k < KF_DRIVERS; ++k) {
         ud[k] = udd[k] = 0.0;
         if (count) {
-            const double h2 = t - samples[count - 1].t;
-            const double d2 = (u[k] - samples[count - 1].u[k]) / h2;
+            const kf_sample *const last = &samples[count - 1];
+            const double h2 = t - last->t, d2 = (u[k] - last->u[k]) / h2;
             ud[k] = d2;
             if (count > 1) {
-                const kf_sample *const first = &samples[count - 2];
-                const double d1 = (samples[count - 1].u[k] - first->u[k]) / (samples[count - 1].t - first->t);
-                udd[k] = 2.0 * (d2 - d1) / (t - first->t);
-                ud[k] = d2 + 0.5 * udd[k] * h2;
+                const kf_sample *const first = last - 1;
+                const double bend = d2 - (last->u[k] - first->u[k]) / (last->t - first->t), share = 1.0 / (t - first->t);
+                udd[k] = bend * (2.0 * share);
+                ud[k] = d2 + bend * (h2 * share);
             }
         }
     }
