@@ -24,9 +24,10 @@ def estimated_rates(
     count = len(samples)
     if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:  # most calls: at the last of all samples
         (first, (a,)), (second, (b,)) = samples[1], samples[2]
-        slope = (u[0] - b) / (t - second)
-        bend, share = slope - (b - a) / (second - first), 1.0 / (t - first)
-        return (slope + bend * ((t - second) * share),), (bend * (2.0 * share),)
+        step = t - second
+        slope = (u[0] - b) / step
+        bend = (slope - (b - a) / (second - first)) / (t - first)
+        return (slope + bend * step,), (bend + bend,)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
@@ -37,13 +38,12 @@ def estimated_rates(
     if count == 1:
         return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = samples[count - 2]
-    share = 1.0 / (t - t0)
     speeds, accelerations = [], []
     for a, b, c in zip(u0, u1, u, strict=True):
         d2 = (c - b) / h2
-        bend = d2 - (b - a) / (t1 - t0)
-        speeds.append(d2 + bend * (h2 * share))
-        accelerations.append(bend * (2.0 * share))
+        bend = (d2 - (b - a) / (t1 - t0)) / (t - t0)
+        speeds.append(d2 + bend * h2)
+        accelerations.append(bend + bend)
     return tuple(speeds), tuple(accelerations)
 
 
