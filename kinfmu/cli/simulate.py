@@ -39,7 +39,7 @@ LOGS = Path("logs")
 @set_option
 @click.option("--mcap", type=OutputFile(".mcap"), help="The record to write; logs/<name>.mcap if nothing is said.")
 @click.option(
-    "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; logs/<name>.rrd if nothing is said."
+    "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; beside the record if nothing is said."
 )
 @click.option(
     "--channels",
@@ -83,7 +83,7 @@ def simulate(
         fmu, parameters = _fmu(model, settings, Path(folder), has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
-        needs_room = is_logged and (mcap is None or rrd is None)
+        needs_room = is_logged and mcap is None
         with _room() if needs_room else nullcontext(), Progress() as progress, instead(str(fmu), model):
             run = simulated(
                 fmu,
@@ -126,9 +126,13 @@ def _fmu(
 
 
 def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
-    """Where the logs go: into logs/, under the name of the file or of the gallery's mechanism, if nothing is said."""
+    """Where the logs go: into logs/, under the name of the file or of the gallery's mechanism, if nothing is said.
+
+    The recording goes beside the record, so that two runs of one mechanism keep both of their files.
+    """
     name = Path(model.replace(":", "_")).name.removesuffix(".toml").removesuffix(".fmu")
-    return mcap or LOGS / f"{name}.mcap", rrd or LOGS / f"{name}.rrd"
+    record = mcap or LOGS / f"{name}.mcap"
+    return record, rrd or record.with_suffix(".rrd")
 
 
 @contextmanager

@@ -101,6 +101,13 @@ def test_simulate_builds_a_mechanism_first_and_logs_beside_it(
     assert again.stdout.splitlines()[0].endswith("logs/mine.rrd (an older run of that name was replaced)")
 
 
+def test_the_recording_goes_beside_the_record(command: Command, tmp_path: Path) -> None:
+    result = command("simulate", "fourbar", "--stop", "2", "--mcap", "one.mcap")
+    assert result.stdout.splitlines()[0].endswith("written to one.mcap and one.rrd")
+    assert (tmp_path / "one.rrd").stat().st_size > 0
+    assert not (tmp_path / "logs").exists()
+
+
 def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> None:
     (tmp_path / "inputs.csv").write_text("time,crank_angle\n0,0.5\n2,1.5\n")
     assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv").exit_code == 0
