@@ -77,8 +77,9 @@ def _unreadable(path: str | Path, error: OSError) -> LogError:
 
 
 def _advice(scan: Scan, path: str | Path) -> str:
-    """What helps where a run was begun."""
-    return f"; kinfmu recover {path} keeps what is there" if RECORD in scan.metadata else ""
+    """What helps where the first samples of a run are."""
+    is_begun = RECORD in scan.metadata and scan.id_of(SAMPLE_TOPIC) is not None
+    return f"; kinfmu recover {path} keeps what is there" if is_begun else ""
 
 
 def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:

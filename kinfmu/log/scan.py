@@ -66,7 +66,7 @@ class Scan:
 
     def _read(self, file: BinaryIO, size: int) -> str:
         if file.read(len(MAGIC)) != MAGIC:
-            return "it does not begin as one"
+            return "it does not begin as an MCAP file" if size else "it is empty"
         is_ended = False
         while True:
             place = file.tell()

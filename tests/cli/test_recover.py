@@ -53,4 +53,4 @@ def test_what_cannot_be_recovered_is_told(
     assert "none.mcap: there is no such file" in refuses("recover", "none.mcap")
     assert "run.csv: its name must end in .mcap" in refuses("recover", cut, "-o", "run.csv")
     (tmp_path / "text.mcap").write_text("no record")
-    assert fails("recover", "text.mcap") == "text.mcap: nothing can be recovered: it does not begin as one"
+    assert fails("recover", "text.mcap") == "text.mcap: nothing can be recovered: it does not begin as an MCAP file"

@@ -164,8 +164,13 @@ def test_what_holds_no_run_cannot_be_recovered(run: Run, tmp_path: Path) -> None
     (tmp_path / "run.mcap").write_bytes(whole[: whole.index(b"/sample")])
     with pytest.raises(LogError, match=r"run\.mcap: nothing can be recovered: the record at byte \d+ goes beyond"):
         recover(tmp_path / "run.mcap", tmp_path / "found.mcap")
+    with pytest.raises(LogError, match=r"run\.mcap: not a whole MCAP file: .* byte \d+$"):  # recover is not advised
+        read(tmp_path / "run.mcap")
+    (tmp_path / "run.mcap").write_bytes(b"")
+    with pytest.raises(LogError, match=r"run\.mcap: nothing can be recovered: it is empty$"):
+        recover(tmp_path / "run.mcap", tmp_path / "found.mcap")
     (tmp_path / "text.mcap").write_text("t,x\n0,1\n")
-    with pytest.raises(LogError, match=r"text\.mcap: nothing can be recovered: it does not begin as one"):
+    with pytest.raises(LogError, match=r"text\.mcap: nothing can be recovered: it does not begin as an MCAP file"):
         recover(tmp_path / "text.mcap", tmp_path / "found.mcap")
     assert not (tmp_path / "found.mcap").exists()
 
