@@ -73,7 +73,9 @@ install() {
     touch "$VENV/unfinished"
     rm -f "$VENV/installed"
     echo "kinfmu: installing into .venv" >&2
-    (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --editable "$what") || fail "installing into .venv failed, see above"
+    # compat: a plain path, so that a script beside a checkout named kinfmu imports the package and not that folder.
+    (cd "$ROOT" && "$VENV/bin/python" -m pip install --quiet --config-settings editable_mode=compat --editable "$what") ||
+        fail "installing into .venv failed, see above"
     rm "$VENV/unfinished"
     installation "$kind" >"$VENV/installed"
 }

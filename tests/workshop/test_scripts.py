@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 CHECKOUT = Path(__file__).parents[2]
 SCRIPTS = sorted(path for path in (CHECKOUT / "scripts").iterdir() if not path.suffix)
-INSTALL = "python -m pip install --quiet --editable "
+INSTALL = "python -m pip install --quiet --config-settings editable_mode=compat --editable "
 
 
 def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniature) -> None:
