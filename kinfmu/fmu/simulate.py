@@ -238,7 +238,11 @@ def _step_through(
         if not good:
             samples.log(DISCARD, f"at t = {time:g} s: {slave.message()}")
             return
-        if k + 1 < len(t) and not slave.step(time, float(t[k + 1]) - time):
+        if k + 1 == len(t):
+            return
+        end = float(t[k + 1])
+        samples.now = time if inputs else end  # what a step tells is of its inputs, or of where time drives to
+        if not slave.step(time, end - time):
             if slave.counts()[0] > Status.BRIDGED:  # what the step asked for lies out of reach
-                samples.read(float(t[k + 1]), slave)
+                samples.read(end, slave)
             return
