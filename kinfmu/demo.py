@@ -47,7 +47,7 @@ def compare_with_report(run: Run) -> tuple[str, bool]:
         for ours, theirs in zip(row, printed, strict=True):
             agree &= bool(abs(ours - theirs) <= 0.5e-4 * (1.0 + 1e-9))
             percent = 100.0 * (theirs - ours) / ours if theirs else 100.0 * ours
-            cells.append(f"{ours + 0.0:10.4f}{abs(percent):10.4f}")
+            cells.append(f"{round(ours, 4) + 0.0:10.4f}{abs(percent):10.4f}")
         lines.append(f"{t:7d}" + "".join(cells))
     return "\n".join(lines), agree
 

@@ -40,14 +40,14 @@ def solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
     ]
 
 
-def opposite_solution(jacobian: Rows, r: Sequence[str], per_det: str) -> list[str]:
-    """-J^-1 r of one or two unknowns, by 1 / det J: known before r is, it lets nothing wait for a division."""
+def opposite_solution(jacobian: Rows, r: Sequence[str], by_det: str) -> list[str]:
+    """-J^-1 r of one or two unknowns; by_det: '/ det' or '* per_det', which is known before r and lets nothing wait."""
     if len(r) == 1:
-        return [f"-{r[0]} * {per_det}"]
+        return [f"-{r[0]} {by_det}"]
     (a, b), (c, d) = jacobian
     return [
-        f"({_product(b, r[1])} - {_product(d, r[0])}) * {per_det}",
-        f"({_product(c, r[0])} - {_product(a, r[1])}) * {per_det}",
+        f"({_product(b, r[1])} - {_product(d, r[0])}) {by_det}",
+        f"({_product(c, r[0])} - {_product(a, r[1])}) {by_det}",
     ]
 
 

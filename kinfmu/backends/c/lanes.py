@@ -453,7 +453,7 @@ class _LaneUnit:
             self.jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
             lines.append(f"per_det = 1.0 / hold[{self.handed_on(None)}][i];")
         z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-        values = opposite_solution(self.jacobian, b, "per_det")
+        values = opposite_solution(self.jacobian, b, "* per_det")
         return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]
 
 

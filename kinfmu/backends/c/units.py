@@ -298,8 +298,9 @@ class Units:
         solved = [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
         if is_small(block):
             jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian] if entries else []
-            values = opposite_solution(jacobian, b, "per_det")
-            solved += ["per_det = 1.0 / <kept>;", *(f"{one} = {value};" for one, value in zip(z, values, strict=True))]
+            kept, by_det = ("det = <kept>;", "/ det") if order == 1 else ("per_det = 1.0 / <kept>;", "* per_det")
+            values = opposite_solution(jacobian, b, by_det)
+            solved += [kept, *(f"{one} = {value};" for one, value in zip(z, values, strict=True))]
         else:
             opposite = [f"-{one}" for one in b]
             solved += self._solve(m, k, opposite, [f"{one} = step[{i}];" for i, one in enumerate(z)])

@@ -96,12 +96,17 @@ def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str],
     return lines + [f"{name} -= {step}" for name, step in zip(z, steps, strict=True)]
 
 
-def solution_lines(label: str, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]) -> list[str]:
-    """Z = -J^-1 b."""
+def solution_lines(
+    label: str, order: int, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]
+) -> list[str]:
+    """Z = -J^-1 b, of velocities (order 1) or accelerations (2)."""
     m, n = len(jacobian), len(z)
     if m == n <= 2:
-        solved = opposite_solution(jacobian, b, "per_det")
-        return [f"per_det = 1.0 / det{label}", *(f"{name} = {value}" for name, value in zip(z, solved, strict=True))]
+        if order == 1:  # a quotient, rounded once: where bodies turn alike their speeds do to the bit
+            solved, before = opposite_solution(jacobian, b, f"/ det{label}"), []
+        else:
+            solved, before = opposite_solution(jacobian, b, "* per_det"), [f"per_det = 1.0 / det{label}"]
+        return [*before, *(f"{name} = {value}" for name, value in zip(z, solved, strict=True))]
     solve = "lu_solve" if m == n else "qr_solve"
     return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
 

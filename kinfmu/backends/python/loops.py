@@ -153,7 +153,7 @@ class Loops:
             f"if {_HELD}:",
             *(f"    {one} = {value}" for one, value in zip(z, taken, strict=True)),
             "else:",
-            *indented(solution_lines(self.label, jacobian, b, z)),
+            *indented(solution_lines(self.label, order, jacobian, b, z)),
             *(f"{place} = {one}" for place, one in zip(stand, z, strict=True)),
         ]
 

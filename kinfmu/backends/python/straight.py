@@ -235,7 +235,7 @@ class _Straight:
             lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
             jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
             self.exports.setdefault(kept_name(block, str(k + 1)), None)
-            solution = solution_lines(str(k + 1), jacobian, b, z)
+            solution = solution_lines(str(k + 1), order, jacobian, b, z)
             if held:
                 first, last = self.places[k]
                 lines.append(f"if held & {1 << k}:")
