@@ -25,7 +25,7 @@ class Names:
     """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order.
 
     curves: names of the constants that hold the data of curves; functions: names of functions that are called otherwise
-    than sin, cos and so on.
+    than sin, cos and so on, and under "sincos" the one that tells both at once: f(x, &sine, &cosine).
     """
 
     def __init__(
@@ -76,7 +76,14 @@ class Writer:
         inline = {node for node in new if uses[node] == 1 and node not in self.keep and node.op not in FUNCTIONS}
         lines: list[str] = []
         text: dict[Node, tuple[str, int]] = {}
+        others = self._others(new)
         for node in new:
+            if node in self.known:  # it came with the other one of its angle
+                text[node] = (self.names.of(node), _ATOM)
+                continue
+            if node in others:
+                lines.append(self._pair(node, others[node], text))
+                continue
             text[node] = self._operation(node, text)
             if node not in inline or len(text[node][0]) > _LONGEST_INLINE:
                 inline.discard(node)
@@ -85,6 +92,23 @@ class Writer:
                 text[node] = (self.names.of(node), _ATOM)
         self._inline = {node: text[node] for node in inline}
         return lines
+
+    def _others(self, new: Sequence[Node]) -> dict[Node, Node]:
+        """Of sines and cosines the other one of the same angle, where one call tells both."""
+        if "sincos" not in self.names.functions:
+            return {}
+        found = {(node.op, node.args[0]): node for node in new if node.op in ("sin", "cos")}
+        pairs = [(node, found.get(("cos" if op == "sin" else "sin", angle))) for (op, angle), node in found.items()]
+        return {node: other for node, other in pairs if other is not None}
+
+    def _pair(self, node: Node, other: Node, text: dict[Node, tuple[str, int]]) -> str:
+        """The statement that gives both their values."""
+        sine, cosine = (node, other) if node.op == "sin" else (other, node)
+        for one in (sine, cosine):
+            self.known.add(one)
+            text[one] = (self.names.of(one), _ATOM)
+        angle, _ = self._reference(node.args[0], text)
+        return f"{self.names.functions['sincos']}({angle}, &{self.names.of(sine)}, &{self.names.of(cosine)})"
 
     def independent(self, targets: Sequence[Node], moving: Iterable[Node]) -> list[Node]:
         """The largest parts of the targets that do not depend on the symbols `moving`: what a loop need not repeat."""

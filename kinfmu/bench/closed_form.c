@@ -39,7 +39,7 @@ void closed_form(int64_t count, const double *restrict u, const double *restrict
 #pragma GCC ivdep
     for (i = 0; i < count; ++i) {
         double s, k, dx, dy, square, e, h, qx, qy, rx, ry, det, wx, wy, w2, w3, ax, ay, v = ud[i];
-        kf_sincos(u[i], &s, &k);
+        kf_sincos_lane(u[i], &s, &k);
         s *= a;
         k *= a;
         dx = g - k;

@@ -11,6 +11,7 @@ from kinfmu.backends.c import compiler, emit
 from kinfmu.plan import SolvePlan
 
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
+SAME_SINES = "-DKF_LIBRARY_SINCOS"  # those of the C library, which Python has too: all else is compared to the bit
 PROBE = """\
 #include "solver.h"
 #include <string.h>
@@ -61,7 +62,7 @@ class Native:
     def __init__(self, plan: SolvePlan, flags: Sequence[str] = STRICT) -> None:
         files = emit(plan) | compiler.sources(compiler.SOLVER) | {"probe.c": PROBE}
         self.sizes = {name: int(n) for name, n in re.findall(r"#define KF_(\w+) (\d+)$", files["sizes.h"], re.M)}
-        self.c = ctypes.CDLL(str(compiler.shared_library(files, flags)))
+        self.c = ctypes.CDLL(str(compiler.shared_library(files, (*flags, SAME_SINES))))
         self.c.probe_anchor.restype = ctypes.c_void_p
         self.c.probe_message.restype = ctypes.c_char_p
         self.c.kf_margin.restype = ctypes.c_double

@@ -23,7 +23,7 @@ from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.trace import is_parameter
 
-_VECTORS = {"sin": "kf_sin", "cos": "kf_cos"}
+_VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 _LISTED = {"sin": "sine", "cos": "cosine"}  # lists of what comes with the prediction
 _BRANCHING = ("curve", "atan2", "floor")
 

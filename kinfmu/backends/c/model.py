@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
-from kinfmu.backends.c.text import array, assigned, booleans, declared, string
+from kinfmu.backends.c.text import FUNCTIONS, array, assigned, booleans, declared, string
 from kinfmu.backends.c.units import Units, placed, rows_of
 from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.writer import Names, Writer, identifier
@@ -32,7 +32,7 @@ class _Model(Lists):
         super().__init__(plan)
         data = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
         self.curves: dict[CurveData, str] = {one: f"&curve_{k}" for k, one in enumerate(data, start=1)}
-        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves, FUNCTIONS)
         self.solved = [block for block in plan.blocks if block.unknowns]
         self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in self.kinds.items()}
         self.taken = self.home({label: units.positions for label, units in self.units.items()})
@@ -81,6 +81,7 @@ class _Model(Lists):
         lines = [
             f"/* Kinematics of {self.plan.mechanism.name}: generated from its mechanism, not for editing. */",
             '#include "kinfmu.h"',
+            '#include "sincos.h"',
             "",
             "#include <math.h>",
             "#include <stdio.h>",
@@ -172,7 +173,7 @@ class _Model(Lists):
         ]
 
     def _drive(self) -> list[str]:
-        writer = Writer(Names(curves=self.curves), ())
+        writer = Writer(Names(curves=self.curves, functions=FUNCTIONS), ())
         orders = [[getattr(law, order) for law in self.plan.laws] for order in ("position", "rate", "acceleration")]
         flat = [node for nodes in orders for node in nodes]
         body = [f"{line};" for line in writer.statements(flat)]
@@ -359,26 +360,39 @@ class _Model(Lists):
         return lines
 
     def _written(self, order: int) -> list[str]:
-        """The function of the outputs of an order: some stand in a list, others are formulas."""
-        wanted = self.outputs(order)
-        expressions, lines = self._expressions([node for node, place in wanted if place is None])
+        """The function of the outputs of an order: some stand in a list, others are formulas.
+
+        With one driver x1 and x2 are derivatives with respect to it, and so are the formulas:
+
+            yd = y' ud,   ydd = y'' ud^2 + y' udd
+        """
+        parts = [self.outputs(of) for of in ((0,), (1,), (2, 1))[order][: 1 if len(self.plan.drivers) > 1 else None]]
+        places = [place for _, place in parts[0]]
+        rest = [k for k, place in enumerate(places) if place is None]
+        expressions, lines = self._expressions([part[k][0] for part in parts for k in rest])
+        factors = [] if len(self.plan.drivers) > 1 else [[], ["v"], ["(v * v)", "a"]][order]
         out = ("outputs", "rates", "accelerations")[order]
-        table = array(f"int kf_{out}_places", [-1 if place is None else place for _, place in wanted])
-        rest = [k for k, (_, place) in enumerate(wanted) if place is None]
-        is_copied = len(rest) < len(wanted)
+        table = array(f"int kf_{out}_places", [-1 if place is None else place for place in places])
+        sources = (_SOURCES[order], "x1")
+        copied = [f"{source}[kf_{out}_places[k]]" for source in sources[: len(parts)]]
         copying = [
             "for (k = 0; k < KF_OUTPUTS; ++k) {",
             f"    if (kf_{out}_places[k] >= 0) {{",
-            f"        {out}[k] = {_SOURCES[order]}[kf_{out}_places[k]];",
+            f"        {out}[k] = {_weighted(copied, factors)};",
             "    }",
             "}",
         ]
+        is_copied = len(rest) < len(places)
         lines += copying if is_copied else []
-        lines += [f"{out}[{k}] = {text};" for k, text in zip(rest, expressions, strict=True)]
+        for number, k in enumerate(rest):
+            lines.append(f"{out}[{k}] = {_weighted(expressions[number :: len(rest)], factors)};")
         name = ("kf_outputs", "kf_output_rates", "kf_output_accelerations")[order]
-        lists = "".join(f" const double *{one}," for one in LISTS[1 : order + 1])
-        signature = f"inline void {name}(const kf_model *model, const kf_found *found,{lists}\n    double *{out})"
-        unused = _unused(lines, "model", "found", *LISTS[1 : order + 1])
+        arguments = [[], ["x1"], ["x1", "x2"]][order], [[], ["v"], ["v", "a"]][order]
+        listed = "".join(
+            [*(f" const double *{one}," for one in arguments[0]), *(f" double {x}," for x in arguments[1])]
+        )
+        signature = f"inline void {name}(const kf_model *model, const kf_found *found,{listed}\n    double *{out})"
+        unused = _unused(lines, "model", "found", *arguments[0], *arguments[1])
         return [*table, "", *self._function(signature, lines, unused, ["int k;"] if is_copied else ())]
 
     def _watches(self) -> list[str]:
@@ -418,6 +432,14 @@ _HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <=
 
 
 _SOURCES = ("found->x", "x1", "x2")
+
+
+def _weighted(values: Sequence[str], factors: Sequence[str]) -> str:
+    """'(value) * factor + ...' of texts, or the value alone where there are no factors."""
+    if not factors:
+        return values[0]
+    return " + ".join(f"{v} * {f}" if v.isidentifier() or v.endswith("]") else f"({v}) * {f}"
+                      for v, f in zip(values, factors, strict=True))  # fmt: skip
 
 
 def _unused(lines: Sequence[str], *arguments: str) -> list[str]:

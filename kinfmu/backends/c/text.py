@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 
 _WIDTH = 110
 
+FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos"}  # of runtime/sincos.h
+
 
 def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") -> list[str]:
     """'head a, b, c tail' on as many lines as it takes."""
@@ -46,4 +48,5 @@ def declared(names: Iterable[str]) -> list[str]:
 
 def assigned(lines: Iterable[str]) -> list[str]:
     """Names that the statements of a function give values to."""
-    return [match[1] for line in lines if (match := re.match(r"\s*([A-Za-z_]\w*) = ", line))]
+    found = [re.match(r"\s*(\w+) = |\s*kf_sincos\(.*, &(\w+), &(\w+)\);", line) for line in lines]
+    return [name for match in found if match for name in match.groups() if name]

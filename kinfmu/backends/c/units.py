@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.backends.alike import Kind, Run, positions
-from kinfmu.backends.c.text import assigned, declared
+from kinfmu.backends.c.text import FUNCTIONS, assigned, declared
 from kinfmu.backends.lists import LISTS
 from kinfmu.backends.newton import (
     ITERATIONS,
@@ -51,7 +51,7 @@ class Units:
     ) -> None:
         self.kind = kind
         self.label = kind.label
-        self.names = Names(kind.coordinates, curves)
+        self.names = Names(kind.coordinates, curves, FUNCTIONS)
         for block in kind.blocks:
             for name, motion in block.assigned:
                 self.names.assign(motion[0], name)
@@ -194,7 +194,9 @@ class Units:
         unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
         looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
         before = [f"{line};" for line in writer.statements(writer.independent(looped, unknowns))]
-        inside = self._given_outright(writer, block)
+        turned = [node for node in reachable(looped) if node.op in ("sin", "cos") and node.args[0].op == "symbol"]
+        inside = [f"{line};" for line in writer.statements(turned)]
+        inside += self._given_outright(writer, block)
         inside += [f"{line};" for line in writer.statements([*block.residuals, *entries])]
         r = [f"r{k}" for k in range(len(block.residuals))]
         inside += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]

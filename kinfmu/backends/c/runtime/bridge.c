@@ -29,6 +29,12 @@ static double place(const kf_bridge *bridge, const kf_span *span, double u)
     return (kf_turned(u, -bridge->turns) - span->centre) / bridge->half;
 }
 
+/* Where the inner polynomials of a bridge's span are kept, if none with the same place came after them. */
+static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
+{
+    return &solver->scratch.inner[bridge->span % KF_INNERS];
+}
+
 /* A span whole turns on; `raised` tells the turns of the unknowns. */
 static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
 {
@@ -72,7 +78,7 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     const kf_bridge *const bridge = &solver->bridges[number];
     const kf_span *const span = &solver->spans[bridge->span];
     double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
-    kf_span_read(span, &solver->scratch.inner, place(bridge, span, u[0]), z, zd, zdd);
+    kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[0]), z, zd, zdd);
     turn_on(bridge, z, z);
     kf_fresh(pose, -1, INFINITY, -INFINITY);
     if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
@@ -107,7 +113,7 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
 {
     const kf_bridge *const bridge = &solver->bridges[number];
     const kf_span *const span = &solver->spans[bridge->span];
-    kf_span_difference(span, &solver->scratch.inner, place(bridge, span, u), z, zd, zdd);
+    kf_span_difference(span, inner_of(solver, bridge), place(bridge, span, u), z, zd, zdd);
 }
 
 /* The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats; or -1.

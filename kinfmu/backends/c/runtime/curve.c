@@ -1,7 +1,6 @@
 /* A function of one variable made of pieces: see kinfmu/solver/curve.py. */
 #include "kinfmu.h"
-
-#include <math.h>
+#include "sincos.h"
 
 /* n! / (n - order)!: what the derivative of s^n puts before its power. */
 static double falling(int n, int order)
@@ -36,7 +35,7 @@ double kf_curve_at(const kf_curve *curve, int order, double x)
     }
     if (piece->amplitude != 0.0) {
         const double angle = piece->frequency * s + piece->phase;
-        const double wave = order % 2 ? cos(angle) : sin(angle);
+        const double wave = order % 2 ? kf_cos(angle) : kf_sin(angle);
         double scale = order % 4 < 2 ? piece->amplitude : -piece->amplitude;
         for (k = 0; k < order; ++k) {
             scale *= piece->frequency;

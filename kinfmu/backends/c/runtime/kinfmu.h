@@ -13,6 +13,15 @@
 
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
 
+/* Hints where compilers take them: what is rarely called, and what most samples go through, best compiled as a whole. */
+#if defined(__GNUC__)
+#define KF_RARE __attribute__((cold))
+#define KF_WHOLE __attribute__((flatten))
+#else
+#define KF_RARE
+#define KF_WHOLE
+#endif
+
 /* What the formulas are made of besides the pose: the parameters, and what depends on them alone. */
 typedef struct {
     double parameters[KF_ROOM(KF_PARAMETERS)];
@@ -87,9 +96,9 @@ void kf_velocity(const kf_model *model, const kf_found *found, const double *ud,
 void kf_acceleration(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
                      const double *given, const bool *held, double *x2);
 void kf_outputs(const kf_model *model, const kf_found *found, double *outputs);
-void kf_output_rates(const kf_model *model, const kf_found *found, const double *x1, double *rates);
+void kf_output_rates(const kf_model *model, const kf_found *found, const double *x1, double v, double *rates);
 void kf_output_accelerations(const kf_model *model, const kf_found *found, const double *x1, const double *x2,
-                             double *accelerations);
+                             double v, double a, double *accelerations);
 void kf_watches(const kf_model *model, const kf_found *found, double *watches);
 void kf_fixed(const kf_model *model, double *fixed);
 void kf_jacobian(const kf_model *model, const kf_found *found, int block, double *jacobian); /* row after row */

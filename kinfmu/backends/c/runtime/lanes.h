@@ -57,17 +57,17 @@ void kf_lanes_motion(const kf_model *model, kf_lanes *lanes, const bool *held);
 #define KF_FMA(a, b, c) ((a) * (b) + (c))
 #endif
 
-static inline double kf_sin(double x)
+static inline double kf_sin_lane(double x)
 {
     double sine, cosine;
-    kf_sincos(x, &sine, &cosine);
+    kf_sincos_lane(x, &sine, &cosine);
     return sine;
 }
 
-static inline double kf_cos(double x)
+static inline double kf_cos_lane(double x)
 {
     double sine, cosine;
-    kf_sincos(x, &sine, &cosine);
+    kf_sincos_lane(x, &sine, &cosine);
     return cosine;
 }
 

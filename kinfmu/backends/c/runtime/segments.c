@@ -106,8 +106,7 @@ static void join(const kf_node *a, const kf_node *middle, const kf_node *b, doub
     int j, k;
     segment->is_plain = a->is_good && middle->is_good && b->is_good;
     segment->centre = centre;
-    segment->sine[KF_UNKNOWNS] = sin(centre);
-    segment->cosine[KF_UNKNOWNS] = cos(centre);
+    kf_sincos(centre, &segment->sine[KF_UNKNOWNS], &segment->cosine[KF_UNKNOWNS]);
     for (k = 0; k < KF_UNKNOWNS && segment->is_plain; ++k) {
         const double z = middle->z[k], v = middle->zd[k] * half, w = 0.5 * middle->zdd[k] * half * half;
         const double before = a->z[k] - z + v - w, after = b->z[k] - z - v - w;
@@ -118,8 +117,7 @@ static void join(const kf_node *a, const kf_node *middle, const kf_node *b, doub
         const double odd_curve = 0.5 * (curve_after - curve_before), even_curve = 0.5 * (curve_after + curve_before);
         double most = 0.0;
         segment->base[k] = z;
-        segment->sine[k] = sin(z);
-        segment->cosine[k] = cos(z);
+        kf_sincos(z, &segment->sine[k], &segment->cosine[k]);
         c[0][k] = v;
         c[1][k] = w;
         c[6][k] = (odd_curve - 7.0 * odd_slope + 15.0 * odd) / 8.0;
@@ -299,7 +297,7 @@ static void predict_at_once(const kf_segments *segments, const kf_segment *segme
         } else if (kf_unknown_is_angle[k]) {
             KF_SIDE_BY_SIDE
             for (i = 0; i < KF_VECTOR; ++i) {
-                kf_sincos(z[i], &sine[i], &cosine[i]);
+                kf_sincos_lane(z[i], &sine[i], &cosine[i]);
             }
         }
     }
@@ -342,7 +340,7 @@ void kf_window_read(const kf_segments *segments, const kf_window *window, const 
     const double per_half = 1.0 / window->half;
     int i, j, k;
     for (i = 0; i < KF_LANES; ++i) {
-        kf_sincos(u[i], &lanes->angles[0][KF_UNKNOWNS][i], &lanes->angles[1][KF_UNKNOWNS][i]);
+        kf_sincos_lane(u[i], &lanes->angles[0][KF_UNKNOWNS][i], &lanes->angles[1][KF_UNKNOWNS][i]);
     }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         KF_SIDE_BY_SIDE
@@ -358,7 +356,7 @@ void kf_window_read(const kf_segments *segments, const kf_window *window, const 
             zd = (zd * x + z) * per_half;
             zdd *= per_half * per_half;
             z = window->base[k] + z * x;
-            kf_sincos(z, &lanes->angles[0][k][i], &lanes->angles[1][k][i]);
+            kf_sincos_lane(z, &lanes->angles[0][k][i], &lanes->angles[1][k][i]);
             z += turns[i] * segments->raised[k] * HIGH + turns[i] * segments->raised[k] * LOW;
             lanes->z[k][i] = z;
             lanes->x[k][i] = z;

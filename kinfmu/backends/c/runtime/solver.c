@@ -5,16 +5,19 @@
 
 void kf_solver_start(kf_solver *solver)
 {
+    int k;
     kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
     solver->tolerance = TOLERANCE;
     solver->stuck = false;
-    solver->scratch.inner.half = 0.0; /* nothing was read */
+    for (k = 0; k < KF_INNERS; ++k) {
+        solver->scratch.inner[k].half = 0.0; /* nothing was read */
+    }
     solver->message[0] = '\0';
     kf_fresh(&solver->anchor, -1, -INFINITY, INFINITY);
     kf_evaluated(&solver->model, kf_anchor_u, kf_anchor_z, NULL, &solver->anchor.found);
 }
 
-static kf_status failed(kf_pose *pose, kf_status status)
+static KF_RARE kf_status failed(kf_pose *pose, kf_status status)
 {
     kf_fresh(pose, -1, -INFINITY, INFINITY);
     pose->status = status;
@@ -22,7 +25,7 @@ static kf_status failed(kf_pose *pose, kf_status status)
 }
 
 /* A pose counts only if its rows close and the rows set aside as redundant hold too. */
-static kf_status rejected(kf_solver *solver, kf_pose *pose)
+static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
 {
     char *const message = solver->message;
     double watches[KF_ROOM(KF_WATCHES)];
@@ -45,7 +48,7 @@ static kf_status rejected(kf_solver *solver, kf_pose *pose)
 }
 
 /* The pose that a way starts from where the pose has no tangent to go on by. */
-static kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
+static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
 {
     kf_pose *const base = &solver->scratch.base;
     if (pose->base_bridge >= 0) {
@@ -61,7 +64,7 @@ static kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
 }
 
 /* Away from all that is singular: one trusted step. */
-static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     const double longest = KF_LONGEST_STEP * kf_reach[0], s = u[0] - KF_POSE_U(start)[0];
     if (!(-longest <= s && s <= longest && start->low <= u[0] && u[0] <= start->high)
@@ -122,37 +125,20 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
     return pose->status;
 }
 
-/* Outputs, rates and accelerations from the derivatives that the pose holds.
- *
- * With one driver these are with respect to it, and the same goes for the outputs y: yd = y' ud, ydd = y'' ud^2 + y'
- * udd.
+/* Outputs, rates and accelerations from the derivatives that the pose holds: those with respect to the only driver, or
+ * those in time.
  */
 inline void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd,
-                          double *outputs, double *rates, double *restrict accelerations)
+                          double *outputs, double *rates, double *accelerations)
 {
-    double slopes[KF_ROOM(KF_OUTPUTS)];
-    double *restrict const slope = rates != NULL ? rates : slopes;
-    int k;
     if (outputs != NULL) {
         kf_outputs(model, &pose->found, outputs);
     }
+    if (rates != NULL) {
+        kf_output_rates(model, &pose->found, pose->x1, ud[0], rates);
+    }
     if (accelerations != NULL) {
-        kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, accelerations);
-    }
-    if (rates != NULL || (KF_DRIVERS == 1 && accelerations != NULL)) {
-        kf_output_rates(model, &pose->found, pose->x1, slope);
-    }
-    if (KF_DRIVERS == 1 && accelerations != NULL) {
-        const double v = ud[0], square = v * v, a = udd[0];
-        for (k = 0; k < KF_OUTPUTS; ++k) {
-            accelerations[k] = accelerations[k] * square + slope[k] * a;
-            slope[k] *= v;
-        }
-    } else if (KF_DRIVERS == 1 && rates != NULL) {
-        const double v = ud[0];
-        for (k = 0; k < KF_OUTPUTS; ++k) {
-            rates[k] *= v;
-        }
+        kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, ud[0], udd[0], accelerations);
     }
 }
 

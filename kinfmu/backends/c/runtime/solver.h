@@ -126,9 +126,11 @@ typedef struct {
     bool is_given;
 } kf_source;
 
+#define KF_INNERS 2 /* as many as most mechanisms have singular points */
+
 /* What does not outlive a call, but for the polynomials read last, which may be of use again. */
 typedef struct {
-    kf_inner inner;
+    kf_inner inner[KF_INNERS];
     kf_pose base, way[4], walk[2], beside, located;
     kf_model ahead;
     kf_source source;

@@ -77,14 +77,14 @@ bool kf_is_beyond(const double *target, const double *limit, const double *direc
 void kf_say_limit(char *message, const kf_limit *limit, const double *target);
 
 /* advance.c */
-kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
+KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
 
 /* survey.c */
-int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
+KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 
 /* softness.c */
 #define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */

@@ -44,7 +44,7 @@ inline void kf_forget(kf_state *s)
     kf_forget_motion(s);
 }
 
-static kf_answer bind(kf_instance *instance)
+static KF_RARE kf_answer bind(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
     s->unbound = false;
@@ -77,24 +77,22 @@ static void solve(kf_state *s, const double *u)
     s->solved = true;
 }
 
-inline kf_status kf_ask(kf_instance *instance)
+kf_status kf_ask_anew(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
-    if (!s->solved) {
-        double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
-        if (s->unbound) {
-            bind(instance);
-        }
-        if (s->driven_by_time) {
-            kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
-        } else {
-            int k;
-            for (k = 0; k < KF_DRIVERS; ++k) {
-                u[k] = s->real[3 * k];
-            }
-        }
-        solve(s, u);
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS];
+    if (s->unbound) {
+        bind(instance);
     }
+    if (s->driven_by_time) {
+        kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    } else {
+        int k;
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            u[k] = s->real[3 * k];
+        }
+    }
+    solve(s, u);
     return s->status;
 }
 
@@ -132,7 +130,7 @@ static void commit(kf_state *s, double t)
 /* A step that cannot be done. Asked for again from the same point, no smaller, it will not be possible either: the master
  * that goes on nevertheless is told to stop.
  */
-static kf_answer discard(kf_instance *instance, double time, double step, double at)
+static KF_RARE kf_answer discard(kf_instance *instance, double time, double step, double at)
 {
     kf_state *const s = &instance->now;
     s->terminated = s->failed && s->failed_time == time && step >= s->failed_step;
@@ -144,7 +142,7 @@ static kf_answer discard(kf_instance *instance, double time, double step, double
 }
 
 /* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. */
-static void move_inputs(kf_state *s, double step)
+static KF_RARE void move_inputs(kf_state *s, double step)
 {
     int k, order;
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {

@@ -88,7 +88,7 @@ typedef struct {
 
 /* Messages: `kf_answered` formats one, hands it to the host and returns `answer`. */
 extern const char *const kf_categories[3];
-kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...);
+KF_RARE kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...);
 kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories);
 
 /* Life. kf_start: as freshly instantiated. */
@@ -108,8 +108,8 @@ kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *ty
 kf_answer kf_get_boolean(kf_instance *instance, unsigned reference, bool *value);
 kf_answer kf_set_boolean(kf_instance *instance, unsigned reference, bool value);
 kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **value);
-kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type);
-kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type);
+KF_RARE kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type);
+KF_RARE kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type);
 const char *kf_name_of(unsigned reference); /* NULL if there is no such variable */
 
 /* Derivatives. */
@@ -136,7 +136,7 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
 
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */
-kf_status kf_ask(kf_instance *instance); /* the pose asked for, good or not */
+kf_status kf_ask_anew(kf_instance *instance);
 kf_pose *kf_shown(kf_state *state);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
@@ -146,5 +146,11 @@ void kf_moment(const kf_state *state, double *t, double *u);
 void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
 void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *of_ud,
                                   double *of_udd);
+
+/* The pose asked for, good or not. */
+static inline kf_status kf_ask(kf_instance *instance)
+{
+    return instance->now.solved ? instance->now.status : kf_ask_anew(instance);
+}
 
 #endif

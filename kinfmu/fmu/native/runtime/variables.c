@@ -37,7 +37,7 @@ kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const
 /* Get */
 
 /* Positions, rates and accelerations in one go, if more than one of them is wanted: what they share is computed once. */
-static void read_motion(kf_state *s, unsigned parts)
+static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
 {
     double *const values = parts & KF_BIT(KF_PART_VALUES) ? KF_REAL(s, KF_PART_VALUES) : NULL;
     double *const rates = parts & KF_BIT(KF_PART_RATES) ? KF_REAL(s, KF_PART_RATES) : NULL;
@@ -107,7 +107,7 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
 }
 
 /* A list with the time in it, or with what is no Real variable. */
-static kf_answer get_unusual(kf_instance *instance, const unsigned *references, size_t count, double *values)
+static KF_RARE kf_answer get_unusual(kf_instance *instance, const unsigned *references, size_t count, double *values)
 {
     kf_answer answer = KF_DONE;
     size_t k;
@@ -197,7 +197,7 @@ kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **
 
 /* Set */
 
-static kf_answer set_other(kf_instance *instance, unsigned reference, double value)
+static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, double value)
 {
     kf_state *const s = &instance->now;
     const int part = reference < KF_REALS ? kf_part_of[reference] : KF_PARTS;
@@ -224,6 +224,28 @@ static kf_answer set_other(kf_instance *instance, unsigned reference, double val
     return KF_DONE;
 }
 
+/* An input, the value finite. */
+static void set_input(kf_state *s, unsigned reference, double value)
+{
+    if (s->ahead) {
+        kf_forget(s);
+    }
+    if (value != s->real[reference]) {
+        s->real[reference] = value;
+        s->stray = s->stray || s->driven_by_time;
+        if (reference % 3 == 0) {
+            kf_forget(s);
+        } else {
+            s->wired[reference] = s->wired[reference] || value != 0.0;
+            kf_forget_motion(s);
+        }
+    }
+    if (!s->touched) { /* from now on the rates are those at the current time, not at the commit */
+        s->touched = true;
+        kf_forget_motion(s);
+    }
+}
+
 kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values)
 {
     kf_state *const s = &instance->now;
@@ -231,32 +253,16 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
     if (s->mode == KF_TERMINATED) {
         return kf_answered(instance, KF_ERROR, "nothing can be set after terminate");
     }
-    if (s->ahead) {
-        kf_forget(s);
-    }
     for (k = 0; k < count; ++k) {
         const unsigned reference = references[k];
         const double value = values[k];
-        if (reference >= 3 * KF_DRIVERS || !(value - value == 0.0)) { /* inputs come first; a finite number */
+        if (reference < 3 * KF_DRIVERS && value - value == 0.0) { /* inputs come first; a finite number */
+            set_input(s, reference, value);
+        } else {
             const kf_answer answer = set_other(instance, reference, value);
             if (answer != KF_DONE) {
                 return answer;
             }
-            continue;
-        }
-        if (value != s->real[reference]) {
-            s->real[reference] = value;
-            s->stray = s->stray || s->driven_by_time;
-            if (reference % 3 == 0) {
-                kf_forget(s);
-            } else {
-                s->wired[reference] = s->wired[reference] || value != 0.0;
-                kf_forget_motion(s);
-            }
-        }
-        if (!s->touched) { /* from now on the rates are those at the current time, not at the commit */
-            s->touched = true;
-            kf_forget_motion(s);
         }
     }
     return KF_DONE;
