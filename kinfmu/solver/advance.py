@@ -40,8 +40,8 @@ class Limit(NamedTuple):
     crosses: bool = False
 
 
-def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
-    """The pose at `target`, or the limit on the way to it.
+def advance(model: Model, start: Pose, target: Vector, road: Road | None) -> Pose | Limit:
+    """The pose at `target`, or the limit on the way to it; road: what is known of the way, the start's or more.
 
     Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
     residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
@@ -50,13 +50,14 @@ def advance(model: Model, start: Pose, target: Vector) -> Pose | Limit:
     one = len(target) == 1
     direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
     longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
-    pose, step, iterations = start, longest, 0
+    pose = start if road is start.road else on_road(start, road)
+    step, iterations = longest, 0
     before, regular, limit = start, start, None
     if abs(target[0] - start.u[0] if one else distance) > MOST_STEPS * longest:
         return Limit(start.u, TOO_FAR)
     for _ in range(MOST_STEPS):
         if one:
-            road: Road | None = pose.road
+            road = pose.road
             if road is not None and not road.low <= target[0] <= road.high:
                 bridge: Bridge = pose.bridge or road.next_bridge(pose.u[0], target[0])
                 if bridge.covers(target[0]):

@@ -48,23 +48,22 @@ class Solver:
         if u == start.u:
             return start
         start = start.base or start
+        road = start.road
         if self._one:  # most samples: one trusted step, away from all that is singular
-            s, road = u[0] - start.u[0], start.road
+            s = u[0] - start.u[0]
             if -self._longest <= s <= self._longest and (road is None or road.low <= u[0] <= road.high):
                 near = trusted_step(self.model, start, ALONE, s, u)
                 if near is not None and near.watch <= self.tolerance >= near.residual:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
-                    if (
-                        margin > NEAR_SINGULAR
-                        and (margin >= CLOSE or keeps_branch(self.model, start, near, ALONE, s))
-                        and surveyed(self.model, start, near) is road  # nothing new there
-                    ):
-                        return near
+                    if margin > NEAR_SINGULAR and (margin >= CLOSE or keeps_branch(self.model, start, near, ALONE, s)):
+                        road = surveyed(self.model, start, near)
+                        if road is start.road:  # nothing new there
+                            return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
-        pose = advance(self.model, start, u)
+        pose = advance(self.model, start, u, road)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
         tolerance = self.tolerance

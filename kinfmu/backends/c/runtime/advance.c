@@ -167,13 +167,14 @@ static kf_pose *on_road(kf_solver *solver, const kf_pose *pose, int road, kf_pos
     return place;
 }
 
-/* The pose at `target`, in the solver's scratch, or NULL and the limit on the way to it.
+/* The pose at `target`, in the solver's scratch, or NULL and the limit on the way to it; road: what is known of the way,
+ * the start's or more.
  *
  * Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
  * residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
  * With one driver, singular points on the way are bridged.
  */
-kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit)
+kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit)
 {
     const bool one = KF_DRIVERS == 1;
     const double longest = one ? KF_LONGEST_STEP * kf_reach[0] : KF_LONGEST_STEP;
@@ -188,14 +189,17 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
     if (fabs(distance) > KF_MOST_STEPS * longest) {
         return NULL;
     }
+    if (road != start->road) {
+        pose = on_road(solver, start, road, solver->scratch.way);
+    }
     for (turn = 0; turn < KF_MOST_STEPS; ++turn) {
         bool whole;
         double s;
         trial = spare(solver, pose, before, regular);
         if (one) {
             kf_needed(solver, start->road, pose->road, regular->road);
+            road = pose->road;
             if (!(pose->low <= target[0] && target[0] <= pose->high)) {
-                const int road = pose->road;
                 const int bridge =
                     pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, road, KF_POSE_U(pose)[0], target[0]);
                 if (kf_covers(&solver->bridges[bridge], target[0])) {
@@ -227,7 +231,7 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_
             if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR)
                 || kf_keeps_branch(solver, pose, trial, direction, s)) {
                 if (trial->found.margin < KF_REGULAR && one) {
-                    const int road = kf_surveyed(solver, pose, trial);
+                    road = kf_surveyed(solver, pose, trial);
                     if (road != trial->road) {
                         pose = on_road(solver, pose, road, trial);
                         continue;

@@ -63,8 +63,8 @@ static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
     return base;
 }
 
-/* Away from all that is singular: one trusted step. */
-static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+/* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
+static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *road)
 {
     const double longest = KF_LONGEST_STEP * kf_reach[0], s = u[0] - KF_POSE_U(start)[0];
     if (!(-longest <= s && s <= longest && start->low <= u[0] && u[0] <= start->high)
@@ -78,7 +78,8 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
     if (pose->found.margin > KF_NEAR
         && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, kf_alone, s))) {
         kf_needed(solver, start->road, start->road, start->road);
-        return kf_surveyed(solver, start, pose) == pose->road; /* nothing new there */
+        *road = kf_surveyed(solver, start, pose);
+        return *road == pose->road;
     }
     return false;
 }
@@ -89,7 +90,7 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
     kf_limit limit;
     double sum = 0.0;
     bool is_same = true;
-    int k;
+    int road, k;
     if (solver->stuck) {
         return failed(pose, KF_INCONSISTENT);
     }
@@ -104,7 +105,8 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
     if (start->has_base) {
         start = base_of(solver, start);
     }
-    if (KF_DRIVERS == 1 && is_near(solver, start, u, pose)) { /* most samples */
+    road = start->road;
+    if (KF_DRIVERS == 1 && is_near(solver, start, u, pose, &road)) { /* most samples */
         return KF_OK;
     }
     solver->message[0] = '\0';
@@ -113,7 +115,7 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
         kf_say(solver->message, " is not a finite number");
         return failed(pose, KF_OUTSIDE);
     }
-    found = kf_advance(solver, start, u, &limit);
+    found = kf_advance(solver, start, road, u, &limit);
     if (found == NULL) {
         kf_say_limit(solver->message, &limit, u);
         return failed(pose, KF_OUTSIDE);

@@ -77,7 +77,7 @@ bool kf_is_beyond(const double *target, const double *limit, const double *direc
 void kf_say_limit(char *message, const kf_limit *limit, const double *target);
 
 /* advance.c */
-KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, const double *target, kf_limit *limit);
+KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit);
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
