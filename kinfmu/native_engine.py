@@ -45,8 +45,8 @@ class NativeEngine:
                 table[:] = values
         late = _Late(self._library, driven, self._parameters, self._tolerance)
         return Swept(
-            status=told.status,
-            iterations=told.iterations,
+            status=told.outcomes[:, 0].astype(np.int64),
+            iterations=told.outcomes[:, 1].astype(np.int64),
             residual=told.residual,
             watch=told.watch,
             margin=lambda: late.diagnosed[0],

@@ -40,8 +40,8 @@ class Limit(NamedTuple):
     crosses: bool = False
 
 
-def advance(model: Model, start: Pose, target: Vector, road: Road | None) -> Pose | Limit:
-    """The pose at `target`, or the limit on the way to it; road: what is known of the way, the start's or more.
+def advance(model: Model, start: Pose, target: Vector, road: Road | None = None) -> Pose | Limit:
+    """The pose at `target`, or the limit on the way to it; road: what is known of that way, if not the start's.
 
     Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
     residual, and is trusted if the correction is small against the determinant and no determinant changes its sign.
@@ -50,7 +50,7 @@ def advance(model: Model, start: Pose, target: Vector, road: Road | None) -> Pos
     one = len(target) == 1
     direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
     longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
-    pose = start if road is start.road else on_road(start, road)
+    pose = start if road is None or road is start.road else on_road(start, road)
     step, iterations = longest, 0
     before, regular, limit = start, start, None
     if abs(target[0] - start.u[0] if one else distance) > MOST_STEPS * longest:

@@ -44,8 +44,7 @@ class _Job(ctypes.Structure):
         ("ud", _numbers),
         ("udd", _numbers),
         ("tables", _Table * 3),
-        ("status", _integers),
-        ("iterations", _integers),
+        ("outcomes", ctypes.c_void_p),
         ("residual", _numbers),
         ("watches", _numbers),
         ("most_failures", ctypes.c_int64),
@@ -53,17 +52,19 @@ class _Job(ctypes.Structure):
         ("failures", _integers),
         ("messages", ctypes.c_char_p),
         ("side_by_side", ctypes.c_int64),
+        ("gaps", ctypes.c_int64),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What a sweep tells besides its tables: see Run. failures: first sample and message of each stretch without
-    numbers, and after MOST_FAILURES of them how many more there are; side_by_side: how many samples went through lanes.
+    """What a sweep tells besides its tables: see Run. outcomes: (n, 2), status and iterations.
+
+    failures: first sample and message of each stretch without numbers, and after MOST_FAILURES of them how many more
+    there are; side_by_side: how many samples went through lanes.
     """
 
-    status: IntArray
-    iterations: IntArray
+    outcomes: NDArray[np.int32]
     residual: FloatArray
     watch: FloatArray
     failures: tuple[tuple[int, str], ...]
@@ -117,8 +118,8 @@ class Library:
         """
         count, watches = len(driven[0]), len(self.plan.watches)
         if room is None:
-            whole = np.empty((3, count), dtype=np.int64)  # in one piece: the system hands large pieces over faster
-            told = Told(whole[0], whole[1], whole[2].view(np.float64), np.empty((count, watches)), (), 0)
+            whole = np.empty((2, count))  # in one piece: the system hands large pieces over faster
+            told = Told(whole[0].view(np.int32).reshape(count, 2), whole[1], np.empty((count, watches)), (), 0)
         elif room.watch.shape == (count, watches):
             told = room
         else:
@@ -126,7 +127,7 @@ class Library:
         failures = np.zeros(MOST_FAILURES, dtype=np.int64)
         messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
         job = self._job(driven, tables)
-        job.status, job.iterations = _integer_start(told.status), _integer_start(told.iterations)
+        job.outcomes = told.outcomes.ctypes.data_as(ctypes.c_void_p)
         job.residual, job.watches = _start(told.residual), _start(told.watch)
         job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
         job.messages = ctypes.cast(messages, ctypes.c_char_p)
@@ -139,7 +140,7 @@ class Library:
             failed.append((sample, text.decode()))
         more = job.failure_count - MOST_FAILURES
         if more > 0:
-            bad = told.status > Status.BRIDGED
+            bad = told.outcomes[:, 0] > Status.BRIDGED
             first = int(np.flatnonzero(bad & ~np.concatenate([[False], bad[:-1]]))[MOST_FAILURES])
             failed.append(
                 (first, f"{more} more stretches without numbers begin here or later: {MOST_FAILURES} are told")

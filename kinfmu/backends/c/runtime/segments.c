@@ -252,26 +252,27 @@ double kf_turns_after(const kf_segments *segments, double u)
     return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
 }
 
-/* KF_VECTOR lanes in one segment, from `from` on: a fixed number, so that the processor knows what comes. */
-static void predict_at_once(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
-                            kf_lanes *lanes)
+/* Lanes from..to (excluded), all in one segment, KF_VECTOR at a time; those past the last one are written over. */
+static void predict_within(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
+                           int to, kf_lanes *lanes)
 {
     const double per_half = 2.0 / segments->width, high = turns * HIGH, low = turns * LOW, centre = segment->centre;
-    double x[KF_VECTOR];
-    int i, k;
+    double x[KF_LANES + KF_VECTOR], step[KF_VECTOR];
+    int at, i, k;
     if (kf_driver_is_angle[0]) {
         const double s = segment->sine[KF_UNKNOWNS], c = segment->cosine[KF_UNKNOWNS];
-        double *const sine = lanes->angles[0][KF_UNKNOWNS] + from, *const cosine = lanes->angles[1][KF_UNKNOWNS] + from;
-        KF_SIDE_BY_SIDE
-        for (i = 0; i < KF_VECTOR; ++i) {
-            const double step = u[from + i] - high - centre - low;
-            x[i] = step * per_half;
-            kf_turn(step, s, c, &sine[i], &cosine[i]);
+        double *const sine = lanes->angles[0][KF_UNKNOWNS], *const cosine = lanes->angles[1][KF_UNKNOWNS];
+        for (at = from; at < to; at += KF_VECTOR) {
+            KF_SIDE_BY_SIDE
+            for (i = at; i < at + KF_VECTOR; ++i) {
+                const double d = u[i] - high - centre - low;
+                x[i - from] = d * per_half;
+                kf_turn(d, s, c, &sine[i], &cosine[i]);
+            }
         }
     } else {
-        KF_SIDE_BY_SIDE
-        for (i = 0; i < KF_VECTOR; ++i) {
-            x[i] = (u[from + i] - centre) * per_half;
+        for (i = from; i < to; ++i) {
+            x[i - from] = (u[i] - centre) * per_half;
         }
     }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
@@ -279,25 +280,26 @@ static void predict_at_once(const kf_segments *segments, const kf_segment *segme
         const double c4 = segment->c[4][k], c5 = segment->c[5][k], c6 = segment->c[6][k], c7 = segment->c[7][k];
         const double base = turns == 0.0 ? segment->base[k] : kf_turned(segment->base[k], turns * segments->raised[k]);
         const double s = segment->sine[k], c = segment->cosine[k];
-        double *const z = lanes->z[k] + from;
-        double *const sine = lanes->angles[0][k] + from, *const cosine = lanes->angles[1][k] + from;
-        double step[KF_VECTOR];
-        KF_SIDE_BY_SIDE
-        for (i = 0; i < KF_VECTOR; ++i) {
-            const double at = x[i];
-            step[i] = at * KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, KF_FMA(at, c7, c6), c5), c4),
-                c3), c2), c1), c0);
-            z[i] = base + step[i];
-        }
-        if (kf_unknown_is_angle[k] && !segment->is_steep[k]) {
+        const bool is_turned = kf_unknown_is_angle[k] && !segment->is_steep[k];
+        double *const z = lanes->z[k], *const sine = lanes->angles[0][k], *const cosine = lanes->angles[1][k];
+        for (at = from; at < to; at += KF_VECTOR) {
             KF_SIDE_BY_SIDE
             for (i = 0; i < KF_VECTOR; ++i) {
-                kf_turn(step[i], s, c, &sine[i], &cosine[i]);
+                const double p = x[at - from + i];
+                step[i] = p * KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, KF_FMA(p, c7, c6), c5), c4), c3),
+                    c2), c1), c0);
+                z[at + i] = base + step[i];
             }
-        } else if (kf_unknown_is_angle[k]) {
-            KF_SIDE_BY_SIDE
-            for (i = 0; i < KF_VECTOR; ++i) {
-                kf_sincos_lane(z[i], &sine[i], &cosine[i]);
+            if (is_turned) {
+                KF_SIDE_BY_SIDE
+                for (i = 0; i < KF_VECTOR; ++i) {
+                    kf_turn(step[i], s, c, &sine[at + i], &cosine[at + i]);
+                }
+            } else if (kf_unknown_is_angle[k]) {
+                KF_SIDE_BY_SIDE
+                for (i = 0; i < KF_VECTOR; ++i) {
+                    kf_sincos_lane(z[at + i], &sine[at + i], &cosine[at + i]);
+                }
             }
         }
     }
@@ -309,8 +311,8 @@ void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, i
     const double per_width = 1.0 / segments->width, farthest = KF_FARTHEST * kf_reach[0];
     const double last = segments->repeats ? INFINITY : (double)segments->count;
     const double least = segments->repeats ? -INFINITY : 0.0;
-    double own[KF_LANES + KF_VECTOR] = {0.0}, number[KF_LANES];
-    int i, from, to;
+    double own[KF_LANES + KF_VECTOR], number[KF_LANES + 1];
+    int ends[KF_LANES + 1], pieces = 0, from = 0, i, k; /* lanes in one segment, one after another, are a piece */
     KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
         const double place = __builtin_floor((u[i] - begin) * per_width);
@@ -319,17 +321,21 @@ void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, i
         alone[i] = !is_within;
         number[i] = is_within ? place : 0.0;
     }
-    for (from = 0; from < KF_LANES; from = to) {
+    for (i = KF_LANES; i < KF_LANES + KF_VECTOR; ++i) {
+        own[i] = 0.0;
+    }
+    number[KF_LANES] = NAN;
+    for (i = 0; i < KF_LANES; ++i) { /* without a branch that would often be foreseen wrongly */
+        ends[pieces] = i + 1;
+        pieces += number[i] != number[i + 1];
+    }
+    for (k = 0; k < pieces; from = ends[k++]) {
         const double turns = segments->repeats ? floor(number[from] / SEGMENTS) : 0.0;
         const kf_segment *const segment = &segments->segments[(int64_t)(number[from] - SEGMENTS * turns)];
-        for (to = from + 1; to < KF_LANES && number[to] == number[from]; ++to) {
-        }
-        for (i = from; i < to && !segment->is_plain; ++i) {
+        for (i = from; i < ends[k] && !segment->is_plain; ++i) {
             alone[i] = 1;
         }
-        for (i = from; i < to; i += KF_VECTOR) {
-            predict_at_once(segments, segment, turns, own, i, lanes);
-        }
+        predict_within(segments, segment, turns, own, from, ends[k], lanes);
     }
 }
 

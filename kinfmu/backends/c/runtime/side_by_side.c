@@ -28,10 +28,10 @@ bool kf_lanes_made(kf_sweep *sweep)
     return lanes != NULL;
 }
 
-/* Columns that are streamed: status, iterations, residuals, then those of the tables. */
+/* Columns that are streamed: outcomes, residuals, then those of the tables. */
 static kf_column *column_of(kf_sweep *sweep, int order, int output)
 {
-    return &sweep->columns[3 + order * KF_OUTPUTS + output];
+    return &sweep->columns[2 + order * KF_OUTPUTS + output];
 }
 
 /* Numbers of eight bytes to their place in the caller's arrays; column: NULL if they go through the caches. */
@@ -124,9 +124,8 @@ static void finish(kf_sweep *sweep, const kf_job *job, int64_t end)
     if (end == 0 || !does_stream(job)) {
         return;
     }
-    kf_stream_rest(&sweep->columns[0], job->status + end);
-    kf_stream_rest(&sweep->columns[1], job->iterations + end);
-    kf_stream_rest(&sweep->columns[2], job->residual + end);
+    kf_stream_rest(&sweep->columns[0], job->outcomes + end);
+    kf_stream_rest(&sweep->columns[1], job->residual + end);
     for (order = 0; order < 3; ++order) {
         const kf_table *const table = &job->tables[order];
         const int columns = is_by_samples(table) ? 1 : table->row == 1 ? KF_OUTPUTS : 0;
@@ -168,6 +167,12 @@ static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
     }
 }
 
+/* Square root to seven digits, of numbers below 1e8 and not below 1e-60: enough for a residual, and much cheaper. */
+static double root(double square)
+{
+    return (double)sqrtf((float)(square * 1267650600228229401496703205376.0)) * 8.8817841970012523e-16; /* 2^100, 2^-50 */
+}
+
 /* KF_LANES samples from `start` on; false if memory ran out. */
 bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
 {
@@ -175,7 +180,7 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     kf_lanes *const lanes = sweep->lanes;
     const double *const u = job->u + start;
     const bool streams = does_stream(job);
-    int64_t status[KF_LANES], iterations[KF_LANES];
+    kf_outcome outcomes[KF_LANES];
     double residual[KF_LANES];
     int32_t alone[KF_LANES];
     int i, k, passes, left = 0;
@@ -187,13 +192,11 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     passes = correct(sweep, u, alone);
     KF_SIDE_BY_SIDE
     for (i = 0; i < KF_LANES; ++i) {
-        status[i] = KF_OK;
-        iterations[i] = passes;
-        residual[i] = sqrt(lanes->error[i]);
+        outcomes[i] = (kf_outcome){KF_OK, passes};
+        residual[i] = root(lanes->error[i]);
     }
-    write(streams ? &sweep->columns[0] : NULL, job->status + start, status, KF_LANES, start == 0);
-    write(streams ? &sweep->columns[1] : NULL, job->iterations + start, iterations, KF_LANES, start == 0);
-    write(streams ? &sweep->columns[2] : NULL, job->residual + start, residual, KF_LANES, start == 0);
+    write(streams ? &sweep->columns[0] : NULL, job->outcomes + start, outcomes, KF_LANES, start == 0);
+    write(streams ? &sweep->columns[1] : NULL, job->residual + start, residual, KF_LANES, start == 0);
     for (k = 0; k < KF_WATCHES; ++k) {
         for (i = 0; i < KF_LANES; ++i) {
             const double watch = lanes->watches[k][i];
@@ -264,8 +267,7 @@ static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *windo
                 table->start[(ptrdiff_t)sample * table->row + j * table->column] = standing(lanes, order, j)[i];
             }
         }
-        job->status[sample] = KF_BRIDGED;
-        job->iterations[sample] = 1;
+        job->outcomes[sample] = (kf_outcome){KF_BRIDGED, 1};
         job->residual[sample] = sqrt(error);
         for (k = 0; k < KF_WATCHES; ++k) {
             job->watches[sample * KF_WATCHES + k] = lanes->watches[k][i];

@@ -65,8 +65,8 @@ static void put_gap(kf_job *job, int64_t sample, kf_status status)
     for (k = 0; k < 3; ++k) {
         put(&job->tables[k], sample, NULL);
     }
-    job->status[sample] = status;
-    job->iterations[sample] = 0;
+    ++job->gaps;
+    job->outcomes[sample] = (kf_outcome){(int32_t)status, 0};
     job->residual[sample] = NAN;
     for (k = 0; k < KF_WATCHES; ++k) {
         job->watches[sample * KF_WATCHES + k] = NAN;
@@ -76,7 +76,7 @@ static void put_gap(kf_job *job, int64_t sample, kf_status status)
 /* Why a sample failed, if it is the first of its stretch: it was the last one to be solved. */
 static void tell_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
 {
-    if (sample > 0 && !KF_GOOD((kf_status)job->status[sample - 1])) {
+    if (sample > 0 && !KF_GOOD((kf_status)job->outcomes[sample - 1].status)) {
         return;
     }
     if (job->failure_count < job->most_failures) {
@@ -126,8 +126,7 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
     for (k = 0; k < 3; ++k) {
         put(&job->tables[k], sample, wanted[k]);
     }
-    job->status[sample] = pose->status;
-    job->iterations[sample] = pose->found.iterations;
+    job->outcomes[sample] = (kf_outcome){(int32_t)pose->status, pose->found.iterations};
     job->residual[sample] = pose->found.residual;
     if (KF_WATCHES > 0) {
         kf_watches(&sweep->follower.solver.model, &pose->found, job->watches + sample * KF_WATCHES);
@@ -177,7 +176,7 @@ static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_
         if (is_past) {
             put_gap(job, sample, KF_OUTSIDE);
         } else if (!solve_alone(sweep, job, sample, sweep->alone.samples[k].turns)) {
-            is_past = job->status[sample] == KF_OUTSIDE;
+            is_past = job->outcomes[sample].status == KF_OUTSIDE;
         }
     }
 }
@@ -192,8 +191,8 @@ static void solve_those_left(kf_sweep *sweep, kf_job *job)
     }
     solve_on_one_side(sweep, job, middle, sweep->alone.count);
     solve_on_one_side(sweep, job, middle - 1, -1);
-    for (k = 0; k < job->count; ++k) { /* again, for the message */
-        if (!KF_GOOD((kf_status)job->status[k]) && (k == 0 || KF_GOOD((kf_status)job->status[k - 1]))) {
+    for (k = 0; k < job->count && job->gaps > 0; ++k) { /* again, for the message */
+        if (!KF_GOOD((kf_status)job->outcomes[k].status) && (k == 0 || KF_GOOD((kf_status)job->outcomes[k - 1].status))) {
             if (job->failure_count < job->most_failures && solve_alone(sweep, job, k, 0.0)) {
                 continue;
             }
@@ -209,7 +208,7 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
     int64_t sample = 0;
     kf_restart(&sweep->follower);
     job->failure_count = 0;
-    job->side_by_side = 0;
+    job->side_by_side = job->gaps = 0;
 #if KF_HAS_LANES
     if (job->count >= 4 * KF_LANES && !sweep->follower.solver.stuck) {
         if (!kf_lanes_made(sweep) || !kf_segments_lay(&sweep->segments, &sweep->follower, job->count, job->u)) {

@@ -12,9 +12,14 @@ typedef struct {
     ptrdiff_t row, column;
 } kf_table;
 
+/* How a sample was solved: its kf_status, and Newton's iterations. */
+typedef struct {
+    int32_t status, iterations;
+} kf_outcome;
+
 /* What is to be solved and where it goes.
  *
- * u, ud, udd: (count, KF_DRIVERS); tables: values, rates, accelerations; status, iterations, residual: (count); watches:
+ * u, ud, udd: (count, KF_DRIVERS); tables: values, rates, accelerations; outcomes, residual: (count); watches:
  * (count, KF_WATCHES). What cannot be reached is NaN. failures: the first sample of each stretch that cannot be reached,
  * up to most_failures of them, with the messages (most_failures, KF_MESSAGE).
  */
@@ -22,12 +27,13 @@ typedef struct {
     int64_t count;
     const double *u, *ud, *udd;
     kf_table tables[3];
-    int64_t *status, *iterations;
+    kf_outcome *outcomes;
     double *residual, *watches;
     int64_t most_failures, failure_count;
     int64_t *failures;
     char *messages;
     int64_t side_by_side; /* how many samples went through lanes */
+    int64_t gaps;         /* how many are NaN */
 } kf_job;
 
 /* Memory for a sweep, to be given back by kf_sweep_free; NULL if there is none. */

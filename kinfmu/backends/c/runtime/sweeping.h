@@ -23,7 +23,7 @@ struct kf_sweep {
     kf_segments segments;
     kf_lanes *lanes;
     kf_list alone;
-    kf_column columns[3 + 3 * KF_ROOM(KF_OUTPUTS)];
+    kf_column columns[2 + 3 * KF_ROOM(KF_OUTPUTS)];
 };
 
 /* sweep.c */
