@@ -257,22 +257,18 @@ static void predict_within(const kf_segments *segments, const kf_segment *segmen
                            int to, kf_lanes *lanes)
 {
     const double per_half = 2.0 / segments->width, high = turns * HIGH, low = turns * LOW, centre = segment->centre;
+    const double of_centre[2] = {segment->sine[KF_UNKNOWNS], segment->cosine[KF_UNKNOWNS]};
     double x[KF_LANES + KF_VECTOR], step[KF_VECTOR];
     int at, i, k;
-    if (kf_driver_is_angle[0]) {
-        const double s = segment->sine[KF_UNKNOWNS], c = segment->cosine[KF_UNKNOWNS];
-        double *const sine = lanes->angles[0][KF_UNKNOWNS], *const cosine = lanes->angles[1][KF_UNKNOWNS];
-        for (at = from; at < to; at += KF_VECTOR) {
-            KF_SIDE_BY_SIDE
-            for (i = at; i < at + KF_VECTOR; ++i) {
-                const double d = u[i] - high - centre - low;
-                x[i - from] = d * per_half;
-                kf_turn(d, s, c, &sine[i], &cosine[i]);
+    for (at = from; at < to; at += KF_VECTOR) {
+        double *const sine = lanes->angles[0][KF_UNKNOWNS] + at, *const cosine = lanes->angles[1][KF_UNKNOWNS] + at;
+        KF_SIDE_BY_SIDE
+        for (i = 0; i < KF_VECTOR; ++i) {
+            step[i] = u[at + i] - high - centre - low;
+            x[at - from + i] = step[i] * per_half;
+            if (kf_driver_is_angle[0]) {
+                kf_turn(step[i], of_centre[0], of_centre[1], &sine[i], &cosine[i]);
             }
-        }
-    } else {
-        for (i = from; i < to; ++i) {
-            x[i - from] = (u[i] - centre) * per_half;
         }
     }
     for (k = 0; k < KF_UNKNOWNS; ++k) {

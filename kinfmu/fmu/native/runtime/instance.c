@@ -160,15 +160,16 @@ static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
 {
     kf_state *const s = &instance->now;
     double kept[3 * KF_DRIVERS];
+    bool is_current;
     if (s->ahead) {
         kf_forget(s);
     }
     if (!KF_GOOD(kf_ask(instance))) {
         return discard(instance, time, step, time);
     }
-    if (!s->touched || time != s->time) { /* inputs are held, or clocks differ: estimates see another time */
-        kf_forget_motion(s);
-    }
+    is_current = s->touched & (time == s->time); /* or inputs are held, or clocks differ: estimates see another time */
+    s->known &= KF_GIVEN_PARTS | (0u - (unsigned)is_current); /* no branch: clocks differ by chance, in the last digit */
+    s->drive_known &= is_current;
     commit(s, time);
     s->time = time + step;
     if (!s->moving) {
