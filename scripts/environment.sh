@@ -88,6 +88,23 @@ set_up() {
     exec 9<&-
 }
 
+# Debian packages, installed as root or by sudo without a password; fails with a line that says why it cannot.
+# $1: what else may be done where there is no apt-get.
+debian_packages() {
+    local otherwise="$1" as_root=()
+    shift
+    command -v apt-get >/dev/null || fail "no apt-get here; $otherwise (Debian calls it $*)"
+    if dpkg --status "$@" 2>/dev/null | grep -c '^Status: install ok installed' | grep -qx "$#"; then return; fi
+    if ((EUID != 0)); then
+        sudo -n true 2>/dev/null || fail "neither root nor sudo without a password; ask for: apt-get install $*"
+        as_root=(sudo -n)
+    fi
+    export DEBIAN_FRONTEND=noninteractive
+    ${as_root[@]+"${as_root[@]}"} apt-get -qq update || fail "apt-get update failed, so $* are not installed"
+    ${as_root[@]+"${as_root[@]}"} apt-get -qq install --yes --no-install-recommends "$@" >/dev/null ||
+        fail "apt-get could not install $*"
+}
+
 # Prints the comment at the head of a script when it is asked for help.
 help_if_asked() {
     if [[ "${1:-}" == --help || "${1:-}" == -h ]]; then

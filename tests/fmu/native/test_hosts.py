@@ -1,7 +1,7 @@
 """Native FMUs in hosts that others wrote, each in a process of its own, equal to the Python engine.
 
-They run where these packages are installed beside the tests: libcosimpy (OSP, FMI 2.0), ecospy with its own `ecos`
-command (both versions). KINFMU_HOSTS may name a Python that has them.
+They run where these packages are installed beside the tests, as scripts/hosts does: libcosimpy (OSP, FMI 2.0), ecospy
+with its own `ecos` command (both versions). KINFMU_HOSTS may name another Python that has them.
 """
 
 from __future__ import annotations
