@@ -191,3 +191,25 @@ def bar_linkage() -> Mechanism:
         ],
         [AngleDriver("crank", "crank", ConstantSpeed(1.0, 1.0))],
     )
+
+
+def uneven_chain(count: int) -> Mechanism:
+    """`count` crank-rockers, each driven by the rocker before it, none as long as another: alike in formulas alone."""
+    first = math.radians(60.0)
+    bodies = [
+        Body("ground", {f"O_{k}": (4.0 * k, 0) for k in range(count + 1)}),
+        Body("bar_0", {"O": (0, 0), "R": (1, 0)}, (0, 0, first)),
+    ]
+    joints = [Revolute("O_0", ("ground.O_0", "bar_0.O"))]
+    for k in range(1, count + 1):
+        bar = Body(f"bar_{k}", {"O": (0, 0), "P": (3.0 + 0.07 * k, 0), "R": (1, 0)}, (4.0 * k, 0, math.radians(100.0)))
+        coupler = Body(
+            f"coupler_{k}", {"P": (0, 0), "Q": (3.5 + 0.05 * k, 0)}, (4.0 * k - 3.5, 0.9, math.radians(40.0))
+        )
+        bodies += [bar, coupler]
+        joints += [
+            Revolute(f"O_{k}", (f"ground.O_{k}", f"bar_{k}.O")),
+            Revolute(f"P_{k}", (f"bar_{k - 1}.R", f"coupler_{k}.P")),
+            Revolute(f"Q_{k}", (f"coupler_{k}.Q", f"bar_{k}.P")),
+        ]
+    return Mechanism("uneven_chain", bodies, joints, [AngleDriver("crank", "bar_0", ConstantSpeed(first, 1.0))])

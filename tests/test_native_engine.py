@@ -17,6 +17,7 @@ from kinfmu.plan import compile_plan
 from kinfmu.run import Run
 from kinfmu.swept import Driven
 from tests.fmu.test_parameters import geared, linkage
+from tests.mechanisms import uneven_chain
 
 SAMPLES = 1100  # enough for samples to be solved side by side
 
@@ -80,6 +81,12 @@ def test_most_samples_go_side_by_side() -> None:
     told = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
     assert told.side_by_side == SAMPLES // 64 * 64  # all that fill the lanes
     assert (told.outcomes[:, 0] == 0).all()
+
+
+def test_alike_loops_of_other_lengths_move_each_in_its_own_way() -> None:
+    u = np.linspace(1.0, 8.0, SAMPLES)
+    native, python = (kinfmu.solve(uneven_chain(4), crank_angle=u, engine=engine) for engine in ("native", "python"))
+    assert_same_motion(native, python)
 
 
 def test_windows_of_bridges_are_read_side_by_side() -> None:

@@ -90,7 +90,8 @@ class _Lanes(Lists):
         self.taken = self.home({label: units.positions for label, units in self.units.items()})
         readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # they say what is handed on
         units = [line for unit in self.units.values() for line in unit.source()]
-        self.holds = [0, *accumulate(len(self.units[run.kind.label].hold) for run in self.runs)]
+        rooms = [len(run.members) * len(self.units[run.kind.label].hold) for run in self.runs]
+        self.holds = [0, *accumulate(rooms)]  # where the numbers that each run hands on stand
         self.functions = [*units, *(line for k, run in self.numbered() for line in rows_of(k, run, self.place))]
         self.functions += [placed(line, self.holds) for lines in readers for line in lines]
 
@@ -177,7 +178,8 @@ class _Lanes(Lists):
         for number, run in self.numbered():
             many = len(run.members) > 1
             label, index = run.kind.label, "k" if many else "0"
-            arguments = f"model, &run_{number}[{index}], lanes, lanes->hold + {self.holds[number - 1]}"
+            hold = f"{self.holds[number - 1]}{f' + k * {len(self.units[label].hold)}' * many}"
+            arguments = f"model, &run_{number}[{index}], lanes, lanes->hold + {hold}"
             block = f"{run.first}{' + k' * many}"
             if run.kind.solved:
                 factor = f", determinant_factors[{block}]" if stage == "position" else ""
