@@ -78,6 +78,15 @@ def about(mechanism: str) -> Iterator[None]:
 
 
 @contextmanager
+def stopped(text: str) -> Iterator[None]:
+    """Ctrl-C in this block, or function, is told as `text`, with exit status 1 as everywhere."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KinfmuError(text) from None
+
+
+@contextmanager
 def instead(path: str, name: str) -> Iterator[None]:
     """What is found wrong is told of what the user named, not of a file made on the way."""
     try:

@@ -11,7 +11,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MODEL, TIME, set_option
 from kinfmu.cli.files import InputFile, OutputFile
-from kinfmu.cli.group import about, instead, main
+from kinfmu.cli.group import about, instead, main, stopped
 from kinfmu.cli.progress import Progress
 from kinfmu.cli.settings import DRIVEN_BY_TIME, TOLERANCE, as_values, settled
 from kinfmu.cli.tell import tell_of
@@ -48,6 +48,7 @@ LOGS = Path("logs")
     "such as coupler.* and drawn, for viewers; -error,-margin: all but those; none: no logs. All if nothing is said.",
 )
 @click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to keep in a second of the run.")
+@stopped("stopped before the first sample: nothing was kept")
 def simulate(
     model: str,
     start: float | None,
@@ -99,7 +100,8 @@ def simulate(
                 progress=progress,
             )
     if recording:
-        write_rrd(run, recording)
+        with stopped(f"stopped before the recording was written; the run is in {record}"):
+            write_rrd(run, recording)
     tell_of(run)
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
     click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}" if record else verdict(run))
@@ -137,7 +139,7 @@ def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
 
 @contextmanager
 def _room() -> Iterator[None]:
-    """The folder of logs is there in this block; one that was made for it goes again if the request is refused."""
+    """The folder of logs is there in this block; one that was made for it goes again if nothing is kept."""
     is_there = LOGS.is_dir()
     try:
         LOGS.mkdir(exist_ok=True)
@@ -145,7 +147,7 @@ def _room() -> Iterator[None]:
         raise KinfmuError(f"{LOGS}: cannot be made ({error.strerror})") from None
     try:
         yield
-    except RequestError:
+    except (RequestError, KeyboardInterrupt):
         if not is_there:
             LOGS.rmdir()
         raise

@@ -11,7 +11,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, names_in, set_option
 from kinfmu.cli.files import OutputFile
-from kinfmu.cli.group import about, main
+from kinfmu.cli.group import about, main, stopped
 from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
 from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
@@ -52,6 +52,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn t
     help="native: generated C, compiled first, for long sweeps; auto chooses by the number of samples.",
 )
 @set_option
+@stopped("stopped before the table was whole: nothing was written")
 def solve(
     mechanism: str,
     output: Path,

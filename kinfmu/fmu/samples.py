@@ -37,7 +37,7 @@ class Samples:
         interface = self._interface = about.interface
         self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
         most = count + 1  # and one without numbers
-        self._reals = np.full((most, self._ends[-1]), np.nan)
+        self._reals = np.empty((most, self._ends[-1]))
         self._t = np.empty(most)
         self._counts = np.empty((most, 2), dtype=np.int64)
         self._size = 0
@@ -106,6 +106,7 @@ class Samples:
             self._pass_on_what_is_due()
             return True
         row = self._reals[self._size]
+        row.fill(np.nan)  # here, for filling the whole table would keep a long run waiting
         if good:
             if self._references:
                 row[self._asked] = slave.get(self._references)

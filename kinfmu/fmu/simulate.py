@@ -63,7 +63,8 @@ def simulate(
     for the rest. rate: samples to keep in a second of the run, all if None. sink: takes the run while it goes on, such
     as kinfmu.log.McapLog("run.mcap"), or any other kinfmu.Sink. progress: called with (samples done, samples in all).
 
-    Ctrl-C ends the run, too; what was reached is kept, with an event that says so.
+    Ctrl-C ends the run, too; what was reached is kept, with an event that says so. Before the first sample it raises
+    KeyboardInterrupt, and the sink is left alone.
 
     What is probably not meant (inputs that nothing drives, angles that jump by more than half a turn, radians that look
     like degrees) is told by events of level "warning" and "info".
@@ -94,17 +95,20 @@ def simulate(
             samples.extend(undriven(interface, table, float(t[0])))
         if table is not None:
             samples.extend(input_notes(interface, table, start, stop))
-        with interruptible() as interrupted, slave(about, folder, samples.log) as one:
-            _initialize(one, settings, t, samples.first_error)
-            samples.read_fixed(one)
-            samples.begin(channels, sink)
-            try:
-                driven = [] if table is None else [one.references[name] for name in table.names]
-                _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
-            except BaseException as failure:
-                samples.end(str(failure) or type(failure).__name__)
-                raise
-    return samples.end()
+        with interruptible() as interrupted:
+            with slave(about, folder, samples.log) as one:
+                _initialize(one, settings, t, samples.first_error)
+                samples.read_fixed(one)
+                if interrupted():
+                    raise KeyboardInterrupt
+                samples.begin(channels, sink)
+                try:
+                    driven = [] if table is None else [one.references[name] for name in table.names]
+                    _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
+                except BaseException as failure:
+                    samples.end(str(failure) or type(failure).__name__)
+                    raise
+            return samples.end()
 
 
 def _text_in(folder: Path, name: str) -> str:
@@ -224,15 +228,16 @@ def _step_through(
 
     kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values.
     """
-    is_kept = np.isin(np.arange(len(t)), kept).tolist()
-    for k, time in enumerate(t.tolist()):
+    is_kept = np.zeros(len(t), bool)
+    is_kept[kept] = True
+    for k, time in enumerate(map(float, t)):
         samples.now = time
-        if interrupted():
+        if k and interrupted():
             samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
         if inputs:
             slave.set(inputs, rows[k].tolist())
-        good = samples.read(time, slave, is_kept=is_kept[k])
+        good = samples.read(time, slave, is_kept=bool(is_kept[k]))
         if progress is not None:
             progress(k + 1, len(t))
         if not good:

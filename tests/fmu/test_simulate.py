@@ -14,7 +14,9 @@ import pytest
 
 from kinfmu.errors import FmuError, RequestError
 from kinfmu.fmu import simulate
+from kinfmu.fmu.samples import Samples
 from kinfmu.mechanism import toml_file
+from kinfmu.run import Run
 from kinfmu.solver.status import Status
 
 
@@ -230,3 +232,38 @@ def test_ctrl_c_ends_the_run_and_keeps_what_was_reached(fourbar: Path) -> None:
     assert run.events[-1].text == "at t = 20 s: interrupted; the run ends here"
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)  # afterwards Ctrl-C does what it did before
+
+
+class Watching:
+    """A sink that notes what it is given, and does something when it begins."""
+
+    def __init__(self, at_begin: Callable[[], None] = lambda: None) -> None:
+        self.at_begin, self.calls = at_begin, list[str]()
+
+    def begin(self, _run: Run) -> None:
+        self.calls.append("begin")
+        self.at_begin()
+
+    def add(self, run: Run) -> None:
+        self.calls.append(f"{len(run)} samples")
+
+    def end(self, _run: Run, _reason: str) -> None:
+        self.calls.append("end")
+
+
+def test_ctrl_c_before_the_first_sample_is_raised_and_leaves_the_sink_alone(
+    fourbar: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Samples, "read_fixed", lambda *_: signal.raise_signal(signal.SIGINT))
+    sink = Watching()
+    with pytest.raises(KeyboardInterrupt):
+        simulate(fourbar, sink=sink)
+    assert sink.calls == []
+
+
+def test_a_run_that_has_begun_holds_a_sample_whenever_ctrl_c_comes(fourbar: Path) -> None:
+    sink = Watching(lambda: signal.raise_signal(signal.SIGINT))
+    run = simulate(fourbar, sink=sink)
+    assert run.t.tolist() == [0.0]
+    assert run.events[-1].text == "at t = 1 s: interrupted; the run ends here"
+    assert sink.calls == ["begin", "1 samples", "end"]
