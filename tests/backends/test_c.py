@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import re
 import subprocess
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
+from kinfmu import AngleDriver, Body, ConstantSpeed, Gear, Mechanism, Revolute, gallery
 from kinfmu.backends.c import compiler, emit, library
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import CompilerError
@@ -140,6 +141,28 @@ def test_parameters_are_bound_or_refused() -> None:
     assert len(c.model[:4]) == len(plan.parameters)
     assert list(c.model[:4]) == [4.2, 1.3, 3.1, 3.3]
     assert model.PARAMETERS[0][0] == "ground"
+
+
+def test_a_parameter_that_only_a_condition_looks_at_is_bound_or_refused() -> None:
+    gears = Mechanism(
+        "gears",
+        [
+            Body("ground", {"O": (0, 0), "C": (4, 0)}),
+            Body("gear", {"O": (0, 0)}),
+            Body("pinion", {"C": (0, 0)}, (4, 0)),
+        ],
+        [
+            Revolute("O", ("ground.O", "gear.O")),
+            Revolute("C", ("ground.C", "pinion.C")),
+            Gear("mesh", ("gear", "pinion"), ratio="teeth"),
+        ],
+        [AngleDriver("crank", "gear", ConstantSpeed(0.0, 1.0))],
+        parameters={"teeth": 2.0},
+    )
+    c = Compiled(compile_plan(gears))
+    assert c.bind([3.0]) == ""
+    assert c.bind([0.0]) == "[joints.mesh] ratio = 0 must be other than 0"
+    assert c.bind([math.inf]) == "what follows from them is no finite number"
 
 
 def test_the_same_plan_gives_the_same_bytes_whatever_the_hash_seed() -> None:

@@ -205,6 +205,7 @@ class _Model(Lists):
             return self._function(signature, ["return true;"], ["model", "parameters", "why", "room"])
         writer = Writer(self.names, (), self.derived)
         known = [f"{line};" for line in writer.statements([*self.derived, *(c.node for c in self.plan.conditions)])]
+        numbers = [writer.expression(node) for _, node, _ in self.plan.conditions if node not in self.derived]
         loads = [
             f"{identifier(name)} = parameters[{k}];"
             for name, k in self.parameters.items()
@@ -213,7 +214,6 @@ class _Model(Lists):
         lines = [f"model->parameters[{k}] = parameters[{k}];" for k in self.parameters.values()]
         lines += [*loads, *known]
         lines += [f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(self.derived)]
-        numbers = [writer.expression(node) for _, node, _ in self.plan.conditions if node not in self.derived]
         if self.derived:
             lines += ["for (k = 0; k < KF_DERIVED; ++k) {", "    total += fabs(model->derived[k]);", "}"]
         if self.derived or numbers:
