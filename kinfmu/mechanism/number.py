@@ -6,12 +6,14 @@ import re
 from collections.abc import Collection
 
 from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_number, is_number
-from kinfmu.units import Quantity, every_unit, factors
+from kinfmu.units import Quantity, every_unit, factors, unit_of
 
 _PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*)\s*")  # a number and one word
+_WORDS = re.compile(r"\s*[+-]?\s*[^\W\d]\w*(?:[\s-]+\w+)*\s*")  # 'y', '-x', 'Y axis', 'x-axis'
 _EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
 
 
@@ -33,7 +35,7 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
             plain = _PLAIN.fullmatch(value)
             if plain and quantity and known:  # no expression was meant: what fits this place is enough to tell
                 raise _wrong_unit(where, value, plain[1], known) from None
-            raise MechanismError(f"{where} = {error}") from None
+            raise no_expression(where, value, quantity, length_unit, error) from None
         literal = expression.literal
         if literal is None:
             return expression
@@ -44,7 +46,7 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
         check_number(where, literal.value, value)
         return float(literal.value)
     if not is_number(value):
-        valid = f"a number or text such as '{_example(quantity)}'"
+        valid = f"a number or text such as '{_example(quantity, length_unit)}'"
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     check_number(where, value)
     return float(value)  # type: ignore[arg-type]  # is_number said so
@@ -66,13 +68,24 @@ def measured(where: str, value: object, quantity: Quantity, length_unit: str) ->
     return float(value)  # type: ignore[arg-type]  # check_number said so
 
 
+def no_expression(
+    where: str, text: str, quantity: Quantity | None, length_unit: str, error: MechanismError
+) -> MechanismError:
+    """`error` about an expression, with its place; of words alone it tells first what must stand there."""
+    if quantity is None or not _WORDS.fullmatch(text):
+        return MechanismError(f"{where} = {error}")
+    needed, example = Dimension.of(quantity), _example(quantity, length_unit)
+    return MechanismError(f"{where} must be {needed}, such as '{example}': {error}")
+
+
 def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> MechanismError:
     near = suggestion(unit, known)
     valid = f"must be one of {listed(known)}{near}" if known else "does not belong to a pure number"
     return MechanismError(f"{where} = {quoted(value)}: unit {quoted(unit)} {valid}")
 
 
-def _example(quantity: Quantity | None) -> str:
-    if quantity is None or quantity.kind not in _EXAMPLES:
+def _example(quantity: Quantity | None, length_unit: str) -> str:
+    if quantity is None or not factors(quantity, length_unit):
         return "2*a"
-    return _EXAMPLES[quantity.kind] + ("", "/s", "/s2")[quantity.order]
+    _, slash, per = unit_of(quantity, length_unit).partition("/")
+    return _EXAMPLES[quantity.kind] + slash + per

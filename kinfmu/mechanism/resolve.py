@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.number import written
+from kinfmu.mechanism.number import no_expression, written
 from kinfmu.mechanism.parameters import Parameter, dimensions_of, read, resolved
 from kinfmu.mechanism.places import Members, Place, told
 from kinfmu.mechanism.quoted import quoted
@@ -54,6 +54,10 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     def computed(place: Place, value: Any, quantity: Quantity) -> Any:
         if not isinstance(value, Expression):
             return value
+        try:
+            value.refuse_unknown(values)
+        except MechanismError as error:
+            raise no_expression(told(place), value.text, quantity, unit, error) from None
         try:
             found = value.dimension(dimensions)
             number = float(value.value(values))

@@ -148,6 +148,14 @@ WRONG = {
         'law = "polynomial"\ncoefficients = [0, "1 mm"]',
         "c1 = '1 mm': unit 'mm' must be one of m/s, m/min, ",
     ),
+    "a coefficient that is no number": (
+        'law = "polynomial"\ncoefficients = [0, 1, 2, [3]]',
+        "c3 = [3] must be a number or text such as '25 mm/s3'",
+    ),
+    "a coefficient that is a word": (
+        'law = "polynomial"\ncoefficients = [0, "fast"]',
+        "c1 must be a speed, such as '25 mm/s': 'fast', character 1: no parameter 'fast'; parameters: none",
+    ),
     "neither points nor a file": (SPLINE, "needs the key 'points' or 'file'; keys: points, ends, file"),
     "points and a file": (
         f'{SPLINE}points = []\nfile = "a"',

@@ -235,7 +235,8 @@ CHANGES = {
     "a length that is text without a number": (
         "length = 1\n",
         'length = "one m" ',
-        "[joints.AB] length = 'one m', character 5: 'm' where one of + - * / ** must stand",
+        "[joints.AB] length must be a length, such as '25 mm': 'one m', character 5: 'm' where one of + - * / ** must "
+        "stand",
     ),
     "a speed with the unit of an angle": (
         '"1 deg/s"',

@@ -12,7 +12,7 @@ import pytest
 from kinfmu.drivers import AngleDriver
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError, RequestError
-from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute
+from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute, Translational
 from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
 from kinfmu.mechanism.expression import Expression
@@ -343,6 +343,21 @@ def test_a_value_that_cannot_be_meant_is_told_with_its_expression() -> None:
 def test_a_place_tells_its_unknown_names() -> None:
     guide = Coordinate("guide", "bar.P", "x", "2*b")  # type: ignore[arg-type]
     assert told({}, guide) == "[joints.guide] value = '2*b', character 3: no parameter 'b'; parameters: a"
+
+
+@pytest.mark.parametrize(
+    ("axis", "character", "what"),
+    [
+        ("y", 1, "no parameter 'y'; parameters: a"),
+        ("-y", 2, "no parameter 'y'; parameters: a"),
+        ("y-axis", 1, "no parameter 'y'; parameters: a"),
+        ("Y axis", 3, "'axis' where one of + - * / ** must stand"),
+    ],
+)
+def test_words_in_the_place_of_a_number_are_told_what_is_measured_there(axis: str, character: int, what: str) -> None:
+    slide = Translational("slide", ("ground.O", "bar.P"), axis)  # type: ignore[arg-type]
+    needed = "[joints.slide] axis must be an angle, such as '60 deg'"
+    assert told({}, slide) == f"{needed}: '{axis}', character {character}: {what}"
 
 
 def test_a_name_that_is_an_input_is_told() -> None:
