@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
@@ -14,7 +15,9 @@ from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, sugg
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.mechanism.number import measured
+from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.toml_file import text
+from kinfmu.mechanism.valid import is_number
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.python_engine import PythonEngine
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
@@ -49,9 +52,9 @@ def solve(
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
     if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
     and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there.
-    tolerance: residual relative to the size above which a sample is not ok. wrap: angles given as inputs are followed
-    the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three arrays
-    (n, outputs), by samples or by outputs (order="F": faster), that take values, rates and accelerations.
+    tolerance: residual relative to the size above which a sample is not ok; positive. wrap: angles given as inputs are
+    followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three
+    arrays (n, outputs), by samples or by outputs (order="F": faster), that take values, rates and accelerations.
 
     Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
     last good sample. Raises a RequestError for what is not there or cannot be meant, and what compiling a plan raises
@@ -59,6 +62,8 @@ def solve(
     """
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+    if not (is_number(tolerance) and 0.0 < tolerance < math.inf):
+        raise RequestError(f"tolerance = {quoted(tolerance)} must be a positive number")
     if isinstance(mechanism, SolvePlan):
         if outputs is not None:
             raise RequestError("outputs are chosen when a plan is compiled: compile_plan(mechanism, outputs)")

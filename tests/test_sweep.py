@@ -94,6 +94,11 @@ def test_two_drivers_take_arrays_and_numbers() -> None:
         ({"t": [0.0], "engine": "fortran"}, "engine 'fortran' is not known"),
         ({"t": [0.0], "parameters": {"crank.sped": 1.0}}, r"did you mean 'crank\.speed'"),
         ({"t": [0.0], "parameters": {"crank.speed": np.inf}}, "must be a finite number"),
+        ({"t": [0.0], "tolerance": -1}, r"^tolerance = -1 must be a positive number$"),
+        ({"t": [0.0], "tolerance": 0.0}, r"^tolerance = 0\.0 must be a positive number$"),
+        ({"t": [0.0], "tolerance": np.nan}, r"^tolerance = nan must be a positive number$"),
+        ({"t": [0.0], "tolerance": np.inf}, r"^tolerance = inf must be a positive number$"),
+        ({"t": [0.0], "tolerance": "1e-9"}, r"^tolerance = '1e-9' must be a positive number$"),
     ],
 )
 def test_wrong_arguments_are_told_in_one_line(arguments: dict[str, object], message: str) -> None:
