@@ -9,6 +9,7 @@ from kinfmu.chains import CHAINS, chain
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read, text
+from kinfmu.suffix import suffix_of
 
 
 def folder() -> Path:
@@ -30,7 +31,7 @@ def has(name: str) -> bool:
 
 def load(mechanism: str | Path) -> Mechanism:
     """A mechanism by its gallery name or from a .toml file; chains also as 'fourbar_chain:1000', of any length."""
-    if isinstance(mechanism, str) and not mechanism.endswith(".toml") and "/" not in mechanism:
+    if isinstance(mechanism, str) and suffix_of(mechanism) != ".toml" and "/" not in mechanism:
         name, colon, count = mechanism.partition(":")
         if colon and name in CHAINS:
             return chain(name, count)

@@ -12,6 +12,7 @@ from kinfmu import gallery
 from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
+from kinfmu.suffix import suffix_of
 from kinfmu.units import Quantity, factors
 
 
@@ -22,7 +23,7 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         name, known = str(value), gallery.names()
-        if name.endswith(".toml"):
+        if suffix_of(name) == ".toml":
             return name if exists(Path(name)) else self.fail(missing(Path(name)), param, ctx)
         files = (f"{name}.toml", str(Path(name) / "mechanism.toml"))
         if gallery.has(name):
@@ -41,7 +42,7 @@ class ModelName(MechanismName):
     name = "FMU|MECH"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        if str(value).endswith(".fmu"):
+        if suffix_of(str(value)) == ".fmu":
             return str(value) if exists(Path(value)) else self.fail(missing(Path(value)), param, ctx)
         return super().convert(value, param, ctx)
 

@@ -13,6 +13,7 @@ from kinfmu.cli.arguments import TIME, names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import RequestError, listed
+from kinfmu.suffix import suffix_of
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -79,7 +80,7 @@ def export(run: Path, output: Path, columns: str | None, start: float | None, st
     """
     from kinfmu.log import read
 
-    suffix = output.suffix.lower()
+    suffix = suffix_of(output)
     if columns is not None and suffix not in PLOTS:
         raise click.UsageError(f"--columns {columns}: chooses what is plotted, into {listed(PLOTS)}, not {suffix}")
     FORMATS[suffix](_between(read(run), start, stop), output, names_in(columns) or ())

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kinfmu.errors import listed, suggestion
+from kinfmu.suffix import suffix_of
 
 
 class InputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
@@ -63,13 +64,13 @@ def missing(path: Path) -> str:
     """'runn.csv: there is no such file; did you mean 'run.csv'?': of its folder, by names that end alike."""
     if is_folder(path):
         return f"{path}: is a folder; the name of a file is needed"
-    return f"{path}: there is no such file{suggestion(str(path), beside(path, path.suffix))}"
+    return f"{path}: there is no such file{suggestion(str(path), beside(path, suffix_of(path)))}"
 
 
 def beside(path: Path, suffix: str) -> list[str]:
     """Files of a suffix in the folder of a path, by how they would be given in its place."""
     try:
-        return sorted(str(path.with_name(one.name)) for one in path.parent.iterdir() if one.suffix == suffix)
+        return sorted(str(path.with_name(one.name)) for one in path.parent.iterdir() if suffix_of(one) == suffix)
     except (OSError, ValueError):  # no folder, or no name that a folder could have
         return []
 
@@ -81,6 +82,6 @@ def _check_suffix(
     param: click.Parameter | None,
     ctx: click.Context | None,
 ) -> None:
-    if suffixes and path.suffix.lower() not in suffixes:
+    if suffixes and suffix_of(path) not in suffixes:
         ends = suffixes[0] if len(suffixes) == 1 else f"one of {listed(suffixes)}"
         kind.fail(f"{path}: its name must end in {ends}", param, ctx)

@@ -17,6 +17,7 @@ from kinfmu.cli.settings import DRIVEN_BY_TIME, TOLERANCE, as_values, settled
 from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.suffix import suffix_of
 
 LOGS = Path("logs")
 
@@ -117,7 +118,7 @@ def _fmu(
     from kinfmu.fmu import build
     from kinfmu.fmu.build import default_drive
 
-    if model.endswith(".fmu"):
+    if suffix_of(model) == ".fmu":
         return Path(model), as_values(settings)
     mech = gallery.load(model)
     given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
@@ -132,7 +133,8 @@ def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
 
     The recording goes beside the record, so that two runs of one mechanism keep both of their files.
     """
-    name = Path(model.replace(":", "_")).name.removesuffix(".toml").removesuffix(".fmu")
+    file = Path(model.replace(":", "_"))
+    name = file.stem if suffix_of(file) in (".toml", ".fmu") else file.name
     record = mcap or LOGS / f"{name}.mcap"
     return record, rrd or record.with_suffix(".rrd")
 

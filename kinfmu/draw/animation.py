@@ -30,6 +30,7 @@ from kinfmu.shapes import palette
 from kinfmu.shapes.instant import Instant
 from kinfmu.shapes.placing import poses_of, world
 from kinfmu.shapes.slides import rods, slides
+from kinfmu.suffix import suffix_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -67,7 +68,7 @@ def animate(run: Run, path: str | Path) -> None:
     matplotlib.
     """
     path = Path(path)
-    if path.suffix.lower() != ".gif":
+    if suffix_of(path) != ".gif":
         raise FigureError(f"{path}: '{path.suffix}' is no moving picture that can be drawn; known: .gif")
     mechanism, poses = _placed(run, path)
     film = _film(run, poses, path)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError, listed
+from kinfmu.suffix import suffix_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
         check_suffix(path)
     with house_style(paths[0]):
         figure = draw()
-        images = [_image(figure, path.suffix.lower()) for path in paths]
+        images = [_image(figure, suffix_of(path)) for path in paths]
     for path, image in zip(paths, images, strict=True):
         write_bytes(path, image)
 
@@ -57,7 +58,7 @@ def write_bytes(path: Path, image: bytes) -> None:
 
 def check_suffix(path: Path) -> None:
     """Raise a FigureError unless the name of a file says what to draw."""
-    if path.suffix.lower() not in SUFFIXES:
+    if suffix_of(path) not in SUFFIXES:
         raise FigureError(f"{path}: '{path.suffix}' is no figure that can be drawn; known: {listed(SUFFIXES)}")
 
 

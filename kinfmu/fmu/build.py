@@ -12,6 +12,7 @@ from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.joints.laws import External
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import refuse_other
+from kinfmu.suffix import suffix_of
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -90,7 +91,7 @@ def _file(path: str | Path | None, name: str) -> Path:
     path = Path(f"{name}.fmu" if path is None else path)
     if path.is_dir():
         return path / f"{name}.fmu"
-    if path.suffix != ".fmu":
+    if suffix_of(path) != ".fmu":
         raise RequestError(f"{path}: is no folder, and the file of an FMU ends in .fmu")
     return path
 

@@ -13,6 +13,7 @@ from kinfmu.log.headless import executable, last_words, shoot
 from kinfmu.log.reading import read
 from kinfmu.log.rerun_file import write_rrd
 from kinfmu.log.target import replacing
+from kinfmu.suffix import suffix_of
 
 FAILS_WITHIN = 1.5  # [s]; a viewer that cannot open a window ends sooner
 POSTER = 1 / 3  # of the run's time: where a picture is taken if no time is given; ends are often singular
@@ -43,12 +44,12 @@ def review(
     if screenshot and not save:
         with TemporaryDirectory() as folder:
             recording = run
-            if run.suffix == ".mcap":
+            if suffix_of(run) == ".mcap":
                 recording = Path(folder) / f"{run.stem}.rrd"
                 at = _record(run, other, recording, at)
             _shoot(recording, screenshot, at)
         return None
-    if run.suffix == ".rrd":
+    if suffix_of(run) == ".rrd":
         recording, moment = run, at
     else:
         recording = Path(save) if save else run.with_name(_beside(run, other))
@@ -67,17 +68,17 @@ def _check(
     if at is not None and not screenshot:
         raise RequestError(f"at = {at:g} s is the time of a screenshot, and none is asked for")
     for path in (run, *([Path(other)] if other else [])):
-        if path.suffix not in (".mcap", ".rrd"):
+        if suffix_of(path) not in (".mcap", ".rrd"):
             raise RequestError(f"{path}: a run to review is an .mcap or .rrd file")
         if not path.is_file():
             raise RequestError(f"{path}: there is no such file")
-    if run.suffix == ".rrd" and (other or save):
+    if suffix_of(run) == ".rrd" and (other or save):
         what = "compared" if other else "saved as another"
         raise RequestError(f"{run}: a recording cannot be {what}; give the run's .mcap file")
-    if other and Path(other).suffix == ".rrd":
+    if other and suffix_of(other) == ".rrd":
         raise RequestError(f"{other}: a recording cannot be compared; give the run's .mcap file")
     for target, suffix in ((save, ".rrd"), (screenshot, ".png")):
-        if target and Path(target).suffix != suffix:
+        if target and suffix_of(target) != suffix:
             raise RequestError(f"{target}: the name must end in {suffix}")
 
 

@@ -10,6 +10,7 @@ from kinfmu.errors import LogError, MissingPackageError, listed
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run, arrow_table
+from kinfmu.suffix import suffix_of
 
 ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
 
@@ -24,7 +25,7 @@ def write_table(run: Run, path: str | Path) -> None:
     Raises a LogError for another suffix or a file that cannot be written, MissingPackageError without pyarrow.
     """
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
-    suffix = Path(path).suffix.lower()
+    suffix = suffix_of(path)
     if suffix not in writers:
         raise LogError(f"{path}: '{suffix}' is no table that can be written; known: {listed(writers)}")
     with replacing(path) as temporary:
@@ -70,4 +71,5 @@ def _write_npz(run: Run, path: Path) -> None:
         "kinfmu.units": np.array([column.unit for column in columns]),
         "kinfmu.mechanism": np.array(run.mechanism_text),
     }
-    np.savez_compressed(path, allow_pickle=False, **{column.name: column.values for column in columns}, **texts)
+    with path.open("wb") as file:  # numpy would give a path another suffix
+        np.savez_compressed(file, allow_pickle=False, **{column.name: column.values for column in columns}, **texts)
