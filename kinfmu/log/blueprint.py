@@ -44,14 +44,7 @@ def single(
         rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run], NARROW) for group in solver]))
         shares.append(1.5)
     rows.append(status_view([""], [run]))
-    text: list[rrb.View] = [card_view()]
-    if happenings(run):
-        text.append(log_view([""]))
-    left = rrb.Vertical(
-        linkage_view(["/linkage"], [run], [scene]),
-        rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
-        row_shares=[1.7, 1],
-    )
+    left = _left(linkage_view(["/linkage"], [run], [scene]), [""], [run])
     right = rrb.Vertical(*rows, row_shares=[*shares, 1.0])
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
 
@@ -74,18 +67,23 @@ def compared(
                 rrb.Horizontal(*[plot(f"B - A: {group.title}", [("/difference", group)], runs) for group in found])
             )
     rows.append(status_view(["/a", "/b"], runs))
-    text: list[rrb.View] = [card_view()]
-    if any(happenings(run) for run in runs):
-        text.append(log_view(["/a", "/b"]))
-    left = rrb.Vertical(
-        linkage_view(["/a/linkage", "/b/linkage"], runs, scenes),
-        rrb.Horizontal(*text, column_shares=[1.0, 1.25][: len(text)]),
-        row_shares=[1.4, 1],
-    )
+    left = _left(linkage_view(["/a/linkage", "/b/linkage"], runs, scenes), ["/a", "/b"], runs)
     apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
     both = rrb.Vertical(*overlaid, name="A and B")
     right = rrb.Tabs(apart, both)
     return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
+
+
+def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
+    """What moves, the card, and below it what happened, if anything did.
+
+    The log shows a line of each text, so it is as wide as it can be; the card breaks them.
+    """
+    import rerun.blueprint as rrb
+
+    if any(happenings(run) for run in runs):
+        return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
+    return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])
 
 
 def _overlaid(

@@ -20,20 +20,19 @@ def card(run: Run, note: str = "") -> str:
     worst = worst_residual(run)
     if worst:
         lines += [f"Worst residual {worst.residual:.2g} of the mechanism's size, at {worst.t:g} s.", ""]
-    lines += ["| samples | status |", "|---:|---|"]
-    lines += [f"| {number} | {MEANINGS[status]} |" for status, number in counts(run).items()]
+    lines += [f"* {number} {MEANINGS[status]}" for status, number in counts(run).items()]
+    events = happenings(run)
+    if events:
+        lines += ["", "What happened:", ""]
+        lines += [f"* **{event.t:g} s:** {plain(event.text)}" for event in events[:MOST_EVENTS]]
+        if len(events) > MOST_EVENTS:
+            lines.append(f"* and {len(events) - MOST_EVENTS} more, in the log")
     if run.watch_names:
         lines += [
             "",
             f"Watched, set aside as redundant: {plain(', '.join(run.watch_names[:MOST_EVENTS]))}"
             + (f" and {len(run.watch_names) - MOST_EVENTS} more." if len(run.watch_names) > MOST_EVENTS else "."),
         ]
-    events = happenings(run)
-    if events:
-        lines += ["", "| t [s] | event |", "|---:|---|"]
-        lines += [f"| {event.t:g} | {plain(event.text)} |" for event in events[:MOST_EVENTS]]
-        if len(events) > MOST_EVENTS:
-            lines.append(f"| | and {len(events) - MOST_EVENTS} more, in the log |")
     lines += _table("about", {key: value for key, value in run.info.items() if key != "title"})
     lines += _table("constant", {name: f"{value:g}" for name, value in run.fixed.items()})
     return "\n".join(lines) + "\n"

@@ -34,7 +34,7 @@ from kinfmu.log.container import McapWriter, Messages
 from kinfmu.log.drawn import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, joint_topics
 from kinfmu.log.record import description, ending, is_integer, layout, tables
 from kinfmu.log.target import replacing
-from kinfmu.log.verdict import sentence, status_events
+from kinfmu.log.verdict import sentence, status_events, unexplained
 from kinfmu.mechanism import toml_file
 from kinfmu.run import Event, Run
 
@@ -62,7 +62,7 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
         try:
             for start in range(0, len(run), ROWS):
                 content.add(run.part(slice(start, start + ROWS)))
-            content.log(status_events(run), run.events)
+            content.log(unexplained(status_events(run), run.events), run.events)
             content.end(run)
         finally:
             content.close()

@@ -10,8 +10,8 @@ from pathlib import Path
 from kinfmu.log.clock import zero_of
 from kinfmu.log.mcap_file import Content
 from kinfmu.log.target import check_room, checked, replacing, unwritable
-from kinfmu.log.verdict import status_events
-from kinfmu.run import Run
+from kinfmu.log.verdict import status_events, unexplained
+from kinfmu.run import Event, Run
 from kinfmu.solver.status import Status
 
 
@@ -29,11 +29,12 @@ class McapLog:
         self._content: Content | None = None
         self._file: FileIO | None = None
         self._status = Status.OK  # of the last sample in the file
+        self._held: list[Event] = []  # failures that the next piece may tell the reason of
 
     def begin(self, run: Run) -> None:  # noqa: ARG002  # every piece of the run holds what is in this one
         """The run before its first sample; LogError if no file can be made."""
         check_room(self.path)
-        self._content, self._status = None, Status.OK
+        self._content, self._status, self._held = None, Status.OK, []
 
     def add(self, run: Run) -> None:
         """The next samples, and the events since the last call."""
@@ -49,6 +50,7 @@ class McapLog:
             self._start(run)
         if self._content and self._file:
             with self._kept_if_it_fails():
+                self._content.log(self._held, ())
                 self._content.end(run, reason)
         self.close()
 
@@ -68,7 +70,10 @@ class McapLog:
 
     def _put(self, content: Content, run: Run) -> None:
         content.add(run)
-        content.log(status_events(run, self._status), run.events)
+        due = unexplained(self._held, run.events)
+        new = unexplained(status_events(run, self._status), run.events)
+        self._held = [change for change in new if change.level == "error"]
+        content.log([*due, *(change for change in new if change.level != "error")], run.events)
         if len(run):
             self._status = Status(int(run.status[-1]))
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.log.clock import nanoseconds
 from kinfmu.run import Event, Run
 from kinfmu.solver.status import Status
 
+_WHEN = re.compile(r"^at t = \S+ s: ")
 _LEVELS = {Status.OK: "info", Status.BRIDGED: "info", Status.NEAR_SINGULAR: "warning"}  # the others: "error"
 MEANINGS = {
     Status.OK: "ok",
@@ -72,9 +75,23 @@ def status_events(run: Run, before: Status = Status.OK) -> list[Event]:
     ]
 
 
+def unexplained(changes: Iterable[Event], events: Iterable[Event]) -> list[Event]:
+    """The changes of status without the failures that an error among `events` tells of, at the same time, with why."""
+    told = {_moment(event) for event in events if event.level == "error"}
+    return [change for change in changes if change.level != "error" or _moment(change) not in told]
+
+
+def _moment(event: Event) -> int:
+    """When it was [ns], as a log tells it."""
+    return int(nanoseconds(np.array([event.t]))[0])
+
+
 def happenings(run: Run) -> list[Event]:
-    """Changes of status and the run's own events, by time; a run that begins well begins without an entry."""
-    return sorted([*status_events(run), *run.events], key=lambda event: event.t)
+    """Changes of status and the run's own events, by time, each failure once; a run that begins well begins without an
+    entry. Texts begin with what matters: when it was stands beside them.
+    """
+    found = [*unexplained(status_events(run), run.events), *run.events]
+    return sorted((event._replace(text=_WHEN.sub("", event.text)) for event in found), key=lambda event: event.t)
 
 
 def sentence(run: Run) -> str:

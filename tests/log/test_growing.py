@@ -59,6 +59,32 @@ def test_a_run_that_grew_says_in_every_topic_what_one_written_at_once_says(run_w
         assert messages(tmp_path / "grown.mcap", topic) == messages(tmp_path / "whole.mcap", topic), topic
 
 
+def test_a_reason_that_comes_after_its_sample_is_still_the_one_row_that_tells_of_the_failure(
+    run_with_gap: Run, tmp_path: Path
+) -> None:
+    run = run_with_gap.part(slice(0, 101), events=run_with_gap.events)
+    sink = McapLog(tmp_path / "run.mcap")
+    sink.begin(without_samples(run))
+    sink.add(dataclasses.replace(run, events=()))
+    sink.add(run.part(slice(101, 101), events=run.events))
+    sink.end(run, "")
+    found = [payload for time, payload in messages(tmp_path / "run.mcap", "/log") if time == 100 * 10**9]
+    assert len(found) == 1
+    assert b"the limit is 1.75 rad" in found[0]
+
+
+@pytest.mark.parametrize("rows", [101, 110])
+def test_a_failure_without_a_reason_is_in_the_log_in_the_end(rows: int, run_with_gap: Run, tmp_path: Path) -> None:
+    run = run_with_gap.part(slice(0, rows))
+    sink = McapLog(tmp_path / "run.mcap")
+    sink.begin(without_samples(run))
+    sink.add(run.part(slice(0, 101)))
+    sink.add(run.part(slice(101, rows)))
+    sink.end(run, "")
+    (found,) = [payload for time, payload in messages(tmp_path / "run.mcap", "/log") if time == 100 * 10**9]
+    assert b"outside" in found
+
+
 def test_rerun_finds_no_fault_with_a_file_that_grew(run_with_gap: Run, tmp_path: Path) -> None:
     grown(run_with_gap, tmp_path / "run.mcap", 7)
     told = subprocess.run(

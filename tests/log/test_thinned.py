@@ -50,7 +50,7 @@ def test_a_recording_says_what_it_leaves_out_and_tells_all_events(
     assert 100 <= len(angles) < 150
     (text,) = documents(tmp_path / "run.rrd", "/card")
     assert f"{len(angles)} of 2001 samples are drawn" in text
-    assert len(rows(tmp_path / "run.rrd", "/log", "TextLog:text")) == 6
+    assert len(rows(tmp_path / "run.rrd", "/log", "TextLog:text")) == 5
     write_comparison(long_run, long_run, tmp_path / "both.rrd")
     (text,) = documents(tmp_path / "both.rrd", "/card")
     assert "A: " in text

@@ -10,7 +10,7 @@ from kinfmu.log.card import card
 from kinfmu.log.verdict import happenings, sentence
 from kinfmu.run import Event, Run
 from kinfmu.solver.status import Status
-from tests.log.runs import fourbar
+from tests.log.runs import fourbar, with_gap
 
 
 def test_the_verdict_counts_samples_by_status(run_with_gap: Run) -> None:
@@ -19,7 +19,19 @@ def test_the_verdict_counts_samples_by_status(run_with_gap: Run) -> None:
 
 def test_what_happened_is_told_by_time_with_its_level(run_with_gap: Run) -> None:
     found = [(event.t, event.level) for event in happenings(run_with_gap)]
-    assert found == [(0, "info"), (1, "info"), (100, "error"), (100, "error"), (121, "info"), (180, "info")]
+    assert found == [(0, "info"), (1, "info"), (100, "error"), (121, "info"), (180, "info")]
+
+
+def test_a_failure_is_told_once_with_its_reason_and_without_the_time_that_stands_beside_it(run: Run) -> None:
+    reason = "crank = 1.9 rad cannot be reached: the limit is 1.75 rad"
+    failed = dataclasses.replace(with_gap(run, 100, 180), events=(Event(100.0, "error", f"at t = 100 s: {reason}"),))
+    assert [event for event in happenings(failed) if event.level == "error"] == [Event(100.0, "error", reason)]
+
+
+def test_a_failure_that_no_event_explains_is_told_by_its_status(run: Run) -> None:
+    failed = dataclasses.replace(with_gap(run, 100, 120), events=(Event(99.0, "error", "something else"),))
+    told = [event.text for event in happenings(failed) if event.level == "error"]
+    assert told == ["something else", "outside: the drivers cannot take the mechanism there"]
 
 
 def test_a_run_that_is_well_from_the_start_has_nothing_to_tell() -> None:
@@ -36,9 +48,9 @@ def test_the_card_tells_mechanism_run_verdict_and_events(run_with_gap: Run) -> N
     for part in (
         "### Four-bar crank with a redundant constraint",
         "181 samples, 0 s to 180 s",
-        "| 21 | outside: ",
+        "* 21 outside: ",
         "Worst residual 1.1e-16",
-        "| 100 | crank\\_angle = 1.9 rad: the limit is 1.75 rad |",
+        "* **100 s:** crank\\_angle = 1.9 rad: the limit is 1.75 rad\n",
         "Watched, set aside as redundant: AB.",
         "Not drawn: coupler.",
     ):
@@ -48,9 +60,9 @@ def test_the_card_tells_mechanism_run_verdict_and_events(run_with_gap: Run) -> N
 def test_text_from_outside_cannot_break_the_card(run: Run) -> None:
     odd = dataclasses.replace(run, info={"title": "a | b\n# <c>"}, events=(Event(1.0, "info", "x|y\nz"),))
     assert "### a \\| b \\# \\<c\\>\n" in card(odd)
-    assert "| 1 | x\\|y z |" in card(odd)
+    assert "* **1 s:** x\\|y z\n" in card(odd)
 
 
 def test_a_long_story_is_cut_on_the_card(run: Run) -> None:
     long = dataclasses.replace(run, events=tuple(Event(float(k), "info", f"event {k}") for k in range(100)))
-    assert "| | and 91 more, in the log |" in card(long)
+    assert "* and 91 more, in the log\n" in card(long)
