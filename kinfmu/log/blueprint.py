@@ -15,7 +15,6 @@ from kinfmu.run import Run
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
-MOST_CURVES = 14  # a longer legend would hide the curves
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
 EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
@@ -144,7 +143,7 @@ def plot(
     import rerun.blueprint as rrb
 
     names = [name for _, group in groups for name in group.names]
-    has_legend = 1 < len(names) <= MOST_CURVES
+    has_legend = len(names) > 1  # one that is longer than the plot is high scrolls
     ranges = [group.shown for _, group in groups if group.shown]
     axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
     return rrb.TimeSeriesView(

@@ -30,8 +30,19 @@ STATUS: tuple[Colour, ...] = (
 
 
 def body(index: int) -> Colour:
-    """Colour of the body at this place of the mechanism file; points of interest go on after the bodies."""
-    return BODIES[index % len(BODIES)]
+    """Colour of the body at this place of the mechanism file; points of interest go on after the bodies.
+
+    After BODIES they come again darker, then paler; those of the first 21, and these made lighter, are all different.
+    """
+    turn, place = divmod(index, len(BODIES))
+    own = BODIES[place]
+    return (own, _mixed(own, (0, 0, 0), 0.3), _mixed(own, (150, 150, 150), 0.6))[turn % 3]
+
+
+def _mixed(colour: Colour, other: Colour, part: float) -> Colour:
+    """The colour with a part of another one in it."""
+    red, green, blue = (round(a + part * (b - a)) for a, b in zip(colour, other, strict=True))
+    return red, green, blue
 
 
 def lighter(colour: Colour) -> Colour:

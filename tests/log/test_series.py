@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from kinfmu.log.series import SMALLEST, accuracy, error_estimates, groups
+import kinfmu
+from kinfmu.log.blueprint import plot
+from kinfmu.log.series import SMALLEST, accuracy, error_estimates, groups, margin
 from kinfmu.run import Run
 from kinfmu.shapes import palette
 from tests.log.runs import fourbar, with_gap
@@ -37,6 +39,20 @@ def test_curves_have_the_colours_of_their_bodies(run: Run) -> None:
     assert found["position", "angle"].colours == palette.BODIES[:3]
     blue = palette.BODIES[1]
     assert found["position", "length"].colours[:2] == (blue, palette.lighter(blue))
+
+
+def test_every_one_of_many_curves_has_a_name_in_the_legend_and_a_colour_of_its_own() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar_chain:9"), [0.0, 1.0])
+    for group in groups(run).values():
+        assert len(group.names) > 14
+        assert len({*group.names}) == len({*group.colours}) == len(group.names)
+        (is_shown,) = plot(group.title, [("", group)], [run]).properties["PlotLegend"].visible.as_arrow_array()
+        assert is_shown.as_py()
+
+
+def test_a_single_curve_is_named_by_its_plot(run: Run) -> None:
+    (is_shown,) = plot("margin", [("", margin(run))], [run]).properties["PlotLegend"].visible.as_arrow_array()
+    assert not is_shown.as_py()
 
 
 def test_a_gap_is_not_a_number_even_if_the_run_holds_some(run: Run) -> None:
