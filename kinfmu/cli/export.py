@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 
-def _table(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001  --columns is refused before
+def _table(run: Run, path: Path, columns: Sequence[str]) -> None:
     from kinfmu.log import write_table
 
-    write_table(run, path)
+    write_table(run, path, columns or None)
 
 
 def _plot(run: Run, path: Path, columns: Sequence[str]) -> None:
@@ -31,7 +31,7 @@ def _plot(run: Run, path: Path, columns: Sequence[str]) -> None:
     plot(run, path, columns)
 
 
-def _animation(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001
+def _animation(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001  --columns is refused before
     from kinfmu.draw import animate
 
     animate(run, path)
@@ -45,7 +45,7 @@ FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
     ".png": _plot,
     ".gif": _animation,
 }
-PLOTS = [suffix for suffix, write in FORMATS.items() if write is _plot]
+WITH_COLUMNS = [suffix for suffix, write in FORMATS.items() if write is not _animation]
 
 
 def _between(run: Run, start: float | None, stop: float | None) -> Run:
@@ -69,19 +69,24 @@ def _between(run: Run, start: float | None, stop: float | None) -> Run:
     required=True,
     help=f"The file to write: {listed(FORMATS)}.",
 )
-@click.option("--columns", metavar="NAMES", help="Coordinates to plot, such as coupler.x,rocker.phi; else those of q.")
+@click.option(
+    "--columns",
+    metavar="NAMES",
+    help="Coordinates to plot, such as coupler.x,rocker.phi; else those of q. Columns of a table, named as simulate "
+    "--channels names them: coupler.x, coupler.*, q, -error; else all. Time and status are always there.",
+)
 @click.option("--start", type=TIME, help="Only samples from then on [s].")
 @click.option("--stop", type=TIME, help="Only samples until then [s].")
 def export(run: Path, output: Path, columns: str | None, start: float | None, stop: float | None) -> None:
     """Write a run as a table, as plots, or as a moving picture.
 
-    RUN is a record (.mcap) of simulate. A table holds everything; Parquet and npz the units, too. Plots (.svg, .png)
-    show coordinates against time, with velocity and acceleration; a .gif shows the linkage move.
+    RUN is a record (.mcap) of simulate. A table holds all columns, or those named; Parquet and npz the units, too.
+    Plots (.svg, .png) show coordinates against time, with velocity and acceleration; a .gif shows the linkage move.
     """
     from kinfmu.log import read
 
     suffix = suffix_of(output)
-    if columns is not None and suffix not in PLOTS:
-        raise click.UsageError(f"--columns {columns}: chooses what is plotted, into {listed(PLOTS)}, not {suffix}")
+    if columns is not None and suffix not in WITH_COLUMNS:
+        raise click.UsageError(f"--columns {columns}: is for tables and plots, {listed(WITH_COLUMNS)}, not {suffix}")
     FORMATS[suffix](_between(read(run), start, stop), output, names_in(columns) or ())
     click.echo(f"written: {output}")

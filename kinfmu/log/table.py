@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from kinfmu.channels import select
 from kinfmu.errors import LogError, MissingPackageError, listed
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
@@ -15,21 +17,26 @@ from kinfmu.suffix import suffix_of
 ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
 
 
-def write_table(run: Run, path: str | Path) -> None:
-    """Write all columns of `run` to a .csv, .parquet or .npz file.
+def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None) -> None:
+    """Write columns of `run` to a .csv, .parquet or .npz file: all, or those named, in the run's order.
+
+    columns: names such as 'coupler.x', 'coupler.*', 'q' or '-error', as those of channels that a simulation keeps; time
+    and status are always there.
 
     CSV: one line of names, then one a sample, and nothing else, so that `pandas.read_csv(path)` reads it; a sample
     without numbers says nan. Parquet (metadata of fields and table) and npz (`kinfmu.units` beside `kinfmu.columns`)
     carry the units and the mechanism too. Numbers read back to the same bits, but -0.0, which is written as 0.0.
 
-    Raises a LogError for another suffix or a file that cannot be written, MissingPackageError without pyarrow.
+    Raises a RequestError for a name that is not there, a LogError for another suffix or a file that cannot be written,
+    MissingPackageError without pyarrow.
     """
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
     suffix = suffix_of(path)
     if suffix not in writers:
         raise LogError(f"{path}: '{suffix}' is no table that can be written; known: {listed(writers)}")
+    chosen = run if columns is None else select(run, columns)
     with replacing(path) as temporary:
-        writers[suffix](run, temporary)
+        writers[suffix](chosen, temporary)
 
 
 def _columns(run: Run) -> list[Column]:

@@ -62,9 +62,38 @@ def test_plots_and_moving_pictures_are_made_of_a_record(
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
 
 
-def test_columns_are_for_plots(record: Path, refuses: Callable[..., str], fails: Callable[..., str]) -> None:
-    told = refuses("export", record, "-o", "run.csv", "--columns", "coupler.x")
-    assert "--columns coupler.x: chooses what is plotted, into .svg, .png, not .csv" in told
+def test_columns_of_a_table_are_chosen_as_channels_are(record: Path, command: Command, tmp_path: Path) -> None:
+    def header(columns: str) -> list[str]:
+        assert command("export", record, "-o", "run.csv", "--columns", columns).exit_code == 0
+        return list(read_csv(tmp_path / "run.csv"))
+
+    assert header("rocker.phi,coupler.x") == ["time", "coupler.x", "rocker.phi", "solver.status"]
+    assert header("crank.*") == ["time", "crank.phi", "crank.omega", "crank.alpha", "solver.status"]
+    assert header("q") == ["time", *read(record).names, "solver.status"]
+    every = [column.name for column in read(record).columns()]
+    assert header("-error") == [name for name in every if not name.startswith("solver.error")]
+
+
+def test_chosen_columns_go_into_every_table_with_their_units(record: Path, command: Command, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    for name in ("run.npz", "run.parquet"):
+        assert command("export", record, "-o", name, "--columns", "coupler.vx").exit_code == 0
+    with np.load(tmp_path / "run.npz") as file:
+        assert file["kinfmu.columns"].tolist() == ["time", "coupler.vx", "solver.status"]
+        assert file["kinfmu.units"].tolist() == ["s", "m/s", "1"]
+        np.testing.assert_array_equal(file["coupler.vx"], read(record)["coupler.vx"])
+    table = parquet.read_table(tmp_path / "run.parquet")
+    assert table.column_names == ["time", "coupler.vx", "solver.status"]
+
+
+def test_a_column_that_is_not_there_is_told(
+    record: Path, refuses: Callable[..., str], fails: Callable[..., str], tmp_path: Path
+) -> None:
+    told = refuses("export", record, "-o", "run.csv", "--columns", "q,cupler.x")
+    assert told.startswith("channel 'cupler.x' is not known; did you mean 'coupler.x'?; channels: all, none, inputs, q")
+    assert not (tmp_path / "run.csv").exists()
+    told = refuses("export", record, "-o", "run.gif", "--columns", "coupler.x")
+    assert told == "--columns coupler.x: is for tables and plots, .csv, .parquet, .npz, .svg, .png, not .gif"
     told = fails("export", record, "-o", "run.svg", "--columns", "cupler.x")
     assert "run.svg: the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?" in told
 
