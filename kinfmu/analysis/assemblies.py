@@ -100,10 +100,12 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
     order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], [round(c, 6) for c in poses[k].tolist()]))
     poses, is_chosen = [poses[k] for k in order], [is_chosen[k] for k in order]
     apart = _told_apart_by(planned, poses)
+    undecided = _undecided(planned, poses, is_at_start=chosen is not None or _is_at_start(mechanism, planned))
     is_quick = not planned.watches  # with redundant rows each try takes seconds
     found = []
     for k, pose in enumerate(poses):
-        start = {} if is_chosen[k] else _choice(mechanism, planned, pose, chosen, is_advised=k < _ADVISED and is_quick)
+        is_advised = k < _ADVISED and is_quick
+        start = {} if is_chosen[k] else _choice(mechanism, planned, pose, chosen, undecided, is_advised=is_advised)
         found.append(Assembly(_named(planned, pose), is_chosen[k], start))
     drivers = {driver.name: float(u) for driver, u in zip(mechanism.drivers, planned.anchor.u, strict=True)}
     return Assemblies(mechanism, drivers, tuple(found), apart, is_complete)
@@ -191,20 +193,46 @@ def _told_apart_by(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[str, .
     return tuple(told)
 
 
+def _undecided(plan: SolvePlan, poses: Sequence[FloatArray], *, is_at_start: bool) -> NDArray[np.bool_]:
+    """Coordinates that start poses have a say in, (bodies, 3): all that no joint fixes, and of those, if the drivers
+    stand where the start poses put them, the ones in which poses differ.
+    """
+    undecided: NDArray[np.bool_] = np.array([name not in plan.fixed for name in plan.mechanism.coordinate_names])
+    if is_at_start and len(poses) > 1:
+        undecided &= np.max([_apart(plan, poses[0], pose) for pose in poses[1:]], axis=0) > _APART
+    return undecided.reshape(-1, 3)
+
+
+def _is_at_start(mechanism: Mechanism, plan: SolvePlan) -> bool:
+    """True if a plan's drivers stand where the start poses of the mechanism put them, or its laws."""
+    targets = start_targets(System(localized(mechanism)[0]))
+    return bool(np.abs(plan.anchor.u - targets).max(initial=0.0) <= _SAME)
+
+
 def _choice(
-    mechanism: Mechanism, plan: SolvePlan, pose: FloatArray, instead_of: FloatArray | None, *, is_advised: bool
+    mechanism: Mechanism,
+    plan: SolvePlan,
+    pose: FloatArray,
+    instead_of: FloatArray | None,
+    undecided: NDArray[np.bool_],
+    *,
+    is_advised: bool,
 ) -> dict[str, Start]:
     """Few start poses, rounded, that lead to a pose if put in place of the file's; all of those that are elsewhere, if
     nothing less does.
 
-    instead_of: the pose that the file's start poses lead to.
+    instead_of: the pose that the file's start poses lead to; undecided: whether start poses have a say in x, y, phi of
+    each moving body, (bodies, 3). Where they have none, they stay as the file says.
     """
     named = _named(plan, pose)
-    whole = {body.name: _rounded(named, body.name) for body in mechanism.moving_bodies}
-    moved = np.ones((len(whole), 3), dtype=bool)
+    moved = undecided
     if instead_of is not None:
-        moved = _apart(plan, instead_of, pose).reshape(-1, 3) > _APART
-    elsewhere = {name: start for (name, start), where in zip(whole.items(), moved, strict=True) if where.any()}
+        moved = moved & (_apart(plan, instead_of, pose).reshape(-1, 3) > _APART)
+    elsewhere = {}
+    for body, free, where in zip(mechanism.moving_bodies, undecided, moved, strict=True):
+        if where.any():
+            pairs = zip(free, _rounded(named, body.name), body.start, strict=True)
+            elsewhere[body.name] = Start(*(new if is_free else given for is_free, new, given in pairs))
     if is_advised:
         for start in _shorter_choices(mechanism, elsewhere, moved):
             if _leads_to(mechanism, plan, start, pose):
@@ -221,10 +249,14 @@ def _shorter_choices(
     """
     bodies = mechanism.moving_bodies
     only_turns = [body.name for body, where in zip(bodies, moved, strict=True) if where[2] and not where[:2].any()]
-    turned = {body.name: body.start._replace(phi=elsewhere[body.name].phi) for body in bodies if body.name in elsewhere}
+    turned = {
+        body.name: body.start._replace(phi=elsewhere[body.name].phi)
+        for body, where in zip(bodies, moved, strict=True)
+        if where[2]
+    }
     for name in only_turns[:_SINGLE]:
         yield {name: turned[name]}
-    if len(elsewhere) > 1 or not only_turns:
+    if turned and (len(turned) > 1 or not only_turns):
         yield turned
     if len(only_turns) < len(elsewhere):
         yield {name: turned[name] if name in only_turns else start for name, start in elsewhere.items()}
@@ -335,10 +367,11 @@ def _value(name: str, value: float, unit: str) -> str:
 
 
 def _start(given: Start, start: Start) -> str:
-    """What a file would say for a start pose: its angle alone where that is all that changes."""
-    if start._replace(phi=given.phi) == given:
-        return f'.phi = "{degrees(start.phi or 0.0)}"'
-    said = [f"{key} = {value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None]
+    """What a file would say for a start pose: one coordinate alone where that is all that changes."""
+    said = {key: f"{value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None}
     if start.phi is not None:
-        said.append(f'phi = "{degrees(start.phi)}"')
-    return f" = {{ {listed(said)} }}"
+        said["phi"] = f'"{degrees(start.phi)}"'
+    for key, value in said.items():
+        if start._replace(**{key: getattr(given, key)}) == given:
+            return f".{key} = {value}"
+    return f" = {{ {listed(f'{key} = {value}' for key, value in said.items())} }}"

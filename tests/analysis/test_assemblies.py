@@ -13,6 +13,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Start, gallery
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.errors import AssemblyError, MobilityError
+from kinfmu.joints import Coordinate, Translational
 from kinfmu.plan import SolvePlan, compile_plan
 from tests.analysis.linkages import digger, five_bar_arm, pushed_crank
 from tests.mechanisms import bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -144,6 +145,33 @@ def test_a_singular_start_pose_is_no_hindrance() -> None:
     for one in assemblies.found:
         chosen = started(flat, dict(one.start))
         assert kinfmu.check(chosen).problem is None
+
+
+def test_what_a_driver_holds_is_not_advised() -> None:
+    thrown = started(six_bar(), {"rocker": Start(3.0, 3.0, 3.0)})
+    with pytest.raises(AssemblyError, match="does not close near its start pose"):
+        compile_plan(thrown)
+    assemblies = kinfmu.check(thrown).assemblies()
+    assert len(assemblies.found) == 2
+    for one in assemblies.found:
+        assert one.start
+        assert "output" not in one.start  # the driver turns it
+        assert compile_plan(started(thrown, dict(one.start)))
+
+
+def test_what_a_joint_holds_stays_as_the_file_says() -> None:
+    crank = slider_crank()
+    piston = Body("piston", {"S": (0, 0)}, (3.7, 0.01, 0.01))
+    joints = [joint for joint in crank.joints if joint.name != "guide"]
+    joints += [Revolute("S", ("rod.S", "piston.S")), Translational("guide", ("ground.O", "piston.S"))]
+    again = Coordinate("again", "rod.S", "y")  # redundant: with it all that is elsewhere is advised, nothing less
+    held = Mechanism("held", [*crank.bodies, piston], [*joints, again], crank.drivers)
+    assemblies = found_for(held)
+    other = assemblies.found[1]
+    assert other.start["rod"] == held.bodies[2].start._replace(phi=other.start["rod"].phi)
+    assert other.start["piston"] == piston.start._replace(x=other.start["piston"].x)
+    assert found_for(started(held, dict(other.start))).found[0].coordinates == pytest.approx(other.coordinates)
+    assert str(assemblies).endswith("and by [bodies.piston] start.x = -2.165")
 
 
 def test_a_mechanism_at_fault_has_no_assemblies() -> None:
