@@ -7,15 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.draw.sheet import FONT, INK, Sheet
+from kinfmu.draw.sheet import FONT, INK, LINE, Sheet
 from kinfmu.run import FloatArray
 from kinfmu.shapes.palette import Colour
 
 _DIRECTIONS = 16  # in which a name may stand beside its anchor
-_FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0)  # [pt] from where it would touch
+_FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt] from where it would touch
 _LEADER_FROM = 9.0  # [pt]; a name further off is tied to its anchor by a thin line
 _AIR, _GAP = 1.5, 3.0  # [pt] above and below a name, and beside it
 _OVERLAP, _OFF_SHEET, _DISTANCE, _TILT = 60.0, 200.0, 0.12, 0.05  # costs beside 1 for a dot of what is drawn
+_CROWD, _APART = 0.8, 5.0  # cost of another name nearer than that [pt], with which it would be read as one
+_BROKEN = 0.6  # cost of a name in several lines
+_ROUNDS = 6  # in which names choose again, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +37,64 @@ class Name:
     rank: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class _Options:
+    """Where a name may stand: middles and half sizes (s, 2) [pt], its text there, the anchors (s, 2) [pt] that it would
+    belong to, and what it costs (s,) as long as no other name stands.
+    """
+
+    spots: FloatArray
+    halves: FloatArray
+    texts: Sequence[str]
+    homes: FloatArray
+    costs: FloatArray
+
+    def box(self, k: int) -> FloatArray:
+        """Lower left and upper right corner, (4,), at spot k."""
+        return np.concatenate([self.spots[k] - self.halves[k], self.spots[k] + self.halves[k]])
+
+    def best(self, taken: Sequence[FloatArray]) -> int:
+        """The spot that costs least beside boxes (4,) that are taken."""
+        costs = self.costs.copy()
+        for box in taken:
+            middle, size = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
+            apart = np.abs(self.spots - middle) - (self.halves + size)  # (s, 2)
+            costs += _OVERLAP * (apart < 0.0).all(axis=1) + _CROWD * (apart < _APART).all(axis=1)
+        return int(np.argmin(np.round(costs, 6)))  # rounding keeps the choice the same on every machine
+
+
 def place(names: Sequence[Name], sheet: Sheet) -> None:
-    """Write each name where it costs least: near its anchor, on free paper."""
-    covered = sheet.covered
-    taken: list[FloatArray] = []
-    for name in sorted(names, key=lambda name: name.rank):
-        anchors = sheet.to_paper(name.anchors)
-        half = _half_size(name.text, italic=name.italic)
+    """Write each name where it costs least: near its anchor, on free paper.
+
+    Names choose one after the other, then again, now that the others stand, until none moves.
+    """
+    names = sorted(names, key=lambda name: name.rank)
+    options = [_options(name, sheet) for name in names]
+    chosen: dict[int, int] = {}
+    for _ in range(_ROUNDS):
+        before = dict(chosen)
+        for k, option in enumerate(options):
+            chosen[k] = option.best([options[j].box(spot) for j, spot in chosen.items() if j != k])
+        if chosen == before:
+            break
+    for k, (name, option) in enumerate(zip(names, options, strict=True)):
+        spot = chosen[k]
+        _lead(sheet, option.homes[spot], option.spots[spot], option.halves[spot], name.clearance)
+        sheet.text(option.spots[spot], option.texts[spot], name.colour, italic=name.italic)
+
+
+def _options(name: Name, sheet: Sheet) -> _Options:
+    """All spots of a name, in one line and, where it is a list, in one line for each of its parts."""
+    anchors, corner = sheet.to_paper(name.anchors), sheet.to_paper(sheet.high) + sheet.beyond
+    found = []
+    for broken, text in enumerate(dict.fromkeys([name.text, name.text.replace(", ", ",\n")])):
+        half = _half_size(text, italic=name.italic)
         spots, homes, costs = _spots(anchors, half, name.clearance, can_stand_on=name.clearance == 0.0)
-        costs = costs + _covering(spots, half, covered, taken, sheet.to_paper(sheet.high))
-        best = int(np.argmin(np.round(costs, 6)))  # rounding keeps the choice the same on every machine
-        spot, home = spots[best], anchors[homes[best]]
-        _lead(sheet, home, spot, half, name.clearance)
-        sheet.text(spot, name.text, name.colour, italic=name.italic)
-        taken.append(np.concatenate([spot - half, spot + half]))
+        costs = costs + _covering(spots, half, sheet.covered, corner) + _BROKEN * broken
+        found.append((spots, np.tile(half, (len(spots), 1)), [text] * len(spots), anchors[homes], costs))
+    spots_, halves, texts, homes_, costs_ = zip(*found, strict=True)
+    together = [np.concatenate(part) for part in (spots_, halves, homes_, costs_)]
+    return _Options(together[0], together[1], [text for part in texts for text in part], together[2], together[3])
 
 
 def _half_size(text: str, *, italic: bool) -> FloatArray:
@@ -56,8 +103,9 @@ def _half_size(text: str, *, italic: bool) -> FloatArray:
     from matplotlib.textpath import text_to_path
 
     font = FontProperties(size=FONT, style="italic" if italic else "normal")
-    width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
-    return np.array([width / 2.0 + _GAP, FONT / 2.0 + _AIR])
+    lines = text.split("\n")
+    width = max(text_to_path.get_text_width_height_descent(line, font, ismath=False)[0] for line in lines)
+    return np.array([width / 2.0 + _GAP, (FONT + (len(lines) - 1) * LINE) / 2.0 + _AIR])
 
 
 def _spots(
@@ -81,17 +129,12 @@ def _spots(
     return np.array(spots), homes, np.array(costs)
 
 
-def _covering(
-    spots: FloatArray, half: FloatArray, covered: FloatArray, taken: Sequence[FloatArray], corner: FloatArray
-) -> FloatArray:
-    """What it costs to cover dots and names, or to leave the sheet, at each spot (s,)."""
+def _covering(spots: FloatArray, half: FloatArray, covered: FloatArray, corner: FloatArray) -> FloatArray:
+    """What it costs to cover dots, or to leave the sheet, at each spot (s,)."""
     within = (covered[:, :2] > spots.min(axis=0) - half) & (covered[:, :2] < spots.max(axis=0) + half)
     covered = covered[within.all(axis=1)]
     near = np.abs(covered[None, :, :2] - spots[:, None, :])  # (s, k, 2)
     costs = ((near < half).all(axis=2) * covered[:, 2]).sum(axis=1)
-    for box in taken:
-        middle, size = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
-        costs += _OVERLAP * (np.abs(spots - middle) < half + size).all(axis=1)
     off = (spots - half < 0.0).any(axis=1) | (spots + half > corner).any(axis=1)
     return np.asarray(costs + _OFF_SHEET * off)
 

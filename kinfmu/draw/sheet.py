@@ -21,6 +21,7 @@ PAPER: Colour = (255, 255, 255)
 INCH = 72.0  # [pt]
 BAR = 9.0  # [pt]; width of a link, where there is room
 FONT = 9.0  # [pt]
+LINE = 11.0  # [pt], from line to line of a name in several
 _WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of what is drawn
 _SMALLEST = 120.0  # [pt]
 _LONG, _LONGEST_STRIP = 6.0, 2.5  # what is longer than it is high, such as a chain, may be wider, up to so many times
@@ -62,6 +63,11 @@ class Sheet:
     def ornament(self) -> float:
         """A point of the printer for supports and blocks [length], which shrink less than links do."""
         return float(self.point * (0.35 + 0.65 * self.fine))
+
+    @property
+    def beyond(self) -> FloatArray:
+        """How far names may reach over the upper right corner, (2,) [pt]."""
+        return np.array([_RIGHT - 2.0, 0.0])
 
     @property
     def covered(self) -> FloatArray:
@@ -168,7 +174,7 @@ class Sheet:
         self._dots.append(np.column_stack([found := np.vstack(dots), np.full(len(found), matters)]))
 
     def text(self, at: ArrayLike, text: str, colour: Colour, *, italic: bool = False) -> None:
-        """A name with its middle at `at` [pt from the lower left corner]."""
+        """A name, of one line or several, with its middle at `at` [pt from the lower left corner]."""
         x, y = self.low + np.asarray(at, dtype=float) * self.point
         self.axes.text(
             x,
@@ -178,7 +184,8 @@ class Sheet:
             fontsize=FONT,
             fontstyle="italic" if italic else "normal",
             ha="center",
-            va="center_baseline",
+            va="center" if "\n" in text else "center_baseline",
+            linespacing=1.2,  # of the height of a letter, which gives LINE
             parse_math=False,
             zorder=1000.0,
         )

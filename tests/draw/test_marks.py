@@ -35,6 +35,8 @@ from kinfmu.shapes.slides import rods, slides
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 
+EDGE = (0.0, 1.5)  # [pt]; that much of a text's box is above and below its letters
+COVERED = 2.0  # of what is drawn, less than a pin, that a name may touch
 TURN = RunSettings(0.0, 2.0 * math.pi, math.pi / 60.0)
 
 
@@ -238,8 +240,26 @@ def test_names_keep_apart_and_stay_on_the_sheet(name: str) -> None:
     for one, other in combinations(boxes, 2):
         assert not one.overlaps(other)
     page = sheet.axes.get_window_extent().expanded(1.02, 1.02)
-    assert all(page.containsx(box.x0) and page.containsx(box.x1) for box in boxes)
+    assert all(page.x0 < box.x0 and box.x1 < sheet.figure.bbox.x1 for box in boxes)  # right of the axes is free paper
     assert all(page.containsy(box.y0) and page.containsy(box.y1) for box in boxes)
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_names_leave_links_and_paths_free(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    sheet = sheet_of(instant(load(name)))
+    dots = sheet.covered
+    to_world = sheet.axes.transData.inverted()
+    for text in sheet.axes.texts:
+        low, high = sheet.to_paper(to_world.transform(text.get_window_extent().get_points()))
+        inside = (dots[:, :2] > low + EDGE) & (dots[:, :2] < high - EDGE)
+        assert dots[inside.all(axis=1), 2].sum() < COVERED, text.get_text()
+
+
+def test_a_list_of_names_is_broken_into_lines_where_one_has_no_room() -> None:
+    pytest.importorskip("matplotlib")
+    texts = {text.get_text() for text in sheet_of(instant(load("jansen_leg"))).axes.texts}
+    assert {"X_upper,\nX_lower", "bottom, ankle"} <= texts
 
 
 def test_a_start_pose_in_which_links_lie_on_one_another_gives_way_to_a_clearer_one() -> None:
