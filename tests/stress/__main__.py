@@ -7,7 +7,9 @@ import multiprocessing
 import os
 import signal
 import sys
+import tempfile
 import time
+from typing import Literal
 
 from kinfmu.mechanism.toml_file import text
 from tests.stress.families import FAMILIES
@@ -15,6 +17,7 @@ from tests.stress.report import Report, details
 from tests.stress.trial import judged, trial
 
 CHUNK = 10  # trials handed to a process at a time
+COUNTS = {"python": 10_000, "native": 300}  # mechanisms; a compiler takes its time with each
 TOLD = 5.0  # [s] between two lines about the progress
 
 
@@ -25,31 +28,34 @@ def main() -> int:
         description="Random mechanisms over random steps, against closed forms of 50 digits; a seed is a mechanism.",
         epilog=f"Families: {', '.join(FAMILIES)}.",
     )
-    parser.add_argument("--count", type=int, help="mechanisms; 10000, or 1 with --seed alone, which shows every sample")
+    parser.add_argument("--count", type=int, help="mechanisms, or 1 with --seed alone, which shows every sample")
     parser.add_argument("--seed", type=int, help="of the first mechanism, the others count on from it; 0")
     parser.add_argument("--family", choices=list(FAMILIES), metavar="NAME", help="one family alone")
+    parser.add_argument("--engine", choices=list(COUNTS), default="python", help="python by default")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a core")
     given = parser.parse_args()
     if given.count is None:
-        given.count = 10_000 if given.seed is None else 1
+        given.count = COUNTS[given.engine] if given.seed is None else 1
     first = given.seed or 0
-    if given.count == 1:
-        return _one(first, given.family)
-    return _many(range(first, first + given.count), given.family, given.jobs)
+    with tempfile.TemporaryDirectory() as compiled:
+        os.environ["KINFMU_CACHE"] = compiled
+        if given.count == 1:
+            return _one(first, given.family, given.engine)
+        return _many(range(first, first + given.count), given.family, given.engine, given.jobs)
 
 
-def _one(seed: int, family: str | None) -> int:
-    one = trial(seed, family)
+def _one(seed: int, family: str | None, engine: Literal["python", "native"]) -> int:
+    one = trial(seed, family, engine)
     verdict = one.judged()
     print(text(one.drawn.mechanism))
     print("\n".join(details(verdict, one.inputs[0].tolist())))
     return 1 if verdict.faults else 0
 
 
-def _many(seeds: range, family: str | None, jobs: int) -> int:
+def _many(seeds: range, family: str | None, engine: Literal["python", "native"], jobs: int) -> int:
     begun = told = time.monotonic()
     report = Report()
-    tasks = [(seed, family) for seed in seeds]
+    tasks = [(seed, family, engine) for seed in seeds]
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         try:
             for verdict in pool.imap_unordered(judged, tasks, CHUNK):
@@ -62,6 +68,7 @@ def _many(seeds: range, family: str | None, jobs: int) -> int:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would take the report
             print("interrupted: what was found so far\n")
     command = "scripts/stress" + (f" --family '{family}'" if family else "")
+    command += f" --engine {engine}" if engine != "python" else ""
     print("\n".join(report.lines(command)))
     print(f"\n{report.mechanisms.total()} mechanisms in {time.monotonic() - begun:.0f} s on {jobs} processes", end="; ")
     print("nothing is wrong" if report.is_right else f"{report.faulty.total()} are at fault")

@@ -32,6 +32,13 @@ def test_random_mechanisms_over_random_steps_are_right_or_say_why_not(family: st
         assert trial(seed, family).judged().faults == [], f"scripts/stress --family '{family}' --seed {seed}"
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_so_they_are_by_the_native_engine(family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    told = f"scripts/stress --engine native --family '{family}' --seed 1"
+    assert trial(1, family, "native").judged().faults == [], told
+
+
 def test_a_loop_that_falls_in_line_inside_a_larger_block_keeps_its_smooth_branch() -> None:
     """There a whole row of the block's Jacobian vanishes and turns round, which rows of unit length would hide."""
     assert trial(2548, "six-bars driven at the end").judged().faults == []

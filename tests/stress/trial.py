@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
 SINGULAR = 1e-6  # product of what must stay positive; below, long doubles lose the digits that errors are judged by
 AGREED = 0.1  # the two oracles may differ by this part of the error, or of what counts as wrong
 STARTS = 64
+MANY = 400  # samples at least for the native engine, which lays many side by side
 FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms stand a million lengths, or some, off the origin
 MEETING = 0.3  # least sine of the angle under which bars meet at the start
 DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (Fraction(3, 5), Fraction(4, 5)), (Fraction(-7, 25), Fraction(24, 25)))
@@ -74,13 +75,14 @@ class Trial:
     branch: Interval | Walk
     patterns: Sequence[str]
     inputs: tuple[Floats, Floats, Floats]  # (n, d) each: values, speeds, accelerations
+    engine: Literal["python", "native"] = "python"
 
     def run(self) -> tuple[Run, float]:
         """What kinfmu says to it, and the size that it measures errors by."""
         plan = compile_plan(self.drawn.mechanism)
         names = [driver.inputs for driver in plan.drivers]
         given = {names[k][order]: table[:, k] for order, table in enumerate(self.inputs) for k in range(len(names))}
-        return kinfmu.solve(plan, **given), load_model(plan).SIZE
+        return kinfmu.solve(plan, engine=self.engine, **given), load_model(plan).SIZE
 
     def judged(self) -> Verdict:
         """kinfmu's run beside the closed forms."""
@@ -228,8 +230,8 @@ class Trial:
                     break
 
 
-def trial(seed: int, family: str | None = None) -> Trial:
-    """The trial of a seed, of any family or of one."""
+def trial(seed: int, family: str | None = None, engine: Literal["python", "native"] = "python") -> Trial:
+    """The trial of a seed, of any family or of one, for an engine."""
     rng = Draw(seed)
     drawn_family = rng.choices(list(FAMILIES), [weight for _, weight in FAMILIES.values()])[0]
     family = family or drawn_family
@@ -241,11 +243,14 @@ def trial(seed: int, family: str | None = None) -> Trial:
             continue
         break
     names, u = drawn_steps(rng, branch)
+    while engine == "native" and len(u) < MANY:
+        others, more = drawn_steps(rng, branch)
+        names, u = [*names, *(other for other in others if other not in names)], np.concatenate([u, more])
     generator = np.random.default_rng(rng.getrandbits(64))
     units = [1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds]
     ud = generator.uniform(0.3, 1.5, u.shape) * generator.choice((1.0, -1.0), u.shape) * units
     udd = generator.uniform(-1.0, 1.0, u.shape) * units
-    return Trial(seed, family, drawn, branch, names, (u, ud, udd))
+    return Trial(seed, family, drawn, branch, names, (u, ud, udd), engine)
 
 
 def _drawn(rng: Draw, family: str) -> Drawn:
@@ -275,6 +280,6 @@ def _drawn(rng: Draw, family: str) -> Drawn:
     return Drawn(sketch, frame, tuple(float(value) for value in candidates[int(np.argmax(good))]))
 
 
-def judged(task: tuple[int, str | None]) -> Verdict:
-    """The verdict on a seed and a family, for processes that share the work."""
+def judged(task: tuple[int, str | None, Literal["python", "native"]]) -> Verdict:
+    """The verdict on a seed, a family and an engine, for processes that share the work."""
     return trial(*task).judged()
