@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.backends.c.library import Library
 from kinfmu.plan import SolvePlan
@@ -43,7 +44,7 @@ class NativeEngine:
         for table, values in zip(tables, filled, strict=True):
             if table is not values:
                 table[:] = values
-        late = _Late(self._library, driven, self._parameters, self._tolerance)
+        late = _Late(self._library, driven, told.outcomes, self._parameters, self._tolerance)
         return Swept(
             status=told.outcomes[:, 0].astype(np.int64),
             iterations=told.outcomes[:, 1].astype(np.int64),
@@ -58,12 +59,20 @@ class NativeEngine:
 class _Late:
     """Margins and errors of a sweep, which are computed together when either is first read."""
 
-    def __init__(self, library: Library, driven: Driven, parameters: Sequence[float], tolerance: float) -> None:
+    def __init__(
+        self,
+        library: Library,
+        driven: Driven,
+        outcomes: NDArray[np.int32],
+        parameters: Sequence[float],
+        tolerance: float,
+    ) -> None:
         self._library = library
         self._driven = driven
+        self._outcomes = outcomes
         self._parameters = parameters
         self._tolerance = tolerance
 
     @cached_property
     def diagnosed(self) -> tuple[FloatArray, FloatArray]:
-        return self._library.diagnose(self._driven, self._parameters, self._tolerance)
+        return self._library.diagnose(self._driven, self._outcomes, self._parameters, self._tolerance)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
 from .message import LOCATED, place
-from .pose import ALONE, Model, Pose, Vector, directed, on_road
+from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road
 from .road import Road, Searched
 from .span import REGULAR
 from .status import Status
@@ -21,9 +21,7 @@ NO_BLOCK, TOO_FAR = -1, -2  # in place of a limit's block: no determinant is to 
 BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away by accident
 UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
-UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
-STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 _GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way

@@ -18,7 +18,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
-from .pose import ALONE, AT_REST, EPS, Model, Pose, Vector, evaluated, tangent_of
+from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Model, Pose, Vector, evaluated, tangent_of
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest count for all
@@ -83,7 +83,18 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         return NOTHING_KNOWN
     if not sum(squares) < inf:
         return NOTHING_KNOWN
+    if _is_at_a_crossing(model, pose, rates):
+        return least[0] + sqrt(squares[0]), inf, inf
     return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
+
+
+def _is_at_a_crossing(model: Model, pose: Pose, rates: Rates) -> bool:
+    """True where branches cross and no bridge holds: whose rates these are is not known.
+
+    There the rates stay as they are while the determinant falls; right before a dead centre they are steep.
+    """
+    one = len(pose.u) == 1 and pose.bridge is None
+    return one and pose.margin < UNDECIDED and rates.speed * model.REACH[0] < STEEP
 
 
 def with_drive_errors(

@@ -11,6 +11,8 @@ Model = Any  # a generated module: see kinfmu.backends.python.emit
 Found = tuple[Any, ...]  # what its `position` gives
 
 EPS = 2.220446049250313e-16
+UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
+STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
 AT_REST: Vector = (0.0,)
 

@@ -26,6 +26,7 @@ WRONG = 1e-9  # of the column's largest magnitude
 TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
 NARROW = 0.015  # [rad]; change points that turn in less have no room for a bridge: `outside` is an answer too
 ROOM = 4e-3  # [rad, lengths]; nor have those as close to a limit: four half widths of the narrowest bridge
+AT = 1e-9  # [rad, lengths]; samples as close to such a change point count as those behind it
 BEYOND = 10.0  # times its own estimate: a flagged sample may not be wronger
 SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
 SINGULAR = 1e-6  # product of what must stay positive; below, long doubles lose the digits that errors are judged by
@@ -138,8 +139,8 @@ class Trial:
             return False
         branch, unit = self.branch, 1.0 if self.drawn.sketch.kinds == ("angle",) else float(self.drawn.frame.scale)
         for mark in branch.marks:
-            after, before = branch.high_is_limit and x > mark, branch.low_is_limit and x < mark
-            left = branch.high - mark if after else mark - branch.low if before else np.inf
+            after, before = branch.high_is_limit and x > mark - AT * unit, branch.low_is_limit and x < mark + AT * unit
+            left = min(branch.high - mark if after else np.inf, mark - branch.low if before else np.inf)
             if left < ROOM * unit:
                 sines = self.drawn.positions(np.array([[mark]])).closing.sines
                 return min(abs(float(np.atleast_1d(sine)[0])) for sine in sines) < 1e-12

@@ -85,7 +85,7 @@ class Library:
         library.kf_sweep_bind.argtypes = [ctypes.c_void_p, _numbers]
         library.kf_sweep_run.restype = ctypes.c_bool
         library.kf_sweep_run.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job)]
-        library.kf_sweep_diagnose.restype = None
+        library.kf_sweep_diagnose.restype = ctypes.c_bool
         library.kf_sweep_diagnose.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), _numbers, _numbers]
         library.kf_sweep_message.restype = ctypes.c_char_p
         library.kf_sweep_message.argtypes = [ctypes.c_void_p]
@@ -150,14 +150,17 @@ class Library:
     def diagnose(
         self,
         driven: tuple[FloatArray, FloatArray, FloatArray],
+        outcomes: NDArray[np.int32],
         parameters: Sequence[float] = (),
         tolerance: float = 1e-9,
     ) -> tuple[FloatArray, FloatArray]:
-        """Margins (n,) and estimated errors (n, 3) of samples."""
+        """Margins (n,) and estimated errors (n, 3) of samples that were swept, with these outcomes; NaN if not good."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
         job = self._job(driven, (None, None, None))
+        job.outcomes = outcomes.ctypes.data_as(ctypes.c_void_p)
         with _Memory(self._library, self._refusal(len(margins)), tolerance, parameters) as memory:
-            self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors))
+            if not self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors)):
+                raise KinfmuError(self._refusal(len(margins)))
         return margins, errors
 
     def _refusal(self, count: int) -> str:

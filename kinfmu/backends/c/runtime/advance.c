@@ -4,7 +4,6 @@
 #define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
 #define BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
 #define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
-#define UNDECIDED 1e-6     /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
 #define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part: more is another branch */
 #define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
@@ -62,7 +61,7 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
     const double *x1 = pose->x1, *x2 = pose->x2, *const there = trial->x1;
     double largest = 0.0, jump = 0.0;
     int k;
-    if (pose->found.margin < UNDECIDED && trial->found.margin > pose->found.margin) {
+    if (pose->found.margin < KF_UNDECIDED && trial->found.margin > pose->found.margin) {
         return false;
     }
     if (KF_DRIVERS == 1) {

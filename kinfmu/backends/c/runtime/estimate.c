@@ -217,6 +217,13 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
     return count >= 0 && squares[0] + squares[1] + squares[2] < INFINITY;
 }
 
+/* True where branches cross and no bridge holds: whose rates these are is not known. */
+static bool is_at_a_crossing(const kf_pose *pose, const kf_driven *drive)
+{
+    return KF_DRIVERS == 1 && pose->bridge < 0 && pose->found.margin < KF_UNDECIDED
+        && drive->speed * kf_reach[0] < KF_STEEP;
+}
+
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
 {
     const kf_driven drive = drive_of(solver, pose, ud, udd);
@@ -238,4 +245,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
+    if (is_at_a_crossing(pose, &drive)) {
+        errors[1] = errors[2] = INFINITY;
+    }
 }

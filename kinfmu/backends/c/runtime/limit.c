@@ -1,7 +1,6 @@
 /* Limit: driver values where a way ends, and why. See Limit in kinfmu/solver/advance.py. */
 #include "way.h"
 
-#define STEEP 100.0 /* slope of an unknown over the driver, in radians or sizes; before a dead centre it is more */
 
 /* Where the way ends, just beyond a pose that steps cannot leave.
  *
@@ -29,7 +28,7 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     for (k = kf_first_of(limit->block); k < kf_block_ends[limit->block]; ++k) {
         steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
     }
-    limit->crosses = steepest * (KF_DRIVERS == 1 ? kf_reach[0] : 1.0) < STEEP;
+    limit->crosses = steepest * (KF_DRIVERS == 1 ? kf_reach[0] : 1.0) < KF_STEEP;
     near = fabs(determinants[limit->block]);
     far = fabs(before->found.determinants[limit->block]);
     if (!limit->crosses) {

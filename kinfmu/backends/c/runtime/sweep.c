@@ -136,8 +136,14 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
 
 #if KF_HAS_LANES
 
+/* True for jobs large enough to be worth segments. */
+static bool goes_side_by_side(const kf_sweep *sweep, const kf_job *job)
+{
+    return job->count >= 4 * KF_LANES && !sweep->follower.solver.stuck;
+}
+
 /* Keep a sample for later; false if memory ran out. */
-bool kf_leave(kf_sweep *sweep, kf_job *job, int64_t sample)
+bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
 {
     const double u = isnan(job->u[sample]) ? INFINITY : job->u[sample]; /* what has no place in the order comes last */
     kf_list *const list = &sweep->alone;
@@ -181,14 +187,22 @@ static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_
     }
 }
 
+/* Sort by driver values; the number of the first one that is not before the anchor. */
+static int64_t put_in_order(kf_list *list)
+{
+    int64_t middle = 0;
+    qsort(list->samples, (size_t)list->count, sizeof *list->samples, in_order);
+    while (middle < list->count && list->samples[middle].u < kf_anchor_u[0]) {
+        ++middle;
+    }
+    return middle;
+}
+
 /* Those that are left, in the order of their driver values: from the anchor up, and from there down. */
 static void solve_those_left(kf_sweep *sweep, kf_job *job)
 {
-    int64_t middle = 0, k;
-    qsort(sweep->alone.samples, (size_t)sweep->alone.count, sizeof *sweep->alone.samples, in_order);
-    while (middle < sweep->alone.count && sweep->alone.samples[middle].u < kf_anchor_u[0]) {
-        ++middle;
-    }
+    const int64_t middle = put_in_order(&sweep->alone);
+    int64_t k;
     solve_on_one_side(sweep, job, middle, sweep->alone.count);
     solve_on_one_side(sweep, job, middle - 1, -1);
     for (k = 0; k < job->count && job->gaps > 0; ++k) { /* again, for the message */
@@ -210,7 +224,7 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
     job->failure_count = 0;
     job->side_by_side = job->gaps = 0;
 #if KF_HAS_LANES
-    if (job->count >= 4 * KF_LANES && !sweep->follower.solver.stuck) {
+    if (goes_side_by_side(sweep, job)) {
         if (!kf_lanes_made(sweep) || !kf_segments_lay(&sweep->segments, &sweep->follower, job->count, job->u)) {
             return false;
         }
@@ -254,22 +268,59 @@ bool kf_drive_all(int64_t count, const double *times, const double *parameters, 
     return true;
 }
 
-void kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors)
+/* Of a sample that is good; if it is not when it is followed another way, as may happen at a limit, nothing is known. */
+static void diagnose(kf_sweep *sweep, const kf_job *job, int64_t sample, double *margin, double *errors)
 {
-    int64_t sample;
-    kf_restart(&sweep->follower);
-    for (sample = 0; sample < job->count; ++sample) {
-        kf_pose *const pose = kf_followed(&sweep->follower, job->u + sample * KF_DRIVERS);
-        double found[3] = {NAN, NAN, NAN};
-        const bool good = KF_GOOD(pose->status);
-        if (margin != NULL) {
-            margin[sample] = good ? kf_margin(&sweep->follower.solver, pose) : NAN;
-        }
-        if (errors != NULL) {
-            if (good) {
-                kf_errors(&sweep->follower.solver, pose, job->ud + sample * KF_DRIVERS, job->udd + sample * KF_DRIVERS, found);
-            }
-            memcpy(errors + 3 * sample, found, sizeof found);
+    kf_pose *const pose = kf_followed(&sweep->follower, job->u + sample * KF_DRIVERS);
+    const bool good = KF_GOOD(pose->status);
+    double found[3] = {INFINITY, INFINITY, INFINITY};
+    if (good) {
+        kf_errors(&sweep->follower.solver, pose, job->ud + sample * KF_DRIVERS, job->udd + sample * KF_DRIVERS, found);
+    }
+    margin[sample] = good ? kf_margin(&sweep->follower.solver, pose) : 0.0;
+    memcpy(errors + 3 * sample, found, sizeof found);
+}
+
+#if KF_HAS_LANES
+
+/* The good ones of a job that went side by side, in the order in which those left were solved; false: no memory. */
+static bool diagnose_in_order(kf_sweep *sweep, const kf_job *job, double *margin, double *errors)
+{
+    int64_t middle, k;
+    for (k = 0; k < job->count; ++k) {
+        if (KF_GOOD((kf_status)job->outcomes[k].status) && !kf_leave(sweep, job, k)) {
+            return false;
         }
     }
+    middle = put_in_order(&sweep->alone);
+    for (k = middle; k < sweep->alone.count; ++k) {
+        diagnose(sweep, job, sweep->alone.samples[k].sample, margin, errors);
+    }
+    kf_restart(&sweep->follower);
+    for (k = middle - 1; k >= 0; --k) {
+        diagnose(sweep, job, sweep->alone.samples[k].sample, margin, errors);
+    }
+    return true;
+}
+
+#endif
+
+bool kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors)
+{
+    int64_t k;
+    kf_restart(&sweep->follower);
+    for (k = 0; k < job->count; ++k) {
+        margin[k] = errors[3 * k] = errors[3 * k + 1] = errors[3 * k + 2] = NAN;
+    }
+#if KF_HAS_LANES
+    if (goes_side_by_side(sweep, job)) {
+        return diagnose_in_order(sweep, job, margin, errors);
+    }
+#endif
+    for (k = 0; k < job->count; ++k) {
+        if (KF_GOOD((kf_status)job->outcomes[k].status)) {
+            diagnose(sweep, job, k, margin, errors);
+        }
+    }
+    return true;
 }

@@ -48,8 +48,8 @@ const char *kf_sweep_message(const kf_sweep *sweep);
 /* All samples of a job; false if memory ran out. */
 bool kf_sweep_run(kf_sweep *sweep, kf_job *job);
 
-/* margin (count) and errors (count, 3) of the samples of a job; either may be NULL. */
-void kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
+/* margin (count) and errors (count, 3) of the samples of a job whose outcomes are known; false if memory ran out. */
+bool kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
 
 /* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws, with these parameters; false if
  * they cannot be had.

@@ -27,7 +27,7 @@ struct kf_sweep {
 };
 
 /* sweep.c */
-bool kf_leave(kf_sweep *sweep, kf_job *job, int64_t sample);
+bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample);
 
 /* side_by_side.c */
 bool kf_lanes_made(kf_sweep *sweep);

@@ -17,6 +17,8 @@
 #define KF_NEAR 0.0125       /* determinant below which a pose is near-singular */
 #define KF_CLOSE 0.1
 #define KF_MOST_STEPS 1000000
+#define KF_UNDECIDED 1e-6    /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
+#define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 
 /* pose.c */
 extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
