@@ -39,6 +39,26 @@ def test_so_they_are_by_the_native_engine(family: str, monkeypatch: pytest.Monke
     assert trial(1, family, "native").judged().faults == [], told
 
 
+@pytest.mark.parametrize("seed", [136, 299])
+def test_what_can_be_had_on_one_way_and_not_on_another_has_an_estimate(
+    seed: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """At a limit the order of the samples decides: errors are estimated in the order in which samples were solved."""
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    assert trial(seed, None, "native").judged().faults == []
+
+
+def test_at_a_crossing_without_a_bridge_the_rates_are_not_known() -> None:
+    """3e-3 rad beside a limit no bridge fits; on the crossing itself the rates are those of neither branch."""
+    one = replace(trial(236, "watt six-bars", "native"), engine="python")
+    verdict = one.judged()
+    assert verdict.faults == []
+    (crossing, _) = one.branch.marks  # type: ignore[union-attr]
+    there = (np.abs(one.inputs[0][:, 0] - crossing) < 1e-9) & (verdict.statuses == 1)
+    assert there.any()
+    assert np.isinf(verdict.estimate[there][:, 1:]).all()
+
+
 def test_a_loop_that_falls_in_line_inside_a_larger_block_keeps_its_smooth_branch() -> None:
     """There a whole row of the block's Jacobian vanishes and turns round, which rows of unit length would hide."""
     assert trial(2548, "six-bars driven at the end").judged().faults == []
