@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.log import ros2
+from kinfmu.log import robot, ros2
 from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds
 from kinfmu.log.container import McapWriter, Messages
@@ -73,7 +73,7 @@ class LinkTopic:
         if self._template is None:
             return
         template, metres, numbers = self._template, self._metres, []
-        for pose in ros2.frames(run, self._mechanism).values():
+        for pose in robot.frames(run, self._mechanism).values():
             x, y, phi = pose.T
             nothing = np.zeros_like(x)
             place = [metres * x, metres * y, nothing]
@@ -90,10 +90,10 @@ class LinkTopic:
         """The robot description, of the size that the mechanism has in its first pose."""
         first = int(np.argmax(run.good))
         shown = scene(run.part(slice(first, first + 1)), self._mechanism)
-        frames = ros2.frames(run.part(slice(0, 0)), self._mechanism)
+        frames = robot.frames(run.part(slice(0, 0)), self._mechanism)
         if not frames:
             return
-        urdf = Template().string(ros2.robot_description(self._name, shown, self._metres))
+        urdf = Template().string(robot.robot_description(self._name, shown, self._metres))
         channel = self._writer.channel("/robot_description", "cdr", "std_msgs/msg/String", ros2.STRING, {})
         at = stamps[:1]
         self._writer.write(channel, Messages(np.zeros(1, int), at, urdf.length, lambda out: urdf.fill(out, at)))

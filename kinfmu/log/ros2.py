@@ -1,4 +1,4 @@
-"""Message definitions of ROS 2 that viewers draw by themselves, and a robot description made of a scene.
+"""Message definitions of ROS 2 that viewers draw by themselves, and names as it allows them.
 
 Text of the definitions: common_interfaces, geometry2 and rcl_interfaces (Apache-2.0 / BSD-3), without comments.
 """
@@ -7,18 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from xml.sax.saxutils import quoteattr
-
-import numpy as np
-
-from kinfmu.joints import Distance
-from kinfmu.joints.placement import body_of
-from kinfmu.log.scene import Scene
-from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.run import FloatArray, Run
-from kinfmu.shapes import palette
-from kinfmu.shapes.placing import poses_of, world
 
 _LINE = "=" * 80
 _TIME = f"{_LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
@@ -63,71 +51,3 @@ def field_names(columns: Iterable[str]) -> list[str]:
             taken, number = f"{name}_{number}", number + 1
         names.append(taken)
     return names
-
-
-def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
-    """Pose (n, 3) of x, y [length], phi [rad] of every link of the robot description: bodies, then bars."""
-    poses, _ = poses_of(run, mechanism)
-    placed = {body.name: poses[body.name] for body in mechanism.moving_bodies if body.name in poses}
-    points = mechanism.body_points
-    for joint in mechanism.joints:
-        if isinstance(joint, Distance):
-            bodies = [body_of(point) for point in joint.between]
-            if all(body in poses or body == GROUND_NAME for body in bodies):
-                a, b = (
-                    np.broadcast_to(points[point], (len(run), 2))
-                    if body == GROUND_NAME
-                    else world(poses[body], points[point])
-                    for body, point in zip(bodies, joint.between, strict=True)
-                )
-                placed[_bar_frame(joint.name)] = np.column_stack([a, np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])])
-    return placed
-
-
-def robot_description(name: str, scene: Scene, metres: float) -> str:
-    """URDF of the scene: every link under ROOT by a floating joint, so that closed loops need no tree.
-
-    metres: length of the mechanism's unit [m]. Links lie in layers above each other so that none hides another.
-    """
-    width = 0.02 * scene.size * metres
-    links = [_link(ROOT, palette.GROUND, [np.array([point]) for point in scene.supports.values()], width, 0.0, metres)]
-    links += [
-        _link(body.name, palette.body(body.index), [body.outline], width, width * (1 + body.index), metres)
-        for body in scene.bodies
-    ]
-    for bar in scene.bars:
-        ends = np.array([[0.0, 0.0], [bar.length, 0.0]])
-        links.append(_link(_bar_frame(bar.name), palette.BAR, [ends], 0.6 * width, -width, metres))
-    joints = [
-        f'<joint name={quoteattr(link + "_floats")} type="floating">'
-        f"<parent link={quoteattr(ROOT)}/><child link={quoteattr(link)}/></joint>"
-        for link in (*(body.name for body in scene.bodies), *(_bar_frame(bar.name) for bar in scene.bars))
-    ]
-    body_lines = "\n".join([*links, *joints])
-    return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n{body_lines}\n</robot>\n'
-
-
-def _bar_frame(joint: str) -> str:
-    return f"bar.{joint}"  # names of bodies hold no dot
-
-
-def _link(
-    name: str, colour: palette.Colour, strips: Iterable[FloatArray], width: float, height: float, metres: float
-) -> str:
-    """A link of boxes along its polylines and discs at their corners; width, height [m], strips in the unit."""
-    rgba = " ".join(f"{channel / 255:.3g}" for channel in colour)
-    material = f'<material name={quoteattr(name)}><color rgba="{rgba} 1"/></material>'
-    visuals = []
-    for strip in strips:
-        for start, end in zip(metres * strip[:-1], metres * strip[1:], strict=True):
-            (x, y), (dx, dy) = (start + end) / 2, end - start
-            visuals.append(
-                f'<visual><origin xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 {np.arctan2(dy, dx):.9g}"/>'
-                f'<geometry><box size="{np.hypot(dx, dy):.9g} {width:.9g} {width:.9g}"/></geometry>{material}</visual>'
-            )
-        for x, y in metres * np.unique(strip, axis=0):
-            visuals.append(
-                f'<visual><origin xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"/>'
-                f'<geometry><cylinder radius="{width:.9g}" length="{1.2 * width:.9g}"/></geometry>{material}</visual>'
-            )
-    return f"<link name={quoteattr(name)}>{''.join(visuals)}</link>"

@@ -71,7 +71,7 @@ def test_no_view_of_the_gallery_complains(name: str, tmp_path: Path, viewer: hea
     assert any(view.startswith("log10 residual") for view in shot.views)
 
 
-@pytest.mark.parametrize("name", ["excavator", "fourbar"])
+@pytest.mark.parametrize("name", ["excavator", "fourbar", "cam_roller"])
 def test_the_record_alone_opens_with_plots_and_the_linkage(name: str, tmp_path: Path, viewer: headless.Viewer) -> None:
     mechanism = kinfmu.load(name)
     times = run_times(mechanism.run)
