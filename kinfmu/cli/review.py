@@ -9,6 +9,7 @@ import click
 from kinfmu.cli.arguments import TIME
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
+from kinfmu.cli.tell import note
 from kinfmu.errors import listed
 
 
@@ -27,6 +28,6 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at is the time of --screenshot, which is not given")
-    recording = reviewed(run, other, save=save, screenshot=screenshot, at=at)
+    recording = reviewed(run, other, save=save, screenshot=screenshot, at=at, tell=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"made {listed(made)}")

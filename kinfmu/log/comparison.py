@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.errors import LogError
+from kinfmu.errors import LogError, listed
 from kinfmu.log.blueprint import compared
 from kinfmu.log.card import plain
 from kinfmu.log.clock import nanoseconds
@@ -20,6 +20,8 @@ from kinfmu.log.thinned import thinned
 from kinfmu.log.verdict import sentence
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
+
+MOST_TOLD = 6  # names that a line lists
 
 
 class _Look(NamedTuple):
@@ -72,12 +74,30 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
         log_card(rec, _card(a, b, difference, names, [*told, *(note for note in notes if note)]))
 
 
+def in_common(a: Run, b: Run, names: tuple[str, str] = ("A", "B")) -> str:
+    """A line on which coordinates two runs both have; '' if they are the same, as those of one mechanism are."""
+    common = _common(a, b)
+    if len(common) == len(a.outputs) == len(b.outputs):
+        return ""
+    if not common:
+        return f"{names[0]} and {names[1]} have no coordinates in common, so there are no differences to show"
+    told = listed([*common[:MOST_TOLD], *["..."][: len(common) > MOST_TOLD]])
+    return (
+        f"{names[0]} and {names[1]} have {len(common)} of {len(a.outputs)} and {len(b.outputs)} coordinates in common, "
+        f"whose differences are shown: {told}"
+    )
+
+
+def _common(a: Run, b: Run) -> list[str]:
+    return [name for name in a.outputs if name in b.outputs]
+
+
 def _difference(a: Run, b: Run) -> Run | None:
     """B - A at the times of A for the coordinates of A that B has too; B is interpolated where its times differ.
 
     Linear interpolation is off by up to h^2 / 8 times the second derivative; equal times are compared as they are.
     """
-    common = [name for name in a.outputs if name in b.outputs]
+    common = _common(a, b)
     if not common or not len(a) or not len(b):
         return None
     of_a, of_b = ([run.outputs.index(name) for name in common] for run in (a, b))
@@ -116,8 +136,10 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         "",
         *[plain(note) for note in notes],
     ]
+    if told := in_common(a, b):
+        lines += ["", f"{plain(told)}.", ""]
     if difference is None:
-        return "\n".join([*lines, "", "The runs have no coordinates in common.", ""])
+        return "\n".join(lines)
     if not np.array_equal(a.t, b.t):
         lines += ["The times differ: B is interpolated linearly at those of A.", ""]
     apart, equal = [], []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 
@@ -27,10 +28,12 @@ def review(
     save: str | Path | None = None,
     screenshot: str | Path | None = None,
     at: float | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Path | None:
     """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
 
-    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s].
+    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s];
+    tell: called with a line on which coordinates two runs have in common if they are not the same.
     Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
     recording is, None if there was only a picture.
 
@@ -46,14 +49,14 @@ def review(
             recording = run
             if suffix_of(run) == ".mcap":
                 recording = Path(folder) / f"{run.stem}.rrd"
-                at = _record(run, other, recording, at)
+                at = _record(run, other, recording, at, tell)
             _shoot(recording, screenshot, at)
         return None
     if suffix_of(run) == ".rrd":
         recording, moment = run, at
     else:
         recording = Path(save) if save else run.with_name(_beside(run, other))
-        moment = _record(run, other, recording, at)
+        moment = _record(run, other, recording, at, tell)
     if screenshot:
         _shoot(recording, screenshot, moment)
     elif not save:
@@ -86,7 +89,13 @@ def _beside(run: Path, other: str | Path | None) -> str:
     return f"{run.stem}-{Path(other).stem}.rrd" if other else f"{run.stem}.rrd"
 
 
-def _record(run: Path, other: str | Path | None, recording: Path, at: float | None) -> float | None:
+def _record(
+    run: Path,
+    other: str | Path | None,
+    recording: Path,
+    at: float | None,
+    tell: Callable[[str], None] | None,
+) -> float | None:
     """Write the recording; returns the time [s] at which a picture of it shows something."""
     first = read(run)
     if at is not None and other is None and len(first) and not first.t[0] <= at <= first.t[-1]:
@@ -94,9 +103,12 @@ def _record(run: Path, other: str | Path | None, recording: Path, at: float | No
     if other is None:
         write_rrd(first, recording)
     else:
-        from kinfmu.log.comparison import write_comparison
+        from kinfmu.log.comparison import in_common, write_comparison
 
-        write_comparison(first, read(other), recording, (Path(run).name, Path(other).name))
+        second, names = read(other), (run.name, Path(other).name)
+        write_comparison(first, second, recording, names)
+        if tell and (line := in_common(first, second, names)):
+            tell(line)
     times = first.t[first.good] if first.good.any() else first.t
     if at is not None or not len(times):
         return at

@@ -8,9 +8,11 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 import kinfmu
@@ -18,6 +20,7 @@ from kinfmu import gallery, log
 from kinfmu.cli import main
 from kinfmu.cli.group import ORDER
 from tests.cli.conftest import Command, read_csv
+from tests.log.runs import fourbar
 
 ROOT = Path(__file__).parents[2]
 
@@ -172,6 +175,18 @@ def test_review_of_a_run_that_is_missing_is_told(refuses: Callable[..., str], tm
     (tmp_path / "fourbar.mcap").touch()
     told = refuses("review", "forbar.mcap", "--save", "none.rrd")
     assert told.endswith("forbar.mcap: there is no such file; did you mean 'fourbar.mcap'?")
+
+
+def test_review_says_what_two_runs_have_in_common(command: Command, tmp_path: Path) -> None:
+    run = fourbar(np.arange(3.0))
+    log.write_mcap(run, tmp_path / "a.mcap")
+    log.write_mcap(replace(run, outputs=tuple(f"b_{name}" for name in run.outputs)), tmp_path / "b.mcap")
+    result = command("review", "a.mcap", "b.mcap", "--save", "both.rrd")
+    assert (result.exit_code, result.stdout) == (0, "made both.rrd\n")
+    assert result.stderr == (
+        "kinfmu: note: a.mcap and b.mcap have no coordinates in common, so there are no differences to show\n"
+    )
+    assert command("review", "a.mcap", "a.mcap", "--save", "both.rrd").stderr == ""
 
 
 def test_every_command_explains_itself(command: Command) -> None:

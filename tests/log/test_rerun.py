@@ -13,7 +13,7 @@ import pytest
 from kinfmu.channels import select
 from kinfmu.errors import LogError
 from kinfmu.log import headless, write_rrd
-from kinfmu.log.comparison import write_comparison
+from kinfmu.log.comparison import in_common, write_comparison
 from kinfmu.log.rerun_file import _check_whole
 from kinfmu.run import Run
 from tests.log.runs import KINDS, fourbar, without_samples
@@ -192,6 +192,32 @@ def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -
     assert np.isnan(apart[:5]).all()
     assert np.isnan(apart[15:]).all()
     assert np.abs(apart[5:15]).max() < 1e-12
+
+
+def renamed(run: Run, *kept: str) -> Run:
+    """A run of another mechanism, whose coordinates have other names but for those that are kept."""
+    outputs = tuple(name if name in kept else f"other_{name}" for name in run.outputs)
+    return dataclasses.replace(run, outputs=outputs, mechanism_text="", info={})
+
+
+def test_a_comparison_says_what_runs_of_two_mechanisms_have_in_common(run: Run, tmp_path: Path) -> None:
+    assert in_common(run, run) == ""
+    none = "A and B have no coordinates in common, so there are no differences to show"
+    assert in_common(run, renamed(run)) == none
+    part = renamed(run, "crank.phi", "A.x")
+    some = "A and B have 2 of 7 and 7 coordinates in common, whose differences are shown: crank.phi, A.x"
+    assert in_common(run, part) == some
+    more = dataclasses.replace(run, outputs=(*run.outputs[:-1], "B.y"))
+    assert in_common(run, more, ("a.mcap", "b.mcap")) == (
+        "a.mcap and b.mcap have 6 of 7 and 7 coordinates in common, whose differences are shown: "
+        f"{', '.join(run.outputs[:-1])}"
+    )
+    wide = [dataclasses.replace(run, outputs=(*map(str, range(7)), last)) for last in ("a", "b")]
+    assert in_common(wide[0], wide[1]).endswith(": 0, 1, 2, 3, 4, 5, ...")
+    for other, told in ((renamed(run), none), (part, some)):
+        write_comparison(run, other, tmp_path / "compare.rrd")
+        (text,) = documents(tmp_path / "compare.rrd", "/card")
+        assert f"\n{told}.\n".replace("_", r"\_") in text
 
 
 def test_runs_in_different_units_are_not_compared(run: Run, tmp_path: Path) -> None:
