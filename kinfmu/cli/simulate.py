@@ -38,7 +38,9 @@ LOGS = Path("logs")
     "--wrap", is_flag=True, help="Angles of --input were wrapped, from 360 to 0 deg, say: follow them the short way."
 )
 @set_option
-@click.option("--mcap", type=OutputFile(".mcap"), help="The record to write; logs/<name>.mcap if nothing is said.")
+@click.option(
+    "--mcap", type=OutputFile(".mcap"), help="The record to write; logs/<file given>.mcap if nothing is said."
+)
 @click.option(
     "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; beside the record if nothing is said."
 )

@@ -104,6 +104,19 @@ def test_simulate_builds_a_mechanism_first_and_logs_beside_it(
     assert again.stdout.splitlines()[0].endswith("logs/mine.rrd (an older run of that name was replaced)")
 
 
+def test_an_fmu_is_named_after_the_mechanism_and_logs_after_the_file_given(
+    command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    file = fourbar_file('name = "fourbar"', 'name = "press"').name
+    assert command("build", file).stdout.startswith("press.fmu: ")
+    assert "written to logs/mine.mcap" in command("simulate", file, "--stop", 1).stdout.replace(os.sep, "/")
+    assert command("solve", file, "-o", "table.npz", "--times", "0:1:1").exit_code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["logs", "mine.toml", "press.fmu", "table.npz"]
+    assert log.read(tmp_path / "logs" / "mine.mcap").info["name"] == "press"
+    with np.load(tmp_path / "table.npz") as table:
+        assert 'name = "press"' in str(table["kinfmu.mechanism"])
+
+
 def test_the_recording_goes_beside_the_record(command: Command, tmp_path: Path) -> None:
     result = command("simulate", "fourbar", "--stop", "2", "--mcap", "one.mcap")
     assert result.stdout.splitlines()[0].endswith("written to one.mcap and one.rrd")
