@@ -267,3 +267,13 @@ def test_a_run_that_has_begun_holds_a_sample_whenever_ctrl_c_comes(fourbar: Path
     assert run.t.tolist() == [0.0]
     assert run.events[-1].text == "at t = 1 s: interrupted; the run ends here"
     assert sink.calls == ["begin", "1 samples", "end"]
+
+
+def test_fmpys_own_loop_ends_past_a_limit_with_the_last_good_pose(pendulum: Path) -> None:
+    from fmpy import simulate_fmu
+
+    names = ["lower.phi", "solver.status"]
+    rows = simulate_fmu(str(pendulum), start_time=0.0, stop_time=3.0, output_interval=0.5, output=names)
+    assert rows["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0, 2.0]
+    assert rows["solver.status"].tolist() == [0, 0, 0, 0, 1, 3]
+    assert rows["lower.phi"][-1] == rows["lower.phi"][-2]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -63,3 +67,27 @@ def test_fmpy_simulates_it(built_native: Build, fmi: int, kind: str) -> None:
     run = kinfmu.solve(linkage(), rows["time"])
     for name in names:
         np.testing.assert_allclose(rows[name], run[name], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_ends_past_a_limit_and_its_recorder_holds_the_rows(
+    built_native: Build, fmi: int, kind: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from fmpy import simulate_fmu
+
+    page = (Path(__file__).parents[3] / "docs" / "fmu.md").read_text(encoding="utf-8")
+    (block,) = (block for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "step_finished" in block)
+    options: dict[str, Any] = {
+        "fmi_type": kind,
+        "start_time": 0.0,
+        "stop_time": 3.0,
+        "output_interval": 0.5,
+        "output": ["lower.phi"],
+    }
+    call = f"simulate_fmu({str(built_native('double_pendulum', fmi, 'time'))!r}, **options, "
+    names: dict[str, Any] = {"simulate_fmu": simulate_fmu, "options": options}
+    exec(compile(block.replace('simulate_fmu("fourbar.fmu", ', call), "fmu.md", "exec"), names)  # noqa: S102  our page
+    assert names["kept"]
+    assert names["rows"]["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    told = "at t = 2.5 s: crank = 6.544985 rad (375 deg) cannot be reached: the limit is crank = 6.2831853072 rad"
+    assert told in capfd.readouterr().out
