@@ -157,7 +157,10 @@ def _suffix(target: str | None) -> str:
 
 @cache
 def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
-    done = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)  # noqa: S603  as above
+    with tempfile.TemporaryDirectory() as scratch:  # for some platforms zig leaves a file behind
+        done = subprocess.run(  # noqa: S603  a compiler that we looked up
+            [*compiler, "--version"], cwd=scratch, capture_output=True, text=True, check=False
+        )
     return (*compiler, done.stdout)
 
 

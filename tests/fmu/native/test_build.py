@@ -102,6 +102,9 @@ def test_all_platforms_are_compiled_with_progress(tmp_path: Path, monkeypatch: p
     quick = tuple(one for one in PLATFORMS if one.suffix != ".dll")  # zig's first library for windows takes minutes
     monkeypatch.setattr(import_module("kinfmu.fmu.native.archive"), "PLATFORMS", quick)
     seen: list[tuple[int, int]] = []
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
     path = kinfmu.build(
         kinfmu.load("fourbar"),
         tmp_path / "all.fmu",
@@ -113,6 +116,7 @@ def test_all_platforms_are_compiled_with_progress(tmp_path: Path, monkeypatch: p
         binaries = {name for name in zipped.namelist() if name.startswith("binaries/")}
     assert binaries == {f"binaries/{one.fmi2}/fourbar{one.suffix}" for one in quick}
     assert seen == [(k, len(quick)) for k in range(len(quick) + 1)]
+    assert list(here.iterdir()) == []
 
 
 def test_other_platforms_without_zig_are_refused_with_what_brings_it(
