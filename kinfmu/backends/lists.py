@@ -6,8 +6,6 @@ their positions, x1 their rates, x2 their accelerations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from kinfmu.backends.alike import Run, runs_of
 from kinfmu.backends.parametric import parametric
 from kinfmu.equations.graph import Node
@@ -56,16 +54,3 @@ class Lists:
         stands = self.stands(order)
         nodes: list[Node] = [motion[1:][order] for motion in self.plan.outputs_motion]
         return [(node, stands.get(node.name) if node.op == "symbol" else None) for node in nodes]
-
-    def home(self, positions: Mapping[str, Sequence[Node]]) -> dict[Node, int]:
-        """Number of the run whose only unit computes a node in the position stage: there later functions can take it.
-
-        positions: nodes of that stage by the label of a kind.
-        """
-        return {
-            node: number
-            for number, run in self.numbered()
-            if len(run.members) == 1 and not run.kind.constants
-            for node in positions[run.kind.label]
-            if node.args and node not in self.derived
-        }

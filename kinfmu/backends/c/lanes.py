@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
-from itertools import accumulate
 
 from kinfmu.backends.alike import Kind, positions
-from kinfmu.backends.c.text import array, assigned, declared
-from kinfmu.backends.c.units import placed, places, row_type, rows_of
+from kinfmu.backends.c.handed_on import HandedOn
+from kinfmu.backends.c.stages import block_of, index
+from kinfmu.backends.c.text import array, assigned, declared, repeated
+from kinfmu.backends.c.units import places, row_type, rows_of
 from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.newton import determinant, is_small, opposite_solution, solution, square
 from kinfmu.backends.writer import Names, Writer, identifier
@@ -39,12 +40,13 @@ def has_lanes(plan: SolvePlan) -> bool:
 def emit_lanes(plan: SolvePlan) -> dict[str, str]:
     """Texts of lane_sizes.h and, if the plan has lanes, of lanes.c, by file name."""
     if not has_lanes(plan):
-        return {"lane_sizes.h": "#define KF_HAS_LANES 0\n#define KF_LANE_HOLD 0\n#define KF_REPEATS 0\n"}
+        return {"lane_sizes.h": _sizes(0, 0, 0)}
     lanes = _Lanes(plan)
-    sizes = (
-        f"#define KF_HAS_LANES 1\n#define KF_LANE_HOLD {lanes.holds[-1]}\n#define KF_REPEATS {int(_repeats(plan))}\n"
-    )
-    return {"lane_sizes.h": sizes, "lanes.c": lanes.source()}
+    return {"lane_sizes.h": _sizes(1, len(lanes.handed_on), int(_repeats(plan))), "lanes.c": lanes.source()}
+
+
+def _sizes(has: int, hold: int, repeats: int) -> str:
+    return f"#define KF_HAS_LANES {has}\n#define KF_LANE_HOLD {hold}\n#define KF_REPEATS {repeats}\n"
 
 
 def _repeats(plan: SolvePlan) -> bool:
@@ -87,13 +89,11 @@ class _Lanes(Lists):
             label: _LaneUnit(kind, self.parameters, self.derived, plan.size, self._turned(kind))
             for label, kind in self.kinds.items()
         }
-        self.taken = self.home({label: units.positions for label, units in self.units.items()})
+        self.handed_on = HandedOn(self, self.units)
         readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # they say what is handed on
         units = [line for unit in self.units.values() for line in unit.source()]
-        rooms = [len(run.members) * len(self.units[run.kind.label].hold) for run in self.runs]
-        self.holds = [0, *accumulate(rooms)]  # where the numbers that each run hands on stand
         self.functions = [*units, *(line for k, run in self.numbered() for line in rows_of(k, run, self.place))]
-        self.functions += [placed(line, self.holds) for lines in readers for line in lines]
+        self.functions += self.handed_on.placed(line for lines in readers for line in lines)
 
     def _angles(self) -> dict[str, int]:
         """Coordinates whose sine and cosine come with the prediction, with their place there: unknown angles, then the
@@ -122,7 +122,6 @@ class _Lanes(Lists):
         return own | given
 
     def source(self) -> str:
-        factors = [1.0 / block.determinant_scale for block in self.plan.blocks if block.unknowns]
         return "\n".join(
             [
                 f"/* Kinematics of {self.plan.mechanism.name}, side by side: generated from its mechanism. */",
@@ -131,7 +130,6 @@ class _Lanes(Lists):
                 "#include <math.h>",
                 "",
                 *array("int kf_lane_angles", [self.angles.get(name, -1) for name in self.order]),
-                *(array("static double determinant_factors", factors) if factors else ()),
                 "",
                 *self.functions,
                 *self._position(),
@@ -176,13 +174,11 @@ class _Lanes(Lists):
         """Calls of all units' functions of a stage, one after another."""
         lines = []
         for number, run in self.numbered():
-            many = len(run.members) > 1
-            label, index = run.kind.label, "k" if many else "0"
-            hold = f"{self.holds[number - 1]}{f' + k * {len(self.units[label].hold)}' * many}"
-            arguments = f"model, &run_{number}[{index}], lanes, lanes->hold + {hold}"
-            block = f"{run.first}{' + k' * many}"
+            label, k = run.kind.label, index(run)
+            arguments = f"model, &run_{number}[{k}], lanes, lanes->hold + {self.handed_on.start(number, k)}"
             if run.kind.solved:
-                factor = f", determinant_factors[{block}]" if stage == "position" else ""
+                block = block_of(run)
+                factor = f", kf_determinant_factors[{block}]" if stage == "position" else ""
                 calls = [
                     f"if (held != NULL && held[{block}]) {{",
                     f"    {stage}_given{label}({arguments});",
@@ -192,9 +188,7 @@ class _Lanes(Lists):
                 ]
             else:
                 calls = [f"{stage}{label}({arguments});"]
-            if many:
-                calls = [f"for (k = 0; k < {len(run.members)}; ++k) {{", *(f"    {call}" for call in calls), "}"]
-            lines += calls
+            lines += repeated(len(run.members), calls)
         return lines
 
     def _loop(self, name: str, lines: Sequence[str], writer: Writer) -> list[str]:
@@ -206,9 +200,8 @@ class _Lanes(Lists):
                 source = f"model->derived[{self.derived[node]}]"
             elif _is_turned(node, self.angles):
                 source = f"lanes->{_LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
-            elif node in self.taken:
-                number = self.taken[node]
-                source = f"lanes->hold[<{number}:{self.units[self.runs[number - 1].kind.label].handed_on(node)}>][i]"
+            elif node in self.handed_on.nodes:
+                source = f"lanes->hold[{self.handed_on.place(node)}][i]"
             elif is_parameter(node):
                 source = f"model->parameters[{self.parameters[node.name]}]"
             else:
@@ -241,7 +234,7 @@ class _Lanes(Lists):
     def _written(self, targets: Sequence[Node]) -> tuple[list[str], Writer]:
         """Statements for targets, given what the units compute and what comes with the prediction."""
         turned = [node for node in reachable(targets) if _is_turned(node, self.angles)]
-        writer = Writer(self.names, [*self.derived, *self.taken, *turned])
+        writer = Writer(self.names, [*self.derived, *self.handed_on.nodes, *turned])
         return [f"{line};" for line in writer.statements(targets)], writer
 
 
@@ -282,6 +275,10 @@ class _LaneUnit:
     def handed_on(self, node: Node | None) -> int:
         """Place of a node among the numbers that later functions take from here, from now on if not before."""
         return self.hold.setdefault(node, len(self.hold))
+
+    def room(self) -> int:
+        """How many numbers a unit hands on."""
+        return len(self.hold)
 
     def source(self) -> list[str]:
         motion = self._motion("motion", held=False)  # says what is handed on

@@ -50,3 +50,25 @@ def assigned(lines: Iterable[str]) -> list[str]:
     """Names that the statements of a function give values to."""
     found = [re.match(r"\s*(\w+) = |\s*kf_sincos\(.*, &(\w+), &(\w+)\);", line) for line in lines]
     return [name for match in found if match for name in match.groups() if name]
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines one step further in."""
+    return [f"    {line}" for line in lines]
+
+
+def function(
+    signature: str, lines: Sequence[str], arguments: Iterable[str] = (), variables: Sequence[str] = ()
+) -> list[str]:
+    """A function, and an empty line: what its statements assign is declared as double.
+
+    arguments: names of those that it may do without, which is told where it does; variables: further declarations.
+    """
+    text = "\n".join([*variables, *lines])
+    unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    return [signature, "{", *indented([*declared(assigned(lines)), *variables, *unused, *lines]), "}", ""]
+
+
+def repeated(count: int, lines: Sequence[str]) -> list[str]:
+    """The lines, in a loop over k unless they are to be gone through once."""
+    return list(lines) if count == 1 else [f"for (k = 0; k < {count}; ++k) {{", *indented(lines), "}"]

@@ -11,11 +11,10 @@ coordinates. Units without a solved block do without z, held, given and determin
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.backends.alike import Kind, Run, positions
-from kinfmu.backends.c.text import FUNCTIONS, assigned, declared
+from kinfmu.backends.c.text import FUNCTIONS, function, indented
 from kinfmu.backends.lists import LISTS
 from kinfmu.backends.newton import (
     ITERATIONS,
@@ -115,20 +114,6 @@ class Units:
                 lines.append(f"{name} = {LISTS[place[0]]}[row->{place[1]}];")
         return lines
 
-    def _function(self, signature: str, arguments: Sequence[str], lines: Sequence[str], *more: str) -> list[str]:
-        """A function with its variables; arguments that it does without are told so."""
-        text = "\n".join(lines)
-        unused = [name for name in arguments if not re.search(rf"\b{name}\b", text)]
-        return [
-            signature,
-            "{",
-            *(f"    {line}" for line in [*declared(assigned(lines)), *more]),
-            *(f"    (void){name};" for name in unused),
-            *(f"    {line}" for line in lines),
-            "}",
-            "",
-        ]
-
     # The functions
 
     def source(self) -> list[str]:
@@ -163,7 +148,7 @@ class Units:
                 f"static void position{self.label}(const kf_model *model, const row{self.label} *row, double *x,"
                 " double *hold)"
             )
-            return self._function(signature, arguments, lines)
+            return function(signature, lines, arguments)
         lines += [f"{self._kept} = det;"] if self.keeps_determinant else []
         lines += ["*determinant = det;", "newton->iterations += iteration;"]
         lines += [
@@ -176,7 +161,7 @@ class Units:
             "    double *hold, const double *z, bool held, double *determinant, kf_newton *newton)"
         )
         variables = ["int iteration;"] if is_small(block) else ["double det;", "int iteration;"]
-        return self._function(signature, ["model", "hold"], lines, *variables)
+        return function(signature, lines, ("model", "hold"), variables)
 
     def _given_outright(self, writer: Writer, block: Block) -> list[str]:
         lines = []
@@ -211,13 +196,13 @@ class Units:
             *before,
             "last = INFINITY;",
             f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
-            *(f"    {line}" for line in inside),
+            *indented(inside),
             f"    if (error <= {ROUND_OFF**2!r} || held",
             f"        || (16.0 * error > last && error <= {SETTLED**2!r} * ({angles}))) {{",
             "        break;",
             "    }",
             "    last = error;",
-            *(f"    {line}" for line in self._correction(jacobian, r, names)),
+            *indented(self._correction(jacobian, r, names)),
             "}",
             f"if (iteration == {ITERATIONS}) {{",
             "    newton->failed = error;",
@@ -258,7 +243,7 @@ class Units:
             f"    const double right[{m}] = {{{', '.join(right)}}};",
             f"    double step[{k}];",
             f"    {name}({sizes}, <kept>, right, step);",
-            *(f"    {line}" for line in then),
+            *indented(then),
             "}",
         ]
 
@@ -286,7 +271,7 @@ class Units:
             f" const double *hold,\n   {solving}{ready} double *{out})"
         )
         arguments = ["model", "x", "hold", *(["x1"] if order == 2 else [])]
-        return self._function(signature, arguments, lines)
+        return function(signature, lines, arguments)
 
     def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
         """The linear solve of a block, or what is given in its place."""
@@ -306,7 +291,7 @@ class Units:
         else:
             opposite = [f"-{one}" for one in b]
             solved += self._solve(m, k, opposite, [f"{one} = step[{i}];" for i, one in enumerate(z)])
-        return [*before, "if (held) {", *taken, "} else {", *(f"    {line}" for line in solved), "}"]
+        return [*before, "if (held) {", *taken, "} else {", *indented(solved), "}"]
 
     def _entries(self, name: str, nodes: Sequence[Node], scales: Sequence[float] | None) -> list[str]:
         """A function that writes numbers of the position stage one after another."""
@@ -321,7 +306,7 @@ class Units:
             f"static void {name}{self.label}(const kf_model *model, const row{self.label} *row, const double *x,"
             " const double *hold,\n    double *entries)"
         )
-        return self._function(signature, ["model", "row", "x", "hold"], lines)
+        return function(signature, lines, ("model", "row", "x", "hold"))
 
 
 def fields(kind: Kind) -> tuple[list[str], list[str], list[str]]:
@@ -357,11 +342,3 @@ def rows_of(number: int, run: Run, place: Mapping[str, int]) -> list[str]:
         told = f" /* {', '.join(member.own)} */"
         rows.append(f"    {{{', '.join([*given, *map(repr, member.constants), *own])}}},{told}")
     return [f"static const row{run.kind.label} run_{number}[{len(rows)}] = {{", *rows, "};", ""]
-
-
-def placed(line: str, holds: Sequence[int]) -> str:
-    """A statement with the place of what it takes from a unit: '<3:7>' is number 7 of what run 3 hands on.
-
-    holds: where the numbers that each run hands on begin.
-    """
-    return re.sub(r"<(\d+):(\d+)>", lambda match: str(holds[int(match[1]) - 1] + int(match[2])), line)

@@ -22,6 +22,7 @@ HEADERS = {
 _WORDS = {"2.0": ("Real", "Integer", "Integer"), "3.0": ("Float64", "Int64", "Int32")}
 _STEP = (
     "model.c",
+    "position.c",
     "pose.c",
     "advance.c",
     "solver.c",

@@ -42,6 +42,14 @@ typedef struct {
     int iterations;
 } kf_found;
 
+/* How Newton went in all blocks: their squared residuals, relative to the size, the largest, all together, and the one
+ * of the block that failed; and how often it corrected.
+ */
+typedef struct {
+    double largest, total, failed;
+    int iterations;
+} kf_newton;
+
 /* Pieces of a function of one variable: see kinfmu/solver/curve.py. */
 typedef struct {
     double origin;
@@ -68,6 +76,7 @@ extern const double kf_reach[KF_DRIVERS]; /* what counts as a step of one */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
 extern const double kf_row_scales[KF_ROOM(KF_ROWS)]; /* of the residuals, block after block */
+extern const double kf_determinant_factors[KF_ROOM(KF_BLOCKS)]; /* 1 / determinant far from singular */
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
 extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws */
 
@@ -89,8 +98,8 @@ extern const int kf_accelerations_places[KF_ROOM(KF_OUTPUTS)];
 
 bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room);
 void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
-int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd, double s,
-                const bool *held, kf_found *found); /* -1, or the block that failed, with its residual in `found` */
+int kf_solve_blocks(const kf_model *model, const double *z, const bool *held, kf_found *found,
+                    kf_newton *newton); /* x of all blocks from what x predicts; -1, or the block that failed */
 void kf_velocity(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
                  double *x1);
 void kf_acceleration(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
@@ -103,6 +112,10 @@ void kf_watches(const kf_model *model, const kf_found *found, double *watches);
 void kf_fixed(const kf_model *model, double *fixed);
 void kf_jacobian(const kf_model *model, const kf_found *found, int block, double *jacobian); /* row after row */
 void kf_residuals(const kf_model *model, const kf_found *found, int block, double *residuals); /* relative to the size */
+
+/* Unknowns z + s zd + s^2 zdd / 2, corrected: -1, or the block that failed, with its residual in `found`. */
+int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd, double s,
+                const bool *held, kf_found *found);
 
 /* Small dense linear algebra: blocks of three unknowns and more, and least squares. */
 #define KF_LU_ROOM(k) ((k) * (k) + 2 * (k))

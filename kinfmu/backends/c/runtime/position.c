@@ -1,0 +1,54 @@
+/* Position: a model's pose at driver values, predicted, corrected block after block, and judged. */
+#include <math.h>
+
+#include "kinfmu.h"
+
+/* The largest residual of the rows set aside. */
+static inline double watched(const kf_model *model, const kf_found *found)
+{
+    double watches[KF_ROOM(KF_WATCHES)], largest = 0.0, total = 0.0;
+    int k;
+    kf_watches(model, found, watches);
+    for (k = 0; k < KF_WATCHES; ++k) {
+        const double gap = fabs(watches[k]);
+        largest = largest > gap ? largest : gap;
+        total += gap; /* a NaN stays */
+    }
+    return total < INFINITY ? largest : total;
+}
+
+inline int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd,
+                       double s, const bool *held, kf_found *found)
+{
+    kf_newton newton = {0.0, 0.0, 0.0, 0};
+    double predicted[KF_ROOM(KF_UNKNOWNS)];
+    double *const x = found->x;
+    int k, failed;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        predicted[k] = x[k] = z[k] + s * (zd[k] + 0.5 * s * zdd[k]);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        x[KF_COORDINATES - KF_DRIVERS + k] = u[k];
+    }
+    failed = kf_solve_blocks(model, z, held, found, &newton);
+    if (failed >= 0) {
+        found->residual = sqrt(newton.failed);
+        return failed;
+    }
+    found->margin = 1.0;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        double size;
+        found->determinants[k] *= kf_determinant_factors[k];
+        size = fabs(found->determinants[k]);
+        found->margin = k == 0 || size < found->margin ? size : found->margin;
+    }
+    found->residual = sqrt(newton.total < INFINITY ? newton.largest : newton.total);
+    found->iterations = newton.iterations;
+    found->moved = 0.0;
+    for (k = 0; newton.iterations && k < KF_UNKNOWNS; ++k) {
+        const double moved = fabs(x[k] - predicted[k]) / kf_unknown_scales[k];
+        found->moved = moved > found->moved ? moved : found->moved;
+    }
+    found->watch = watched(model, found);
+    return -1;
+}
