@@ -1,31 +1,28 @@
 """lanes.c: the formulas of a plan for many samples side by side, free of branches.
 
-A unit's position is one loop over the lanes, so that intermediate numbers stay in registers; its rates and
-accelerations are another, which is left out where nobody asks for them. Newton corrects a good prediction once. Sines
-and cosines of the driver's angle and of the unknowns come with the prediction, and the correction rotates them. In a
-window around a singular point the blocks that are held take position and derivatives as they are given.
+A unit's position is one loop over the lanes; its rates and accelerations are another, which is left out where nobody
+asks for them. In a window around a singular point the blocks that are held take position and derivatives as they are
+given.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 
-from kinfmu.backends.alike import Kind, positions
+from kinfmu.backends.alike import Kind
 from kinfmu.backends.c.handed_on import HandedOn
+from kinfmu.backends.c.lane_units import LISTED, VECTORS, LaneUnit, is_turned, through
+from kinfmu.backends.c.repeats import repeats
 from kinfmu.backends.c.stages import block_of, index
-from kinfmu.backends.c.text import array, assigned, declared, repeated
-from kinfmu.backends.c.units import places, row_type, rows_of
+from kinfmu.backends.c.text import array, indented, repeated
+from kinfmu.backends.c.units import rows_of
 from kinfmu.backends.lists import LISTS, Lists
-from kinfmu.backends.newton import determinant, is_small, opposite_solution, solution, square
-from kinfmu.backends.writer import Names, Writer, identifier
-from kinfmu.equations.graph import FUNCTIONS, Node, reachable
-from kinfmu.naming import derivative_name
-from kinfmu.plan import Block, SolvePlan
+from kinfmu.backends.newton import is_small
+from kinfmu.backends.writer import Names, Writer
+from kinfmu.equations.graph import Node, reachable
+from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter
 
-_VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
-_LISTED = {"sin": "sine", "cos": "cosine"}  # lists of what comes with the prediction
 _BRANCHING = ("curve", "atan2", "floor")
 
 
@@ -42,51 +39,20 @@ def emit_lanes(plan: SolvePlan) -> dict[str, str]:
     if not has_lanes(plan):
         return {"lane_sizes.h": _sizes(0, 0, 0)}
     lanes = _Lanes(plan)
-    return {"lane_sizes.h": _sizes(1, len(lanes.handed_on), int(_repeats(plan))), "lanes.c": lanes.source()}
+    return {"lane_sizes.h": _sizes(1, len(lanes.handed_on), int(repeats(plan))), "lanes.c": lanes.source()}
 
 
-def _sizes(has: int, hold: int, repeats: int) -> str:
-    return f"#define KF_HAS_LANES {has}\n#define KF_LANE_HOLD {hold}\n#define KF_REPEATS {repeats}\n"
-
-
-def _repeats(plan: SolvePlan) -> bool:
-    """True if a whole turn of any angle changes nothing: all stand in sines and cosines, but where one is another.
-
-    A gear or a coupling of angles tells how often they have turned: such a plan is not taken to repeat.
-    """
-    angles = {name for block in plan.blocks for name in block.coordinates if name.endswith(".phi")}
-    angles |= {driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"}
-
-    def is_turned(node: Node) -> bool:
-        """An angle, and no more than constants added to it."""
-        while node.op in ("+", "-") and node.args[1].constant is not None:
-            node = node.args[0]
-        while node.op == "+" and node.args[0].constant is not None:
-            node = node.args[1]
-        return node.op == "symbol" and node.name in angles
-
-    rows = [node for block in plan.blocks for node in block.residuals]
-    rows += [m[0] for block in plan.blocks for name, m in block.assigned if not (name in angles and is_turned(m[0]))]
-    found: set[Node] = set()
-    stack = list(rows)
-    while stack:
-        node = stack.pop()
-        if node in found or (node.op in ("sin", "cos") and is_turned(node.args[0])):
-            continue
-        if node.op == "symbol" and node.name in angles:
-            return False
-        found.add(node)
-        stack += node.args
-    return True
+def _sizes(has: int, hold: int, is_repeated: int) -> str:
+    return f"#define KF_HAS_LANES {has}\n#define KF_LANE_HOLD {hold}\n#define KF_REPEATS {is_repeated}\n"
 
 
 class _Lanes(Lists):
     def __init__(self, plan: SolvePlan) -> None:
         super().__init__(plan)
-        self.names = Names((name for block in plan.blocks for name in block.coordinates), functions=_VECTORS)
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), functions=VECTORS)
         self.angles = self._angles()
         self.units = {
-            label: _LaneUnit(kind, self.parameters, self.derived, plan.size, self._turned(kind))
+            label: LaneUnit(kind, self.parameters, self.derived, plan.size, self._turned(kind))
             for label, kind in self.kinds.items()
         }
         self.handed_on = HandedOn(self, self.units)
@@ -149,7 +115,7 @@ class _Lanes(Lists):
             "    }",
             "    (void)k;",
             "    (void)held;",
-            *(f"    {line}" for line in self._calls("position")),
+            *indented(self._calls("position")),
             "    outputs(model, lanes);",
             "    watches(model, lanes);",
             "}",
@@ -163,7 +129,7 @@ class _Lanes(Lists):
             "    int k;",
             "    (void)k;",
             "    (void)held;",
-            *(f"    {line}" for line in self._calls("motion")),
+            *indented(self._calls("motion")),
             "    rates(model, lanes);",
             "    accelerations(model, lanes);",
             "}",
@@ -198,8 +164,8 @@ class _Lanes(Lists):
         for node in writer.used:
             if node in self.derived:
                 source = f"model->derived[{self.derived[node]}]"
-            elif _is_turned(node, self.angles):
-                source = f"lanes->{_LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
+            elif is_turned(node, self.angles):
+                source = f"lanes->{LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
             elif node in self.handed_on.nodes:
                 source = f"lanes->hold[{self.handed_on.place(node)}][i]"
             elif is_parameter(node):
@@ -213,7 +179,7 @@ class _Lanes(Lists):
             "    int i;",
             "    (void)model;",
             "    (void)lanes;",
-            *_through([*loads, *lines] if lines else ()),
+            *through([*loads, *lines] if lines else ()),
             "}",
             "",
         ]
@@ -233,241 +199,6 @@ class _Lanes(Lists):
 
     def _written(self, targets: Sequence[Node]) -> tuple[list[str], Writer]:
         """Statements for targets, given what the units compute and what comes with the prediction."""
-        turned = [node for node in reachable(targets) if _is_turned(node, self.angles)]
+        turned = [node for node in reachable(targets) if is_turned(node, self.angles)]
         writer = Writer(self.names, [*self.derived, *self.handed_on.nodes, *turned])
         return [f"{line};" for line in writer.statements(targets)], writer
-
-
-class _LaneUnit:
-    """The functions of one kind of units.
-
-        position(model, row, lanes, hold, factor)   Newton's correction, what it leaves, and what follows
-        motion(model, row, lanes, hold)             rates and accelerations
-        position_given, motion_given                the same of a block that is held
-
-    turned: names of coordinates whose sine and cosine come with the prediction.
-    """
-
-    def __init__(
-        self, kind: Kind, parameters: dict[str, int], derived: dict[Node, int], size: float, turned: set[str]
-    ) -> None:
-        self.kind = kind
-        self.parameters = parameters
-        self.derived = derived
-        self.size = size
-        self.names = Names(kind.coordinates, functions=_VECTORS)
-        for block in kind.blocks:
-            for name, motion in block.assigned:
-                self.names.assign(motion[0], name)
-        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
-        self.predicted = {node for node in self.positions if _is_turned(node, turned)}
-        self.turning = [  # unknown angles with the nodes of sine and cosine, of which the formulas hold one at least
-            (node.name, node.graph.function("sin", node), node.graph.function("cos", node))
-            for node in self.positions
-            if node.op == "symbol" and kind.solved and node.name in kind.solved.unknowns and node.name in turned
-        ]
-        self.turning = [turn for turn in self.turning if self.predicted & set(turn[1:])]
-        self.predicted |= {node for turn in self.turning for node in turn[1:]}
-        self.assigned = {motion[0]: name for block in kind.blocks for name, motion in block.assigned}
-        self.where = places(kind)
-        self.hold: dict[Node | None, int] = {}  # None: the determinant of the block that is solved
-
-    def handed_on(self, node: Node | None) -> int:
-        """Place of a node among the numbers that later functions take from here, from now on if not before."""
-        return self.hold.setdefault(node, len(self.hold))
-
-    def room(self) -> int:
-        """How many numbers a unit hands on."""
-        return len(self.hold)
-
-    def source(self) -> list[str]:
-        motion = self._motion("motion", held=False)  # says what is handed on
-        if self.kind.solved is None:
-            return [*row_type(self.kind), "", *self._position("position", held=False), *motion]
-        return [
-            *row_type(self.kind),
-            "",
-            *self._position("position", held=False),
-            *self._position("position_given", held=True),
-            *motion,
-            *self._motion("motion_given", held=True),
-        ]
-
-    def _position(self, stage: str, *, held: bool) -> list[str]:
-        writer = Writer(self.names, [*self.derived, *self.predicted])
-        lines: list[str] = []
-        for block in self.kind.blocks:
-            if block.unknowns:
-                lines += self._closing(writer, block) if held else self._newton(writer, block)
-            lines += self._given_outright(writer, block)
-        corrected = self.kind.solved.unknowns if self.kind.solved is not None and not held else ()
-        turning = self.turning if corrected else []
-        for unknown, sine, cosine in turning:
-            field = self.where[unknown][1]
-            lines += [f"sine_{field}[i] = {self.names.of(sine)};", f"cosine_{field}[i] = {self.names.of(cosine)};"]
-        found = [*corrected, *(name for block in self.kind.blocks for name, _ in block.assigned)]
-        lines += [f"x_{self.where[name][1]}[i] = {identifier(name)};" for name in found]
-        handed_on = {node: k for node, k in self.hold.items() if node is not None}
-        lines += [f"{line};" for line in writer.statements(list(handed_on))]
-        lines += [f"hold[{k}][i] = {writer.expression(node)};" for node, k in handed_on.items()]
-        used = dict.fromkeys([*(node for turn in turning for node in turn[1:]), *writer.used])
-        predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i];" for name in corrected]
-        factor = " const double factor" if corrected else ""
-        return self._function(stage, factor, [*predicted, *self._loads(used, found), *lines])
-
-    def _motion(self, stage: str, *, held: bool) -> list[str]:
-        costly = [node for node in self.positions if node.op in FUNCTIONS or node.op == "/"]
-        writer = Writer(self.names, [*self.derived, *self.predicted, *self.assigned, *costly])
-        lines: list[str] = []
-        for order in (1, 2):
-            for block in self.kind.blocks:
-                if block.unknowns:
-                    lines += [] if held else self._linear(writer, block, order)
-                for name, nodes in block.assigned:
-                    lines += [f"{line};" for line in writer.statements([nodes[order]])]
-                    lines.append(f"{identifier(derivative_name(name, order))} = {writer.expression(nodes[order])};")
-        names = [name for block in self.kind.blocks for name, _ in block.assigned]
-        names = names if held else list(self.kind.coordinates)
-        rates = [(derivative_name(name, order), order, self.where[name][1]) for name in names for order in (1, 2)]
-        lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)};" for name, order, field in rates]
-        return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
-
-    def _loads(self, nodes: Iterable[Node], found: Collection[str]) -> list[str]:
-        """Assignments of what statements use and have not found themselves."""
-        lines = []
-        for node in nodes:
-            if node in self.derived:
-                source = f"model->derived[{self.derived[node]}]"
-            elif node in self.predicted:
-                source = f"{_LISTED[node.op]}_{self.where[node.args[0].name][1]}[i]"
-            elif node.op != "symbol" and node in self.assigned:
-                source = f"x_{self.where[self.assigned[node]][1]}[i]"
-            elif node.op != "symbol":
-                source = f"hold[{self.handed_on(node)}][i]"
-            elif node.name in found:
-                continue
-            elif is_parameter(node):
-                source = f"model->parameters[{self.parameters[node.name]}]"
-            elif node.name in self.where:
-                order, field = self.where[node.name]
-                source = f"{LISTS[order]}_{field}[i]"
-            else:
-                source = f"row->{node.name}"
-            lines.append(f"{self.names.of(node)} = {source};")
-        return lines
-
-    def _function(self, stage: str, factor: str, lines: Sequence[str]) -> list[str]:
-        text = "\n".join(lines)
-        used = sorted(set(re.findall(r"\b(x[12]?|z|sine|cosine)_([gk]\d+)\[i\]", text)))
-        head = f"static inline void {stage}{self.kind.label}(const kf_model *model, const row{self.kind.label} *row,"
-        return [
-            head,
-            f"    kf_lanes *lanes, double (*hold)[KF_LANES]{',' * bool(factor)}{factor})",
-            "{",
-            *(f"    double *const {name}_{field} = lanes->{name}[row->{field}];" for name, field in used),
-            "    int i;",
-            "    (void)model;",
-            "    (void)row;",
-            "    (void)lanes;",
-            "    (void)hold;",
-            *_through(lines),
-            "}",
-            "",
-        ]
-
-    def _given_outright(self, writer: Writer, block: Block) -> list[str]:
-        lines = []
-        for name, motion in block.assigned:
-            lines += [f"{line};" for line in writer.statements([motion[0]])]
-            given = writer.expression(motion[0])
-            if given != identifier(name):
-                lines.append(f"{identifier(name)} = {given};")
-        return lines
-
-    def _newton(self, writer: Writer, block: Block) -> list[str]:
-        """A correction of the prediction, and the residual that it leaves."""
-        entries = [entry for row in block.jacobian for entry in row]
-        unknowns = [
-            node
-            for node in reachable([*block.residuals, *entries])
-            if node.op == "symbol" and node.name in block.unknowns
-        ]
-        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
-        moving = [*unknowns, *(node for turn in self.turning for node in turn[1:])]
-        lines = [f"{line};" for line in writer.statements(writer.independent(looped, moving))]
-        known = set(writer.known)
-        steps = [f"d{k}" for k in range(len(block.unknowns))]
-        r, evaluated = self._residuals(writer, block, entries)
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-        values = [text.replace(" / det", " * per_det") for text in solution(jacobian, r, "det")]
-        lines += [*evaluated, f"per_det = 1.0 / ({determinant(jacobian)});"]
-        lines += [f"{one} = {text};" for one, text in zip(steps, values, strict=True)]
-        for name, one in zip(block.unknowns, steps, strict=True):
-            scale = "" if name.endswith(".phi") else f" * {1.0 / self.size!r}"
-            lines += [f"{identifier(name)} -= {one};", f"size = fabs({one}){scale};"]
-            lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i];")
-            for unknown, sine, cosine in self.turning:
-                if unknown == name:
-                    lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
-        writer.known = set(known)
-        r, evaluated = self._residuals(writer, block, entries)
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
-        return [
-            *lines,
-            *evaluated,
-            f"det = {determinant(jacobian)};",
-            f"hold[{self.handed_on(None)}][i] = det;",
-            "size = fabs(det * factor);",
-            "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
-            *self._left(r, block),
-        ]
-
-    def _closing(self, writer: Writer, block: Block) -> list[str]:
-        """The residual of unknowns that are given."""
-        r, evaluated = self._residuals(writer, block, ())
-        return [*evaluated, *self._left(r, block)]
-
-    def _residuals(self, writer: Writer, block: Block, entries: Sequence[Node]) -> tuple[list[str], list[str]]:
-        """Names of the residuals, and the statements that compute them and what entries of the Jacobian need."""
-        r = [f"r{k}" for k in range(len(block.residuals))]
-        lines = [f"{line};" for line in writer.statements([*block.residuals, *entries])]
-        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
-        return r, lines
-
-    def _left(self, r: Sequence[str], block: Block) -> list[str]:
-        """What residuals count among those of all blocks."""
-        return [
-            f"size = {square(r, block.row_scales)};",
-            "lanes->error[i] = size > lanes->error[i] || size != size ? size : lanes->error[i]; /* a NaN stays */",
-        ]
-
-    def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
-        right = (block.velocity, block.acceleration)[order - 1]
-        many = len(block.unknowns) > 1  # the determinant of one unknown is its Jacobian
-        entries = [entry for row in block.jacobian for entry in row if many]
-        lines = [f"{line};" for line in writer.statements([*right, *entries])]
-        b = [f"b{k}" for k in range(len(right))]
-        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
-        if order == 1:
-            self.jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
-            lines.append(f"per_det = 1.0 / hold[{self.handed_on(None)}][i];")
-        z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-        values = opposite_solution(self.jacobian, b, "* per_det")
-        return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]
-
-
-def _is_turned(node: Node, angles: Collection[str]) -> bool:
-    """True for the sine or cosine of one of these angles."""
-    return node.op in _LISTED and node.args[0].op == "symbol" and node.args[0].name in angles
-
-
-def _through(lines: Sequence[str]) -> list[str]:
-    """Statements for each lane."""
-    if not lines:
-        return ["    (void)i;"]
-    return [
-        "    KF_SIDE_BY_SIDE",
-        "    for (i = 0; i < KF_LANES; ++i) {",
-        *(f"        {line}" for line in [*declared(assigned(lines)), *lines]),
-        "    }",
-    ]
