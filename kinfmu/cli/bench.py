@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,16 @@ from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
-MEASUREMENTS = ("accuracy", "sample", "sweep", "step", "native", "log", "import", "chains")
+TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench that tells them, and what it measures
+    "sample": ("solve_sample", ()),
+    "sweep": ("native_sweep", ()),
+    "step": ("fmu_step", ("fourbar",)),
+    "native": ("native_step", ("fourbar",)),
+    "log": ("log_files", ()),
+    "import": ("import_time", ()),
+    "chains": ("chains", ()),
+}
+MEASUREMENTS = ("accuracy", *TEXTS)
 ALL = "all"
 
 
@@ -83,34 +93,10 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             click.echo()
         if name == "accuracy":
             _accuracy(mechanisms, given, folder or (Path() if mechanisms else default_folder()))
-        elif name == "sample":
-            from kinfmu.bench import solve_sample
-
-            click.echo(solve_sample.run(**given))
-        elif name == "sweep":
-            from kinfmu.bench import native_sweep
-
-            click.echo(native_sweep.run(**given))
-        elif name == "step":
-            from kinfmu.bench import fmu_step
-
-            click.echo(fmu_step.run(gallery.load("fourbar"), **given))
-        elif name == "native":
-            from kinfmu.bench import native_step
-
-            click.echo(native_step.run(gallery.load("fourbar"), **given))
-        elif name == "log":
-            from kinfmu.bench import log_files
-
-            click.echo(log_files.run(**given))
-        elif name == "import":
-            from kinfmu.bench import import_time
-
-            click.echo(import_time.run(**given))
         else:
-            from kinfmu.bench import chains
-
-            click.echo(chains.run(**given))
+            module, mechanism = TEXTS[name]
+            measurement = import_module(f"kinfmu.bench.{module}")  # late: each needs other packages
+            click.echo(measurement.run(*map(gallery.load, mechanism), **given))
 
 
 def default_folder() -> Path:
