@@ -8,7 +8,8 @@ from pathlib import Path
 from kinfmu.chains import CHAINS, chain
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.toml_file import read, text
+from kinfmu.mechanism.toml_file import read
+from kinfmu.mechanism.toml_text import text
 from kinfmu.suffix import suffix_of
 
 

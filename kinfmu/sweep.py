@@ -16,7 +16,7 @@ from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.mechanism.number import measured
 from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.toml_file import text
+from kinfmu.mechanism.toml_text import text
 from kinfmu.mechanism.valid import is_number
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.python_engine import PythonEngine

@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 
 from kinfmu import AngleDriver, Body, ConstantSpeed, Coordinate, Distance, Mechanism, Revolute, load
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 
 
 def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanism:

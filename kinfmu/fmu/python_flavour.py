@@ -28,7 +28,7 @@ from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.interface import Drive, Interface, interface
-from kinfmu.mechanism import toml_file
+from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 
 CAPABILITIES = {
@@ -85,7 +85,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
     contents = {
         "modelDescription.xml": _description(variables, version, guid=""),
         "documentation/index.html": documentation.page(variables).encode(),
-        "resources/mechanism.toml": toml_file.text(plan.mechanism).encode(),
+        "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
         "kinfmu/__init__.py": b'"""The parts of kinfmu that this FMU needs."""\n',
         "kinfmu/fmu/__init__.py": b'"""The slave."""\n',
         "kinfmu/pythonfmu/__init__.py": b'"""The base class of pythonfmu."""\n',

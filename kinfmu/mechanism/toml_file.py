@@ -1,4 +1,4 @@
-"""Mechanism files: TOML to Mechanism and back. Messages name the file, the table, the key and what would be valid."""
+"""Mechanism files: TOML to Mechanism. Messages name the file, the table, the key and what would be valid."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from kinfmu.joints.laws import LAWS, External, Law
 from kinfmu.joints.measures import MEASURES, Measure
 from kinfmu.joints.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, Start
-from kinfmu.mechanism.expression import Computed
-from kinfmu.mechanism.law_table import law_keys, law_lines, read_law
+from kinfmu.mechanism.law_table import law_keys, read_law
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.number import written
 from kinfmu.mechanism.parameters import Parameter
@@ -34,7 +33,7 @@ from kinfmu.mechanism.toml_tables import (
     text_of,
 )
 from kinfmu.mechanism.valid import check_name
-from kinfmu.units import METRES, Quantity, unit_of
+from kinfmu.units import METRES, Quantity
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
@@ -223,62 +222,3 @@ def _parameter(name: str, value: Any) -> Parameter:
     if "value" not in value:
         raise MechanismError(f"{where} needs the key 'value'; keys: value, description")
     return Parameter(value["value"], description=text_of(f"{where} description", value.get("description", "")))
-
-
-def text(mechanism: Mechanism) -> str:
-    """The mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
-    lines = [f"name = {_toml(mechanism.name)}"]
-    if mechanism.title:
-        lines.append(f"title = {_toml(mechanism.title)}")
-    lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}"]
-    if mechanism.parameters:
-        lines += ["", "[parameters]", *(_written(name, p, mechanism) for name, p in mechanism.parameters.items())]
-    lines += ["", "[run]"]
-    lines += [f"{key.name} = {_toml(getattr(mechanism.run, key.name))}" for key in fields(RunSettings)]
-    for body in mechanism.bodies:
-        lines += ["", f"[bodies.{body.name}]"]
-        points = ", ".join(f"{name} = {_toml(point)}" for name, point in body.points.items())
-        lines.append(f"points = {{ {points} }}" if points else "points = {}")
-        start = ", ".join(f"{key} = {_toml(value)}" for key, value in body.start._asdict().items() if value is not None)
-        if start:
-            lines.append(f"start = {{ {start} }}")
-    for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
-        for member in members:
-            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}"]
-            for key in member_keys(type(member)):
-                value = getattr(member, key)
-                if key == "law":
-                    lines += law_lines(value, _toml)
-                else:
-                    lines.append(f"{key} = {_toml(value)}")
-    if mechanism.points:
-        lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
-    lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
-    return "\n".join(lines) + "\n"
-
-
-def _written(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
-    """The line of a parameter: its expression, or its number with the unit that tells what it measures."""
-    value: object = parameter.value
-    if parameter.expression is None and parameter.quantity and parameter.kind != "number":
-        value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
-    if not parameter.description:
-        return f"{name} = {_toml(value)}"
-    return f"{name} = {{ value = {_toml(value)}, description = {_toml(parameter.description)} }}"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, Computed):
-        value = value.expression.text
-    if isinstance(value, Measure):
-        keys = {key: getattr(value, key) for key in member_keys(type(value))}
-        said = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
-        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in said.items()) + " }"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(float(value))  # type: ignore[arg-type]  # all else is a number; numpy's print their type

@@ -9,7 +9,8 @@ import pytest
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Fixed, Mechanism, Revolute, Translational
 from kinfmu.errors import MobilityError
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from tests.mechanisms import five_bar, fourbar
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 import kinfmu.drivers
 from kinfmu.drivers import DRIVERS, Driver
 from kinfmu.equations.graph import evaluate
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.trace import Tracer
 from tests.joints.drawn import (
     coordinates,

@@ -16,7 +16,8 @@ from kinfmu.equations.reference import solve_reference
 from kinfmu.equations.system import System, size_of
 from kinfmu.errors import PoseError
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from tests import oracle
 
 MotionOf = Callable[..., list[NDArray[np.float64]]]  # (u, ud, udd) -> q, qd, qdd

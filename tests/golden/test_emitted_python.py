@@ -10,7 +10,8 @@ import pytest
 
 import kinfmu
 from kinfmu.backends.python import emit
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from kinfmu.plan import compile_plan
 
 

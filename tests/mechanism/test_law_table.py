@@ -22,7 +22,8 @@ from kinfmu import (
 from kinfmu.errors import MechanismError
 from kinfmu.joints.laws import Law
 from kinfmu.mechanism.law_table import law_keys
-from kinfmu.mechanism.toml_file import parse, read, text
+from kinfmu.mechanism.toml_file import parse, read
+from kinfmu.mechanism.toml_text import text
 
 ARM = """name = "arm"
 [units]

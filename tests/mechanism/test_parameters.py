@@ -16,7 +16,8 @@ from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute, Tra
 from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
 from kinfmu.mechanism.expression import Expression
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.origin import localized
 from kinfmu.sweep import solve
 from kinfmu.units import Quantity

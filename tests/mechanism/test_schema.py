@@ -21,7 +21,8 @@ from kinfmu.joints.laws import LAWS
 from kinfmu.joints.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
 from kinfmu.mechanism.schema import schema, schema_text
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from tests.mechanism.test_wrong_files import CHANGES, CRANK_ROCKER
 
 SCHEMA = Draft7Validator(schema())

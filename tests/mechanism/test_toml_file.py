@@ -20,7 +20,8 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Revolute
 from kinfmu.joints.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, Point, RunSettings, Start, expression
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from kinfmu.units import METRES
 
 FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ import tempfile
 import time
 from typing import Literal
 
-from kinfmu.mechanism.toml_file import text
+from kinfmu.mechanism.toml_text import text
 from tests.stress.families import FAMILIES
 from tests.stress.report import Report, details
 from tests.stress.trial import judged, trial

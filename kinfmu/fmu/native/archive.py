@@ -23,7 +23,7 @@ from kinfmu.fmu.description import Description, FmiVersion
 from kinfmu.fmu.interface import Drive, Interface, interface
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
 from kinfmu.fmu.native.sources import headers, sources
-from kinfmu.mechanism import toml_file
+from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 
 OPTIMIZED = ("-O3", "-falign-functions=64", "-falign-loops=32")  # unaligned, a step takes a tenth more at times
@@ -86,7 +86,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersi
     contents = {
         "modelDescription.xml": description.write(about, CAPABILITIES[fmi]),
         "documentation/index.html": documentation.page(variables).encode(),
-        "resources/mechanism.toml": toml_file.text(plan.mechanism).encode(),
+        "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
     }
     if fmi == "3.0":
         contents["sources/buildDescription.xml"] = _build_description(variables.name, units)

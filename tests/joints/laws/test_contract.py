@@ -19,7 +19,8 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.joints.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Spline
 from kinfmu.mechanism.law_table import law_keys
-from kinfmu.mechanism.toml_file import parse, text
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_text import text
 from tests.joints.drawn import coordinates, laws, splines
 from tests.power_series import Series
 
