@@ -59,15 +59,19 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
     return true;
 }
 
-/* The least length of a row over what is usual for it, at most 1: rows scaled to unit length hide one that vanishes. */
-double kf_row_part(int k, const double *matrix, const double *usual)
+/* The least length of a line over what is usual for it, at most 1: lines scaled to unit length hide one that vanishes.
+ *
+ * lines of so many entries, that begin `start` apart; entries of a line stand `step` apart.
+ */
+static double least_part(int lines, int start, int entries, int step, const double *matrix, const double *usual)
 {
     double least = 1.0;
     int i, j;
-    for (i = 0; i < k; ++i) {
+    for (i = 0; i < lines; ++i) {
         double square = 0.0, part;
-        for (j = 0; j < k; ++j) {
-            square += matrix[i * k + j] * matrix[i * k + j];
+        for (j = 0; j < entries; ++j) {
+            const double entry = matrix[i * start + j * step];
+            square += entry * entry;
         }
         part = sqrt(square) / usual[i];
         least = part < least ? part : least;
@@ -75,20 +79,16 @@ double kf_row_part(int k, const double *matrix, const double *usual)
     return least;
 }
 
-/* The same of the columns, for a tall matrix (m, k). */
+/* Of the rows of a square matrix. */
+double kf_row_part(int k, const double *matrix, const double *usual)
+{
+    return least_part(k, k, k, 1, matrix, usual);
+}
+
+/* Of the columns of a tall matrix (m, k). */
 double kf_column_part(int m, int k, const double *matrix, const double *usual)
 {
-    double least = 1.0;
-    int i, j;
-    for (j = 0; j < k; ++j) {
-        double square = 0.0, part;
-        for (i = 0; i < m; ++i) {
-            square += matrix[i * k + j] * matrix[i * k + j];
-        }
-        part = sqrt(square) / usual[j];
-        least = part < least ? part : least;
-    }
-    return least;
+    return least_part(k, 1, m, k, matrix, usual);
 }
 
 /* x with A x = b from the factors of A. */
