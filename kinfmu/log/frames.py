@@ -21,6 +21,7 @@ class Frames:
     def __init__(self, rec: rr.RecordingStream, run: Run, size: float, layer: float) -> None:
         self._rec, self._run, self._size, self._layer = rec, run, size, layer
         self._good = np.flatnonzero(run.good)
+        self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
     def move(self, path: str, pose: FloatArray) -> None:
         """Poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers."""
@@ -54,18 +55,16 @@ class Frames:
         """
         import rerun as rr
 
-        if not len(self._good):
-            return
         look = self._look(radius, order, [label] if label else [], shown)
         strip = [points.astype(np.float32)]
-        if self._run.good.all():
+        if self._always:
             self._rec.log(path, rr.LineStrips2D(strip, colors=[colour], **look), static=True)
-            return
-        self._rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
-        send(self._rec, path, self._run.t[self._good[:1]], lambda _: rr.LineStrips2D.columns(strips=strip))
-        turns = self.turns()
-        colours = np.array([colour if good else palette.OUT_OF_REACH for good in self._run.good[turns]], np.uint8)
-        send(self._rec, path, self._run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
+        elif len(self._good):
+            self._rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
+            self._with_first_pose(path, rr.LineStrips2D.columns(strips=strip))
+            turns = self.turns()
+            colours = np.array([colour if good else palette.OUT_OF_REACH for good in self._run.good[turns]], np.uint8)
+            send(self._rec, path, self._run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
 
     def points(
         self,
@@ -80,20 +79,20 @@ class Frames:
         """Points (k, 2) with their names, which stand still in their frame, from the first pose on."""
         import rerun as rr
 
-        if not len(self._good):
-            return
         look = {"colors": [colour], **self._look(radius, order, names, shown)}
         at = points.astype(np.float32)
-        if self._run.good.all():
+        if self._always:
             self._rec.log(path, rr.Points2D(at, **look), static=True)
-            return
-        self._rec.log(path, rr.Points2D.from_fields(**look), static=True)
-        columns = rr.Points2D.columns(positions=at).partition([len(at)])
-        send(self._rec, path, self._run.t[self._good[:1]], lambda _: columns)
+        elif len(self._good):
+            self._rec.log(path, rr.Points2D.from_fields(**look), static=True)
+            self._with_first_pose(path, rr.Points2D.columns(positions=at).partition([len(at)]))
 
     def turns(self) -> NDArray[np.int64]:
         """The first sample of each stretch with numbers, and of each without."""
         return np.flatnonzero(np.diff(self._run.good.astype(int), prepend=-1))
+
+    def _with_first_pose(self, path: str, columns: Any) -> None:
+        send(self._rec, path, self._run.t[self._good[:1]], lambda _: columns)
 
     def _look(self, radius: float, order: float, names: list[str], shown: bool) -> dict[str, Any]:
         """What lines and points are told alike."""
