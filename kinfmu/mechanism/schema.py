@@ -98,46 +98,55 @@ def _definitions() -> Schema:
             ]
         },
         "xy": _list(_ref("number"), 2, 2),
-        "body": _table(
-            {
-                "points": {
-                    "type": "object",
-                    "description": "Points [x, y] in the body's own frame",
-                    "propertyNames": _ref("name"),
-                    "additionalProperties": _ref("xy"),
-                },
-                "start": {
-                    "description": "A rough pose from which assembly starts",
-                    **_table(
-                        {
-                            "x": _number(Quantity("length"), "Of the frame's origin, in the world"),
-                            "y": _number(Quantity("length"), "Of the frame's origin, in the world"),
-                            "phi": _number(Quantity("angle"), "Angle of the frame; bare numbers are radians"),
-                        }
-                    ),
-                },
-            }
-        ),
-        "segment": {
-            "oneOf": [
-                _table(
-                    {
-                        "law": {"enum": [rise.type for rise in RISES]},
-                        "rise": _number(LawQuantity("led"), "How far, down if negative"),
-                        "duration": _number(LawQuantity("argument"), "How long"),
-                    },
-                    required=("law", "rise", "duration"),
-                ),
-                _table(
-                    {"law": {"const": DWELL}, "duration": _number(LawQuantity("argument"), "How long")},
-                    required=("law", "duration"),
-                ),
-            ]
-        },
+        "body": _body(),
+        "segment": _segment(),
         **{f"law_{law.type}": _law(law) for law in LAWS},
         "measure": {"oneOf": [_measure(cls) for cls in MEASURES]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},
         "driver": {"oneOf": [_member(cls, LAWS) for cls in DRIVERS]},
+    }
+
+
+def _body() -> Schema:
+    return _table(
+        {
+            "points": {
+                "type": "object",
+                "description": "Points [x, y] in the body's own frame",
+                "propertyNames": _ref("name"),
+                "additionalProperties": _ref("xy"),
+            },
+            "start": {
+                "description": "A rough pose from which assembly starts",
+                **_table(
+                    {
+                        "x": _number(Quantity("length"), "Of the frame's origin, in the world"),
+                        "y": _number(Quantity("length"), "Of the frame's origin, in the world"),
+                        "phi": _number(Quantity("angle"), "Angle of the frame; bare numbers are radians"),
+                    }
+                ),
+            },
+        }
+    )
+
+
+def _segment() -> Schema:
+    """A rise or a dwell of a sequence."""
+    return {
+        "oneOf": [
+            _table(
+                {
+                    "law": {"enum": [rise.type for rise in RISES]},
+                    "rise": _number(LawQuantity("led"), "How far, down if negative"),
+                    "duration": _number(LawQuantity("argument"), "How long"),
+                },
+                required=("law", "rise", "duration"),
+            ),
+            _table(
+                {"law": {"const": DWELL}, "duration": _number(LawQuantity("argument"), "How long")},
+                required=("law", "duration"),
+            ),
+        ]
     }
 
 
