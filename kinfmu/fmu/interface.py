@@ -206,7 +206,7 @@ def _inputs(plan: SolvePlan) -> Iterator[Variable]:
     starts = start_values(plan.mechanism)
     for driver in plan.drivers:
         for order, name in enumerate(driver.inputs):
-            wiring = " (estimated from the samples until it is first set to other than 0)" if order else ""
+            wiring = " (in co-simulation estimated from the samples until it is first set to other than 0)" if order else ""
             yield Variable(
                 name,
                 "Real",

@@ -24,7 +24,7 @@ from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.interrupt import interruptible
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
-from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.sink import Sink
@@ -89,7 +89,8 @@ def simulate(
         rows = np.empty((len(t), 0)) if table is None else table.at(t)
         kept = kept_samples(t, rate)
         settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-        text, xml = (_text_in(folder, name) for name in ("resources/mechanism.toml", "modelDescription.xml"))
+        xml = _text_in(folder, "modelDescription.xml")
+        text = _as_set(_text_in(folder, "resources/mechanism.toml"), settings)
         samples = Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
         if not _time_drives(interface, settings):
             samples.extend(undriven(interface, table, float(t[0])))
@@ -113,6 +114,17 @@ def simulate(
 
 def _text_in(folder: Path, name: str) -> str:
     return (folder / name).read_text(encoding="utf-8")
+
+
+def _as_set(mechanism_text: str, settings: Mapping[str, float | bool]) -> str:
+    """The mechanism as it moves: with the values that the FMU is given, where it can have them."""
+    mechanism = toml_file.parse(mechanism_text)
+    own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
+    values = {name: value for name, value in settings.items() if name in own}
+    try:
+        return toml_text.text(mechanism.with_parameters(values)) if values else mechanism_text
+    except MechanismError:
+        return mechanism_text  # the FMU will say why
 
 
 @contextmanager
