@@ -18,8 +18,8 @@ text-align: left; vertical-align: top }}</style></head>
 <h2>Driving it</h2>
 <p>While <code>driven_by_time</code> is true the law in the mechanism file drives; its constants are parameters. While
 it is false the inputs drive: {inputs}. Outputs follow a set input at once. Speed and acceleration inputs may stay
-unwired: in co-simulation they are then estimated from the samples, until they are first set to other than 0, with errors
-that fall with the step as h<sup>2</sup> and h. Model exchange takes them as they are: unwired they are 0.
+unwired: in co-simulation they are then estimated from the samples, until they are first set to other than 0, with
+errors that fall with the step as h<sup>2</sup> and h. Model exchange takes them as they are: unwired they are 0.
 <code>solver.error_qd</code> and <code>solver.error_qdd</code> count these errors; they are infinite at the first two
 and three samples, of which nothing is known.</p>
 <h2>When a pose cannot be reached</h2>

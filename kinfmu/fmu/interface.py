@@ -26,6 +26,7 @@ _COORDINATE_WORDS = {
     "y": ("y", "y velocity", "y acceleration"),
     "phi": ("Angle", "Angular velocity", "Angular acceleration"),
 }
+_WIRING = "in co-simulation estimated from the samples until it is first set to other than 0"
 _ORDER_WORDS = ("", "rate of ", "acceleration of ")
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
 
@@ -206,7 +207,7 @@ def _inputs(plan: SolvePlan) -> Iterator[Variable]:
     starts = start_values(plan.mechanism)
     for driver in plan.drivers:
         for order, name in enumerate(driver.inputs):
-            wiring = " (in co-simulation estimated from the samples until it is first set to other than 0)" if order else ""
+            wiring = f" ({_WIRING})" if order else ""
             yield Variable(
                 name,
                 "Real",
