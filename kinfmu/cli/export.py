@@ -80,8 +80,9 @@ def _between(run: Run, start: float | None, stop: float | None) -> Run:
 def export(run: Path, output: Path, columns: str | None, start: float | None, stop: float | None) -> None:
     """Write a run as a table, as plots, or as a moving picture.
 
-    RUN is a record (.mcap) of simulate. A table holds all columns, or those named; Parquet and npz the units, too.
-    Plots (.svg, .png) show coordinates against time, with velocity and acceleration; a .gif shows the linkage move.
+    RUN is a record (.mcap) of simulate or solve. A table holds all columns, or those named; Parquet and npz
+    the units, too. Plots (.svg, .png) show coordinates against time, with velocity and acceleration; a .gif shows the
+    linkage move.
     """
     from kinfmu.log import read
 

@@ -22,7 +22,7 @@ from kinfmu.errors import listed
 def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
     """Look at a run in the Rerun viewer, or at two compared.
 
-    RUN and OTHER are records (.mcap) of simulate; RUN may be a recording (.rrd).
+    RUN and OTHER are records (.mcap) of simulate or solve; RUN may be a recording (.rrd).
     """
     from kinfmu.log import review as reviewed
 

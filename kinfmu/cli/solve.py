@@ -1,4 +1,4 @@
-"""kinfmu solve: a run as a table."""
+"""kinfmu solve: a run as a table, or as a record."""
 
 from __future__ import annotations
 
@@ -16,18 +16,26 @@ from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
 from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
+from kinfmu.suffix import suffix_of
 from kinfmu.units import Quantity, in_turns, like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.drivers import Driver
 
 TABLES = (".csv", ".parquet", ".npz")
+RECORD = ".mcap"
 HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn that was not meant
 
 
 @main.command(epilog="Example: kinfmu solve fourbar -o run.csv --angle 0deg:360deg:361")
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
-@click.option("-o", "output", type=OutputFile(*TABLES), required=True, help="The table to write: .csv, .parquet, .npz.")
+@click.option(
+    "-o",
+    "output",
+    type=OutputFile(*TABLES, RECORD),
+    required=True,
+    help=f"The table to write: {listed(TABLES)}; or the record, {RECORD}, which review shows and export plots.",
+)
 @click.option(
     "--times",
     type=Range(Quantity("time"), "STEP"),
@@ -52,7 +60,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn t
     help="native: generated C, compiled first, for long sweeps; auto chooses by the number of samples.",
 )
 @set_option
-@stopped("stopped before the table was whole: nothing was written")
+@stopped("stopped before the run was whole: nothing was written")
 def solve(
     mechanism: str,
     output: Path,
@@ -63,12 +71,12 @@ def solve(
     outputs: str | None,
     engine: str,
 ) -> None:
-    """Solve a mechanism at times or driver values, into a table.
+    """Solve a mechanism at times or driver values, into a table or a record.
 
     The table has a row for each sample: positions, velocities and accelerations of all outputs, status and error
-    estimates.
+    estimates. A record (.mcap) holds the mechanism too, for review and export.
     """
-    from kinfmu.log import write_table
+    from kinfmu.log import write_mcap, write_table
     from kinfmu.mechanism import RunSettings
     from kinfmu.sweep import run_times
     from kinfmu.sweep import solve as solved
@@ -97,7 +105,10 @@ def solve(
             tolerance=tolerance_of(given),
             **samples,
         )
-    write_table(run, output)
+    if suffix_of(output) == RECORD:
+        write_mcap(run, output)
+    else:
+        write_table(run, output)
     tell_of(run)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run, by_samples=angle is not None)

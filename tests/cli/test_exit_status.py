@@ -47,7 +47,7 @@ WRONG_USAGE = [
     ("schema -o none/schema.json", "there is no folder 'none'"),
     ("solve fourbar", "Missing option '-o'"),
     ("solve forbar -o run.csv", "did you mean 'fourbar'?"),
-    ("solve fourbar -o run.xls", "run.xls: its name must end in one of .csv, .parquet, .npz"),
+    ("solve fourbar -o run.xls", "run.xls: its name must end in one of .csv, .parquet, .npz, .mcap"),
     ("solve fourbar -o none/run.csv", "there is no folder 'none'"),
     ("solve fourbar -o run.csv --set crank.sped=1", "did you mean 'crank.speed'?"),
     ("solve fourbar -o run.csv --outputs roker.phi", "did you mean 'rocker.phi'?"),

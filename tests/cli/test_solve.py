@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
+from kinfmu.log import read
 from tests.cli.conftest import Command, read_csv
 
 
@@ -58,6 +60,21 @@ def test_a_parquet_table_has_the_columns_of_the_csv(command: Command, tmp_path: 
     assert command("solve", "fourbar", "-o", "run.parquet", "--times", "0:2:1").exit_code == 0
     assert command("solve", "fourbar", "-o", "run.csv", "--times", "0:2:1").exit_code == 0
     assert parquet.read_table(tmp_path / "run.parquet").column_names == list(read_csv(tmp_path / "run.csv"))
+
+
+def test_a_solved_run_is_recorded_for_plots_and_the_viewer(command: Command, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    angles = ("--angle", "0deg:360deg:37")
+    told = command("solve", "fourbar", "-o", "run.mcap", *angles).stdout
+    assert told.endswith("written to run.mcap\n")
+    run = read(tmp_path / "run.mcap")
+    solved = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.linspace(0.0, 360.0, 37)))
+    np.testing.assert_allclose(run.values, solved.values, atol=1e-12)
+    assert run.mechanism_text == solved.mechanism_text != ""
+    assert command("export", "run.mcap", "-o", "run.svg").exit_code == 0
+    assert command("solve", "fourbar", "-o", "run.csv", *angles).exit_code == 0
+    assert command("export", "run.mcap", "-o", "exported.csv").exit_code == 0
+    assert (tmp_path / "exported.csv").read_bytes() == (tmp_path / "run.csv").read_bytes()
 
 
 def test_a_setting_changes_the_law(command: Command, tmp_path: Path) -> None:
@@ -159,8 +176,8 @@ def test_a_value_of_an_option_that_cannot_be_meant_is_wrong_usage(
     ("arguments", "told"),
     [
         ((), "Missing option '-o'."),
-        (("-o", "run.xyz"), "Invalid value for '-o': run.xyz: its name must end in one of .csv, .parquet, .npz"),
-        (("-o", "run"), "Invalid value for '-o': run: its name must end in one of .csv, .parquet, .npz"),
+        (("-o", "run.xyz"), "Invalid value for '-o': run.xyz: its name must end in one of .csv, .parquet, .npz, .mcap"),
+        (("-o", "run"), "Invalid value for '-o': run: its name must end in one of .csv, .parquet, .npz, .mcap"),
         (("-o", "run.csv", "--times", "0:1:1", "--angle", "0:1:2"), "--times and --angle cannot both drive"),
     ],
 )

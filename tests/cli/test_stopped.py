@@ -39,5 +39,5 @@ def test_solve_that_is_stopped_says_that_nothing_was_written(
 ) -> None:
     monkeypatch.setattr(early, press)
     told = fails("solve", "fourbar", "-o", "run.csv")
-    assert told == "stopped before the table was whole: nothing was written"
+    assert told == "stopped before the run was whole: nothing was written"
     assert list(tmp_path.iterdir()) == []
