@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -13,6 +13,7 @@ from kinfmu.run import FloatArray, IntArray, Run
 
 ALWAYS = ("time", "solver.status")  # without them nobody can tell what a sample is
 DRAWN = "drawn"
+GROUPS_OF_COORDINATES = ("q", "points", "all")
 ROUNDING = 1e-9  # of a period: what a sample may come early
 
 
@@ -64,6 +65,39 @@ def select(run: Run, channels: Sequence[str] | None = None, rate: float | None =
     rows = kept_samples(run.t, rate)
     part = run if len(rows) == len(run) else run.part(rows, events=run.events)
     return part.without(absent_columns(run, channels))
+
+
+def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
+    """The coordinates of which `names` choose a column, in the order named.
+
+    Names: as those of `absent_columns`, 'coupler.vx' chooses 'coupler.x'; fixed coordinates by their own. Raises a
+    RequestError for a name that is not known, or that chooses no coordinate.
+    """
+    owners = {derivative_name(name, order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
+    groups, columns = _groups(run), [place.name for place in run.places()]
+    kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
+    for name in names:
+        if name.startswith("-"):
+            left_out = _named(name[1:], groups, columns)
+            kept = {column: None for column in kept if column not in left_out}
+        else:
+            found = _of_coordinates(name, owners, groups, columns)
+            kept |= dict.fromkeys(column for column in owners if column in found)
+    return tuple(dict.fromkeys(owners[column] for column in kept if column in owners))
+
+
+def _of_coordinates(
+    name: str, owners: Mapping[str, str], groups: dict[str, set[str]], columns: Sequence[str]
+) -> set[str]:
+    """The columns of coordinates under a name, those that were not kept too; an error if there are none."""
+    found = {name} if name in owners else groups.get(name, {column for column in columns if fnmatchcase(column, name)})
+    if found.isdisjoint(owners):
+        known = dict.fromkeys(owners.values())
+        raise RequestError(
+            f"the run has no coordinate '{name}'{suggestion(name, [*owners, *GROUPS_OF_COORDINATES])}; "
+            f"coordinates: {listed(known)}, or {listed(GROUPS_OF_COORDINATES)}, with * for any letters"
+        )
+    return found
 
 
 def _groups(run: Run) -> dict[str, set[str]]:

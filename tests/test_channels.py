@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from typing import NoReturn
 
 import numpy as np
 import pytest
 
-from kinfmu.channels import absent_columns, is_drawn, kept_samples, select
-from kinfmu.errors import KinfmuError
+from kinfmu.channels import absent_columns, coordinates, is_drawn, kept_samples, select
+from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.run import Run
 from tests.log.runs import fourbar
 
@@ -69,6 +70,34 @@ def test_an_unknown_channel_is_told_with_what_comes_near() -> None:
         absent_columns(run(), ["margins"])
     with pytest.raises(KinfmuError, match=r"did you mean 'coupler\.vx'\?; .*, or columns such as 'crank\.phi', with"):
         absent_columns(run(), ["coupler.vxx"])
+
+
+def test_coordinates_are_chosen_as_columns_are_in_the_order_named() -> None:
+    run = fourbar(np.arange(3.0))
+    assert coordinates(run, ["rocker.phi", "coupler.*", "coupler.x"]) == (
+        "rocker.phi",
+        "coupler.x",
+        "coupler.y",
+        "coupler.phi",
+    )
+    assert coordinates(run, ["q"]) == coordinates(run, ["qdd"]) == run.names
+    assert coordinates(run, ["all"]) == coordinates(run, ["-error"]) == coordinates(run, ["-qd"]) == run.outputs
+    assert coordinates(run, ["points", "-A.*"]) == tuple(n for n in run.outputs[run.coordinate_count :] if n[0] != "A")
+    assert coordinates(run, ["coupler.v?"]) == ("coupler.x", "coupler.y")
+    assert coordinates(run, ["rocker.x", "crank.vy"]) == ("rocker.x", "crank.y")  # fixed ones
+    assert coordinates(select(run, ["q"]), ["A.x"]) == ("A.x",)
+
+
+def test_what_is_no_coordinate_is_told_with_those_that_are() -> None:
+    run = fourbar(np.arange(3.0))
+    told = "; coordinates: crank.phi, coupler.x, .*, or q, points, all, with [*] for any letters$"
+    for name in ("solver.residual", "error", "none", "ram.*", "time"):
+        with pytest.raises(RequestError, match=rf"^the run has no coordinate '{re.escape(name)}'{told}"):
+            coordinates(run, ["coupler.x", name])
+    with pytest.raises(RequestError, match=r"no coordinate 'cupler\.vx'; did you mean 'coupler\.vx'\?; coord"):
+        coordinates(run, ["cupler.vx"])
+    with pytest.raises(RequestError, match=r"channel 'cupler\.x' is not known"):
+        coordinates(run, ["q", "-cupler.x"])
 
 
 def test_what_is_left_out_is_not_computed() -> None:

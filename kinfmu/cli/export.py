@@ -72,8 +72,8 @@ def _between(run: Run, start: float | None, stop: float | None) -> Run:
 @click.option(
     "--columns",
     metavar="NAMES",
-    help="Coordinates to plot, such as coupler.x,rocker.phi; else those of q. Columns of a table, named as simulate "
-    "--channels names them: coupler.x, coupler.*, q, -error; else all. Time and status are always there.",
+    help="Columns of a table, named as simulate --channels names them: coupler.x, coupler.*, q, -error; else all. Time "
+    "and status are always there. Plots take the same names, for coordinates; else those of q.",
 )
 @click.option("--start", type=TIME, help="Only samples from then on [s].")
 @click.option("--stop", type=TIME, help="Only samples until then [s].")

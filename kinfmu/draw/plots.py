@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.channels import coordinates
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, ink
 from kinfmu.draw.writing import check_suffix, write
-from kinfmu.errors import FigureError, listed, suggestion
+from kinfmu.errors import FigureError
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
@@ -37,28 +38,23 @@ _LOST: palette.Colour = (246, 222, 222)
 def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
     """Draw coordinates of `run` against time into a .svg or .png file, as a report prints them.
 
-    columns: coordinates such as 'coupler.x', all generalized coordinates if none are named. Each is a column of three
-    panels: position, velocity and acceleration, in rad and the mechanism's unit of length. Stretches without numbers
-    are gaps on a tinted ground; panels of what was not kept say so. The same run gives the same bytes.
+    columns: names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as those of tables; all generalized
+    coordinates if there are none. Each coordinate is a column of three panels: position, velocity and acceleration, in
+    rad and the mechanism's unit of length. Stretches without numbers are gaps on a tinted ground; panels of what was
+    not kept say so. The same run gives the same bytes.
 
-    Raises FigureError for an unknown name, more than MOST_COORDINATES of them, a run without samples, another suffix,
-    or a file that cannot be written; MissingPackageError without matplotlib.
+    Raises RequestError for a name that is no coordinate; FigureError for more than MOST_COORDINATES of them, a run
+    without samples, another suffix, or a file that cannot be written; MissingPackageError without matplotlib.
     """
     path = Path(path)
     check_suffix(path)
-    names = _chosen(run, tuple(dict.fromkeys(columns)), path)
+    names = _chosen(run, columns, path)
     write(path, lambda: _sheet(run, names))
 
 
-def _chosen(run: Run, columns: tuple[str, ...], path: Path) -> tuple[str, ...]:
+def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[str, ...]:
     """Names of coordinates that the run holds."""
-    known = (*run.outputs, *run.fixed)
-    for name in columns:
-        if name not in known:
-            raise FigureError(
-                f"{path}: the run has no coordinate '{name}'{suggestion(name, known)}; coordinates: {listed(known)}"
-            )
-    names = columns or run.names or run.outputs
+    names = coordinates(run, columns) if columns else run.names or run.outputs
     if len(names) > MOST_COORDINATES:
         raise FigureError(
             f"{path}: {len(names)} coordinates are too many for one sheet, which holds {MOST_COORDINATES}; choose some "

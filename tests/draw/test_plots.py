@@ -12,7 +12,7 @@ import pytest
 from kinfmu.channels import select
 from kinfmu.draw import plot
 from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
-from kinfmu.errors import FigureError
+from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
 
@@ -96,7 +96,7 @@ def test_what_was_not_kept_is_an_empty_panel_that_says_so(run: Run) -> None:
 
 
 def test_what_cannot_be_plotted_is_said(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(FigureError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
+    with pytest.raises(RequestError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
         plot(run, tmp_path / "run.svg", ["cupler.x"])
     with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is no figure that can be drawn; known: \.svg, \.png"):
         plot(run, tmp_path / "run.jpg")
