@@ -19,6 +19,7 @@ from kinfmu.swept import Driven
 from tests.fmu.test_parameters import geared, linkage
 from tests.mechanisms import uneven_chain
 
+ENGINES = ("native", "python")
 SAMPLES = 1100  # enough for samples to be solved side by side
 
 
@@ -190,6 +191,25 @@ def test_what_lies_past_a_limit_is_told_and_the_branch_comes_back() -> None:
     assert [event.text for event in native.events] == [event.text for event in python.events]
 
 
+@pytest.mark.parametrize("turns", [1_000, 15_000])
+def test_thousands_of_turns_on_a_sample_is_as_good_as_at_first(turns: int) -> None:
+    u = 2.0 * np.pi * turns + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
+    native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)
+    assert (native.status == 0).all()
+    assert native.residual.max() <= 1e-14
+    is_length = [not name.endswith(".phi") for name in native.outputs]  # of angles, digits are lost to the turns
+    for order, name in enumerate(("values", "rates", "accelerations")):
+        ours, theirs = (getattr(run, name)[:, is_length] for run in (native, python))
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=(1e-12, 1e-11, 1e-10)[order] * np.abs(theirs).max())
+
+
+def test_no_good_sample_leaves_more_than_the_tolerance() -> None:
+    u = np.linspace(9e4, 9e4 + 7.0, 700)
+    run = kinfmu.solve(kinfmu.load("jansen_leg"), engine="native", crank_angle=u, tolerance=1e-12)
+    assert run.good.all()
+    assert run.residual[run.good].max() <= 1e-12
+
+
 def test_tables_may_lie_by_samples_or_by_outputs() -> None:
     u = np.linspace(0.5, 2.0, SAMPLES)
     mechanism = kinfmu.load("fourbar")
@@ -258,6 +278,10 @@ def test_times_and_tables_may_be_views_of_others() -> None:
     plain = kinfmu.solve(mechanism, t.copy(), engine="native")
     np.testing.assert_array_equal(strided.values, plain.values)
     np.testing.assert_array_equal(strided.accelerations, plain.accelerations)
+    size = SAMPLES * 7 * 8
+    odd = tuple(np.zeros(size + 3, dtype=np.uint8)[3:].view(np.float64).reshape(SAMPLES, 7) for _ in range(3))
+    kinfmu.solve(mechanism, t, engine="native", out=odd)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(odd[2], plain.accelerations)
     out[1].flags.writeable = False
     with pytest.raises(KinfmuError, match="out: rates is read-only"):
         kinfmu.solve(mechanism, t, engine="native", out=out)  # type: ignore[arg-type]

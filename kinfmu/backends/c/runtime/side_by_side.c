@@ -9,6 +9,8 @@
 #define SURE 0.05           /* determinant from which samples may be solved here: it leaves nine digits of qdd */
 #define MOST_MOVED 1e-3     /* correction beyond which one does not arrive, nor rotations do */
 #define CLOSED 1e-30        /* squared residual of what has arrived, for angles of some radians */
+#define SOME 40.0           /* [rad^2, sizes^2]; those of a turn, squared */
+#define SETTLED 1e-7        /* second correction up to which a residual is what rounding of far angles leaves */
 #define BRIDGED 1e-24       /* squared residual of what closes in a window */
 #define MOST_CACHED 4000000 /* [bytes] of tables up to which they go through the caches */
 #define FEWEST 8            /* samples in a window that are worth lanes */
@@ -141,10 +143,19 @@ static bool has_motion(const kf_job *job)
     return job->tables[1].start != NULL || job->tables[2].start != NULL;
 }
 
+/* What a residual's square may be at most, however far the driver is. */
+static double square_of_tolerance(const kf_sweep *sweep)
+{
+    const double tolerance = sweep->follower.solver.tolerance;
+    return tolerance * tolerance;
+}
+
 /* Correct and check what is predicted at driver values u: how many passes it took. alone[i]: in doubt. */
 static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
 {
     const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
+    const double most = square_of_tolerance(sweep);
+    const bool may_settle = !sweep->segments.repeats;
     kf_lanes *const lanes = sweep->lanes;
     int i, k, passes;
     for (passes = 1;; ++passes) {
@@ -154,7 +165,10 @@ static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
         for (i = 0; i < KF_LANES; ++i) {
             const double margin = lanes->margin[i], moved = lanes->moved[i];
             const bool is_trusted = (margin >= SURE) & (KF_TRUST * moved <= margin) & (moved <= MOST_MOVED);
-            const bool has_arrived = lanes->error[i] <= CLOSED * (1.0 + u[i] * u[i] * per_square);
+            const double error = lanes->error[i], far = u[i] * u[i] * per_square;
+            const bool has_closed = error <= CLOSED * (1.0 + (far < SOME ? far : SOME));
+            const bool is_settled = may_settle & (passes == 2) & (moved <= SETTLED) & (error <= CLOSED * (1.0 + far));
+            const bool has_arrived = (has_closed | is_settled) & (error <= most);
             open += is_trusted & !has_arrived & !alone[i];
             alone[i] |= !(is_trusted & (has_arrived | (passes == 1)));
         }
@@ -232,7 +246,7 @@ static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *windo
 {
     const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
     const kf_model *const model = &sweep->follower.solver.model;
-    const double tolerance = sweep->follower.solver.tolerance;
+    const double tolerance = sweep->follower.solver.tolerance, most = square_of_tolerance(sweep);
     kf_lanes *const lanes = sweep->lanes;
     double u[KF_LANES], turns[KF_LANES];
     int i, j, k, order;
@@ -252,8 +266,8 @@ static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *windo
     for (i = 0; i < count; ++i) {
         const int64_t sample = samples[i].sample;
         const double error = lanes->error[i], margin = lanes->margin[i], moved = lanes->moved[i];
-        bool is_good = error <= BRIDGED * (1.0 + u[i] * u[i] * per_square) && margin >= SURE && KF_TRUST * moved <= margin
-            && moved <= MOST_MOVED;
+        bool is_good = error <= BRIDGED * (1.0 + u[i] * u[i] * per_square) && error <= most && margin >= SURE
+            && KF_TRUST * moved <= margin && moved <= MOST_MOVED;
         for (k = 0; k < KF_WATCHES; ++k) {
             is_good = is_good && fabs(lanes->watches[k][i]) <= tolerance;
         }
