@@ -38,7 +38,9 @@ class NativeEngine:
 
     def sweep(self, driven: Driven, tables: Tables) -> Swept:
         """Fill the tables; what cannot be reached is NaN there."""
-        plain = all(stride > 0 and stride % 8 == 0 for table in tables for stride in table.strides)
+        plain = all(
+            table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
+        )
         filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
         told = self._library.sweep(driven, filled, self._parameters, self._tolerance)
         for table, values in zip(tables, filled, strict=True):
