@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kinfmu.channels import coordinates
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, ink
+from kinfmu.draw.title import TITLE_FONT, TITLE_LINE, title_lines
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
 from kinfmu.naming import derivative_name, quantity_of
@@ -28,8 +29,9 @@ if TYPE_CHECKING:
 MOST_COORDINATES = 30  # more make a sheet that nobody prints
 _ABREAST = 3  # coordinates beside each other
 _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its surroundings
-_LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 8.0, 44.0, 34.0  # [pt] around all panels
+_LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
+_EDGE = 8.0  # [pt] around the title
 _LABEL = 40.0  # [pt] from an axis to its name
 _BINS = 1500  # of a long run; each shows its least and its greatest value
 _LOST: palette.Colour = (246, 222, 222)
@@ -72,16 +74,18 @@ def _sheet(run: Run, names: Sequence[str]) -> Figure:
     blocks = -(-len(names) // _ABREAST)
     block = 3.0 * _HEIGHT + _BLOCK_GAP
     width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
-    height = _TOP + blocks * block - _BLOCK_GAP - _GAP + _BOTTOM
+    title = title_lines(run.info.get("title") or run.info.get("name") or "", width - 2.0 * _EDGE)
+    above = _TOP + max(len(title) - 1, 0) * TITLE_LINE
+    height = above + blocks * block - _BLOCK_GAP - _GAP + _BOTTOM
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    title = run.info.get("title") or run.info.get("name") or ""
-    made.text(8.0 / width, 1.0 - 8.0 / height, title, fontsize=11.0, va="top", color=ink(INK), parse_math=False)
+    look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
+    made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(title), **look)
     for index, name in enumerate(names):
         row, column = divmod(index, _ABREAST)
         left = _LEFT + column * _WIDTH
         panels: list[Axes] = []
         for order in range(3):
-            top = height - _TOP - row * block - order * _HEIGHT
+            top = height - above - row * block - order * _HEIGHT
             size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
             axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
             panels.append(axes)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinfmu.draw.title import TITLE_FONT, TITLE_LINE, title_lines
 from kinfmu.run import FloatArray
 from kinfmu.shapes.palette import Colour
 
@@ -221,7 +222,9 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
     from matplotlib.figure import Figure
 
     left, bottom = (_LEFT, _BOTTOM) if unit else (_EDGE, _EDGE)
-    width, height = paper[0] + left + _RIGHT, paper[1] + bottom + _TOP
+    lines = title_lines(title, float(paper[0]))
+    width = paper[0] + left + _RIGHT
+    height = paper[1] + bottom + _TOP + max(len(lines) - 1, 0) * TITLE_LINE
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
     axes = made.add_axes((left / width, bottom / height, paper[0] / width, paper[1] / height))
     axes.set_xlim(low[0], high[0])
@@ -231,7 +234,15 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
         axes.set_xticks([])  # which take long to place, seen or not
         axes.set_yticks([])
         above: Any = {"va": "bottom", "transform": axes.transAxes}
-        axes.text(0.0, 1.0 + 6.0 / paper[1], title, fontsize=11.0, color=ink(INK), parse_math=False, **above)
+        axes.text(
+            0.0,
+            1.0 + 6.0 / paper[1],
+            "\n".join(lines),
+            fontsize=TITLE_FONT,
+            color=ink(INK),
+            parse_math=False,
+            **above,
+        )
         return made, axes
     grey = ink(GREY)
     axes.tick_params(labelsize=8.0, length=3.0, width=0.6, color=grey, labelcolor=grey)
@@ -241,7 +252,7 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
         spine.set_visible(side in ("left", "bottom"))
         spine.set_linewidth(0.6)
         spine.set_color(grey)
-    axes.set_title(title, fontsize=11.0, loc="left", color=ink(INK), parse_math=False)
+    axes.set_title("\n".join(lines), fontsize=TITLE_FONT, loc="left", color=ink(INK), parse_math=False)
     return made, axes
 
 
