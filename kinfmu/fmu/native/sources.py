@@ -30,6 +30,11 @@ _STEP = (
     "instance.c",
     "variables.c",
 )  # what a step goes through
+_HINTS = (  # a step is short: pairs of numbers just written one by one would be waited for, and branches are foreseen
+    "#if defined(__GNUC__) && !defined(__clang__)",
+    '#pragma GCC optimize("no-tree-vectorize", "no-tree-slp-vectorize", "no-if-conversion")',
+    "#endif",
+)
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
@@ -45,6 +50,7 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
 def _step(version: str) -> str:
     """step.c: files that the compiler shall see as one, so that a step is not a way through many small functions."""
     lines = ["/* What set, step and get go through, as one unit. Files included here are not compiled on their own. */"]
+    lines += _HINTS
     lines += [f'#include "{name}"' for name in (*_STEP, f"fmi{version[0]}.c")]
     return "\n".join(lines) + "\n"
 
