@@ -153,7 +153,7 @@ fmi3Status fmi3Reset(fmi3Instance instance)
 }
 
 /* Every variable is a scalar: as many values as references. */
-static fmi3Status wrong_count(fmi3Instance instance, size_t references, size_t values)
+static KF_RARE fmi3Status wrong_count(fmi3Instance instance, size_t references, size_t values)
 {
     return (fmi3Status)kf_answered(common(instance), KF_ERROR, "%zu value references, but %zu values: every variable is a scalar",
                               references, values);
