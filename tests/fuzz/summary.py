@@ -1,0 +1,53 @@
+"""What a part of the hostile suite tried and found."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Finding(NamedTuple):
+    """One fault: the seed that repeats it, the kind of trial, and what was seen."""
+
+    seed: int
+    kind: str
+    text: str
+
+
+@dataclass
+class Summary:
+    """Trials counted by kind, and the findings."""
+
+    part: str
+    tried: Counter[str] = field(default_factory=Counter)
+    findings: list[Finding] = field(default_factory=list)
+
+    def count(self, kind: str, number: int = 1) -> None:
+        """Count trials of a kind."""
+        self.tried[kind] += number
+
+    def find(self, seed: int, kind: str, text: str) -> None:
+        """Keep a finding."""
+        self.findings.append(Finding(seed, kind, text))
+
+    def lines(self) -> list[str]:
+        """The counts, then each finding with the command that repeats it."""
+        counts = ", ".join(f"{count} {kind}" for kind, count in sorted(self.tried.items()))
+        found = [
+            f"  {one.kind}: {one.text}\n    scripts/fuzz {self.part} --seed {one.seed} --seconds 0"
+            for one in self.findings
+        ]
+        return [f"{self.part}: {self.tried.total()} trials ({counts}), {len(found)} findings", *found]
+
+
+def seeds(first: int, seconds: float) -> Iterator[int]:
+    """Seeds from `first` on until `seconds` have passed; at least one."""
+    end = time.monotonic() + seconds
+    for seed in itertools.count(first):
+        yield seed
+        if time.monotonic() >= end:
+            return
