@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
-from .message import LOCATED, place
+from .message import LOCATED, ROUGHLY, differs, place
 from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road
 from .road import Road, Searched
 from .span import REGULAR
@@ -258,7 +258,7 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
     why = f"branches of {names} cross" if limit.crosses else f"{names} would part"
-    asked = place(model, target)
-    if asked == place(model, limit.u):
-        asked = place(model, target, LOCATED)
+    if not differs(model, target, limit.u, LOCATED):
+        return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit, where {why}"
+    asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)
     return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}, where {why}"

@@ -7,6 +7,7 @@ from .pose import Model, Vector
 ROUGHLY, LOCATED = 6, 10  # digits; limits are located to 1e-10 rad
 _DEGREE = 57.29577951308232  # to a radian
 _LARGE = 1e6  # [rad]; beyond, decimals say nothing
+_MORE = 6  # digits that such numbers have before the point
 
 
 def place(model: Model, u: Vector, digits: int = ROUGHLY) -> str:
@@ -20,9 +21,21 @@ def place(model: Model, u: Vector, digits: int = ROUGHLY) -> str:
     return ", ".join(said)
 
 
+def differs(model: Model, a: Vector, b: Vector, digits: int) -> bool:
+    """Return whether `place` shows a driver of two places with different digits: of an angle, in rad and in degrees."""
+    for kind, first, second in zip(model.DRIVER_KINDS, a, b, strict=True):
+        if kind != "angle":
+            is_same = f"{first:.{digits}g}" == f"{second:.{digits}g}"
+        else:  # in degrees there are fewer digits
+            is_same = _decimals(first * _DEGREE, digits - 2) == _decimals(second * _DEGREE, digits - 2)
+        if not is_same:
+            return True
+    return False
+
+
 def _decimals(value: float, count: int) -> str:
     """A number to so many decimals, without zeros at its end."""
     if not -_LARGE < value < _LARGE:
-        return f"{value:.{count}g}"
+        return f"{value:.{count + _MORE if count > ROUGHLY else count}g}"
     said = f"{value:.{count}f}".rstrip("0").rstrip(".")
     return "0" if said == "-0" else said

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import re
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,7 +13,9 @@ import pytest
 import kinfmu
 from kinfmu.backends.python import load_model
 from kinfmu.plan import compile_plan
+from kinfmu.solver.advance import Limit, limit_message
 from kinfmu.solver.message import LOCATED, place
+from tests.backends.native import Native
 
 DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)^2
 
@@ -25,6 +30,7 @@ DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)
         (-2e-16, LOCATED, "crank = 0 rad (0 deg)"),
         (100.0, 6, "crank = 100 rad (5729.578 deg)"),
         (1e300, 6, "crank = 1e+300 rad (5.73e+301 deg)"),
+        (2e6 + 1e-8, LOCATED, "crank = 2000000.00000001 rad (114591559.02617 deg)"),
         (math.inf, 6, "crank = inf rad (inf deg)"),
     ],
 )
@@ -55,3 +61,35 @@ def test_what_cannot_be_reached_is_told_apart_from_the_limit(engine: str, beyond
     limit = "left = 1.4937971861 rad (85.58827421 deg)"
     why = "coupler.phi, right.phi would part"
     assert event.text == f"{asked} cannot be reached: the limit is {limit}, where {why}"
+
+
+class NativeLimit(ctypes.Structure):
+    """kf_limit of a mechanism with one driver."""
+
+    _fields_ = (("u", ctypes.c_double * 1), ("block", ctypes.c_int), ("crosses", ctypes.c_bool))
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Native]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield Native(compile_plan(kinfmu.load("triple_rocker")))
+
+
+def said_by_native(native: Native, limit: float, asked: float) -> str:
+    text = ctypes.create_string_buffer(480)
+    found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
+    native.c.kf_say_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked))
+    return text.value.decode()
+
+
+@pytest.mark.parametrize("turns", [0, 5, 1_000_000])
+@pytest.mark.parametrize("beyond", [3e-9, 1e-10, 3e-11, 1e-12, 0.0])
+def test_a_refused_value_never_has_the_digits_of_its_limit(native: Native, turns: int, beyond: float) -> None:
+    model = load_model(compile_plan(kinfmu.load("triple_rocker")))
+    limit = DEAD_CENTRE + turns * math.tau
+    text = limit_message(model, Limit((limit,), 0), (limit + beyond,))
+    assert text == said_by_native(native, limit, limit + beyond)
+    numbers = re.findall(r"(\S+) rad \((\S+) deg\)", text)
+    assert all(len(set(column)) == len(column) for column in zip(*numbers, strict=True)), text
+    assert len(numbers) == 2 or "cannot be reached: to these digits it is the limit, where" in text

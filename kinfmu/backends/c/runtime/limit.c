@@ -57,18 +57,22 @@ bool kf_is_beyond(const double *target, const double *limit, const double *direc
 /* Why a target cannot be reached, in one line. */
 void kf_say_limit(char *message, const kf_limit *limit, const double *target)
 {
-    char asked[KF_MESSAGE] = "", there[KF_MESSAGE] = "";
     int k;
-    kf_say_place(asked, target, KF_ROUGHLY);
-    kf_say_place(there, limit->u, KF_ROUGHLY);
     if (limit->block == KF_TOO_FAR) {
-        kf_say(message, "%s is too far from %s", asked, there);
+        kf_say_place(message, target, KF_ROUGHLY);
+        kf_say(message, " is too far from ");
+        kf_say_place(message, limit->u, KF_ROUGHLY);
         kf_say(message, ": more than %d steps on one way", KF_MOST_STEPS);
         return;
     }
-    kf_say_place(message, target, strcmp(asked, there) == 0 ? KF_LOCATED : KF_ROUGHLY);
-    kf_say(message, " cannot be reached: the limit is ");
-    kf_say_place(message, limit->u, KF_LOCATED);
+    if (!kf_differs(target, limit->u, KF_LOCATED)) {
+        kf_say_place(message, target, KF_LOCATED);
+        kf_say(message, " cannot be reached: to these digits it is the limit");
+    } else {
+        kf_say_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED);
+        kf_say(message, " cannot be reached: the limit is ");
+        kf_say_place(message, limit->u, KF_LOCATED);
+    }
     kf_say(message, limit->crosses ? ", where branches of " : ", where ");
     if (limit->block == KF_NO_BLOCK) {
         kf_say(message, "the joints");

@@ -4,7 +4,9 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#define KF_LARGE 1e6 /* [rad]; beyond, decimals say nothing */
+#define KF_LARGE 1e6                /* [rad]; beyond, decimals say nothing */
+#define KF_MORE 6                   /* digits that such numbers have before the point */
+#define KF_DEGREE 57.29577951308232 /* to a radian */
 
 void kf_say(char *message, const char *format, ...)
 {
@@ -33,7 +35,8 @@ static void say_decimals(char *message, int count, double value)
     char *const written = message + strlen(message);
     char format[16];
     const bool is_large = !(value > -KF_LARGE && value < KF_LARGE);
-    snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df", count);
+    snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df",
+             is_large && count > KF_ROUGHLY ? count + KF_MORE : count);
     kf_say_number(message, format, value);
     if (!is_large && strchr(written, '.') != NULL) {
         char *end = written + strlen(written);
@@ -59,11 +62,33 @@ void kf_say_place(char *message, const double *u, int digits)
         if (kf_driver_is_angle[k]) {
             say_decimals(message, digits, u[k]);
             kf_say(message, " rad (");
-            say_decimals(message, digits - 2, u[k] * 57.29577951308232);
+            say_decimals(message, digits - 2, u[k] * KF_DEGREE);
             kf_say(message, " deg)");
         } else {
             kf_say_number(message, format, u[k]);
             kf_say(message, " %s", kf_length_unit);
         }
     }
+}
+
+/* True if kf_say_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
+bool kf_differs(const double *a, const double *b, int digits)
+{
+    char format[16];
+    int k;
+    snprintf(format, sizeof format, "%%.%dg", digits);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        char first[KF_MESSAGE] = "", second[KF_MESSAGE] = "";
+        if (kf_driver_is_angle[k]) { /* in degrees there are fewer digits */
+            say_decimals(first, digits - 2, a[k] * KF_DEGREE);
+            say_decimals(second, digits - 2, b[k] * KF_DEGREE);
+        } else {
+            kf_say_number(first, format, a[k]);
+            kf_say_number(second, format, b[k]);
+        }
+        if (strcmp(first, second) != 0) {
+            return true;
+        }
+    }
+    return false;
 }

@@ -106,5 +106,6 @@ enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10
 void kf_say(char *message, const char *format, ...);
 void kf_say_number(char *message, const char *format, double value);
 void kf_say_place(char *message, const double *u, int digits);
+bool kf_differs(const double *a, const double *b, int digits);
 
 #endif
