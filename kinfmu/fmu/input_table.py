@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 TIME = "time"
-_WITH_UNIT = re.compile(r"(.*?)\s*\[(.*)\]", re.DOTALL)  # 'crank_angle [deg]'
 ROUNDING = 1e-9  # of the range: how far times may lie beyond the table by rounding alone
 
 
@@ -139,8 +137,8 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
 
 def _title(cell: str) -> tuple[str, str]:
     """'crank_angle' and 'deg' of 'crank_angle [deg]'."""
-    found = _WITH_UNIT.fullmatch(cell.strip())
-    return (found[1], found[2].strip()) if found else (cell.strip(), "")
+    name, bracket, unit = cell.strip().partition("[")
+    return (name.rstrip(), unit[:-1].strip()) if bracket and unit.endswith("]") else (cell.strip(), "")
 
 
 def _factor(where: str, name: str, unit: str, known: Mapping[str, float]) -> float:

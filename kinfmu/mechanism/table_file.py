@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from kinfmu.errors import MechanismError
 from kinfmu.mechanism.quoted import quoted
 
 LARGEST_TABLE = 4_000_000  # [bytes]
-_UNIT = re.compile(r"\[([^\]]*)\]\s*\Z")
 
 
 def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ...]:
@@ -60,8 +58,8 @@ def _is_number(cell: str) -> bool:
 
 def _unit(title: str) -> str:
     """'deg' of 'angle [deg]'."""
-    match = _UNIT.search(title)
-    return match[1].strip() if match else ""
+    _, bracket, unit = title.removesuffix("]").rpartition("[")
+    return unit.strip() if bracket and title.endswith("]") and "]" not in unit else ""
 
 
 def _number(where: str, line: int, cell: str, unit: str) -> float | str:

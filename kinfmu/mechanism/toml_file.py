@@ -37,7 +37,17 @@ from kinfmu.units import METRES, Quantity
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
-_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}""")
+_MANY_DOTS = re.compile(rf"^(?:[^.\n]*+\.){{{DEEPEST_KEY}}}", re.MULTILINE)  # what a line with such a key holds
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"?+|'[^'\n]*+'?+)"""  # of a key, or a text on one line
+_TOKEN = re.compile(
+    r"#[^\n]*+"  # a comment
+    r'|"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}+|\Z)'  # texts on several lines
+    r"|'''(?:[^']|'(?!''))*+(?:'{3,5}+|\Z)"
+    rf"|(?P<deep>(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}})"
+    rf"|(?:{_PART}[ \t]*+(?:\.[ \t]*+)?+)++"  # other keys and values
+    r"""|[^\w"'#-]++""",
+    re.DOTALL,
+)
 _TABLES = ("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "points", "outputs")
 _ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
 
@@ -63,9 +73,9 @@ def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mecha
 
     where: names the text in messages; folder: where files that it names are looked for.
     """
-    deep = _DEEP_KEY.search(text)
-    if deep:
-        line = text.count("\n", 0, deep.start()) + 1
+    deep = _deep_key(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep) + 1
         raise MechanismError(f"{where}: not valid: a key of more than {DEEPEST_KEY} parts (at line {line})")
     try:
         document = tomllib.loads(text.replace("\r\n", "\n"))
@@ -79,6 +89,13 @@ def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mecha
         return _mechanism(document, Path(folder))
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
+
+
+def _deep_key(text: str) -> int | None:
+    """The place of the first key of more than DEEPEST_KEY parts, outside comments and texts."""
+    if not _MANY_DOTS.search(text):
+        return None
+    return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
 
 
 def _mechanism(document: dict[str, Any], folder: Path) -> Mechanism:
