@@ -10,6 +10,8 @@ from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.curve import CurveData
 
+_RAISING = {"sin", "cos", "sqrt", "floor", "curve", "/"}  # operations that have no value for some numbers
+
 
 def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str] = ()) -> list[str]:
     """Docstring, imports and constants of the module.
@@ -20,6 +22,8 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
     anchor_u, anchor_z = plan.anchor_values
     large = [block for block in solved if len(block.unknowns) > 2 or len(block.residuals) > len(block.unknowns)]
     rare = {node.op for node in plan.nodes} & {"atan2", "floor"}
+    if _may_raise(plan):
+        rare.add("nan")
     imports = [f"from math import {', '.join(sorted({'cos', 'inf', 'sin', 'sqrt', *rare}))}"]
     imports += extra
     if plan.parameters:
@@ -81,12 +85,30 @@ def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
     body = writer.statements(flat)
     constants = [identifier(constant.name) for constant in plan.law_constants]
     returned = ", ".join(tupled(writer.expression(node) for node in nodes) for nodes in orders)
+    lines = [*body, f"return {returned}"]
+    if _may_raise(plan):
+        nothing = tupled(["nan"] * len(plan.laws))
+        caught = "except (OverflowError, ValueError, ZeroDivisionError):  # a time for which a law has no value"
+        lines = ["try:", *indented(lines), caught, f"    return {tupled([nothing] * 3)}"]
     return [
         "",
         "def drive(time, constants):",
         '    """Driver values, speeds and accelerations at a time, by the laws."""',
         *unpacking(constants, "constants"),
-        *indented(body),
-        f"    return {returned}",
+        *indented(lines),
         "",
     ]
+
+
+def _may_raise(plan: SolvePlan) -> bool:
+    """True if an operation of the laws has no value for some numbers, such as the sine of infinity."""
+    found: set[int] = set()
+    stack = [node for law in plan.laws for node in (law.position, law.rate, law.acceleration)]
+    while stack:
+        node = stack.pop()
+        if node.id not in found:
+            found.add(node.id)
+            stack.extend(node.args)
+            if node.op in _RAISING:
+                return True
+    return False

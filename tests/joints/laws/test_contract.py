@@ -5,7 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Literal
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,9 +24,11 @@ from kinfmu.joints.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polyn
 from kinfmu.mechanism.law_table import law_keys
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
+from kinfmu.solver.status import Status
 from tests.joints.drawn import coordinates, laws, splines
 from tests.power_series import Series
 
+HARMONIC = Harmonic(amplitude=1.0, frequency=100.0)
 every_law = pytest.mark.parametrize("cls", LAWS, ids=lambda cls: cls.type)
 
 
@@ -137,3 +142,31 @@ def turning(draw: st.DrawFn) -> Law:
 def test_a_law_that_comes_back_after_a_turn_says_so_and_does(law: Law, x: float) -> None:
     assert law.why_no_turn() == ""
     assert law.at(x + 2.0 * math.pi) == pytest.approx(law.at(x), abs=1e-11)  # x + 2 pi is rounded, and slopes are steep
+
+
+@every_law
+@given(data=st.data())
+def test_a_time_for_which_a_law_has_no_value_is_outside(cls: type[Law], data: st.DataObject) -> None:
+    """Or has numbers, without an error of Python: phases and powers of such times overflow."""
+    mechanism = driven(data.draw(laws(cls)))
+    run = kinfmu.solve(mechanism, [mechanism.run.start, 1e300, -1e300, 1.7e308], engine="python")
+    for status, row in zip(run.status, np.hstack([run.values, run.rates]), strict=True):
+        assert status in (Status.OK, Status.OUTSIDE)
+        assert not (status == Status.OK and np.isnan(row).any())
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_harmonic_law_at_the_largest_times_is_outside(
+    engine: Literal["python", "native"], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
+    run = kinfmu.solve(driven(HARMONIC), [0.0, 1e308, 1e308], engine=engine)
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE, Status.OUTSIDE]
+    assert "arm = nan rad (nan deg) is not a finite number" in run.events[0].text
+
+
+def test_an_fmu_at_such_a_time_discards_the_step(tmp_path: Path) -> None:
+    fmu = kinfmu.build(driven(HARMONIC), tmp_path / "arm.fmu", flavour="python")
+    stepped = kinfmu.simulate(fmu, start=0.0, stop=1e308, step=1e308)
+    assert stepped.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert stepped.events[-1].text == "at t = 1e+308 s: arm = nan rad (nan deg) is not a finite number"
