@@ -18,7 +18,7 @@ from kinfmu.swept import Driven, Swept, Tables
 class NativeEngine:
     """A plan's library. parameters: values reached from those of the plan, or nothing; fixed: as Engine has it.
 
-    CompilerError if there is no compiler or it fails.
+    CompilerError if there is no compiler, or if the library cannot be compiled, kept or loaded.
     """
 
     name = "native"

@@ -88,14 +88,14 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], No
 def _closed_form(fmi: int) -> Callable[[], None]:
     """A round of the closed forms, compiled as the FMU is."""
     sources = {"closed_form.c": (_SOURCES / "closed_form.c").read_text("utf-8")}
-    library = ctypes.CDLL(str(compiler.shared_library(sources, (*OPTIMIZED, f"-DFMI={fmi}"))))
+    library = compiler.load(sources, (*OPTIMIZED, f"-DFMI={fmi}"))
     library.instantiate.restype = ctypes.c_void_p
     return _rounds(fmi, library, ctypes.c_void_p(library.instantiate()), CLOSED_FORM_OUTPUTS)
 
 
 def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence[int]) -> Callable[[], None]:
     """A function that steps an FMU through a round in C, each going on where the last one ended."""
-    host = ctypes.CDLL(str(compiler.shared_library({"host.c": (_SOURCES / "host.c").read_text("utf-8")})))
+    host = compiler.load({"host.c": (_SOURCES / "host.c").read_text("utf-8")})
     step = getattr(host, f"host_run{fmi}")
     word = _WORDS[fmi]
     functions = [library[f"fmi{fmi}{name}"] for name in (f"Set{word}", "DoStep", f"Get{word}")]

@@ -101,7 +101,7 @@ def _chain(rounds: int, count: int) -> list[str]:
 def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
     """Fills columns (15, n): COORDINATES at u (n,), their rates and accelerations, by hand-written C at speed 1."""
     files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
-    library = ctypes.CDLL(str(compiler.shared_library(files | compiler.sources(("sincos.h",)), FLAGS)))
+    library = compiler.load(files | compiler.sources(("sincos.h",)), FLAGS)
     ud, udd = np.ones(len(u)), np.zeros(len(u))
     pointers = [array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in (u, ud, udd)]
     out = columns.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

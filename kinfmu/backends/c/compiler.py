@@ -1,12 +1,11 @@
-"""A shared library from generated C: compiled once by the system's compiler (or zig's), then taken from a cache.
+"""A shared library from generated C: compiled once by the system's compiler (or zig's), then taken from the cache.
 
-The cache lies in the user's cache folder, or where KINFMU_CACHE says. A library is found again by its sources, the
-flags, the compiler and the processor. Two processes that compile the same at once do not disturb each other: each
-writes a file of its own and moves it into place.
+A library is found again by its sources, the flags, the compiler and the processor: see library_cache.py.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 import platform
@@ -16,10 +15,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from kinfmu.backends.c import library_cache
 from kinfmu.errors import CompilerError
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -48,25 +49,63 @@ def units(files: Mapping[str, str]) -> list[str]:
 
 
 def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
-    """A shared library of C files (and the headers that they include), by name; compiled if the cache has it not.
+    """Return a shared library of C files (and the headers that they include), by name; compile it if it is not cached.
 
-    target: a platform in zig's words, such as x86_64-windows-gnu, for which zig compiles; this one if nothing is said.
+    target: a platform in zig's words, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
+    CompilerError if there is no compiler, if it fails, or if the cache cannot be used.
+    """
+    build = _Build(files, flags, target)
+    return library_cache.find(build.key, build.suffix) or library_cache.store(build.key, build.suffix, build.compile())
+
+
+def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> bytes:
+    """Return the content of such a library, also where the cache cannot be used.
+
     CompilerError if there is no compiler, or if it fails.
     """
-    compiler = command() if target is None else zig(target)
-    wanted = [*FLAGS, *flags]
-    content = [platform.machine(), _processor(), *_version(tuple(compiler)), *wanted]
-    content += [part for name in sorted(files) for part in (name, files[name])]
-    key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
-    folder = cache_folder()
-    library = folder / f"{key}{_suffix(target)}"
-    if not library.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            made = Path(scratch) / library.name
-            compiled(compiler, files, wanted, made)
-            made.replace(library)
-    return library
+    build = _Build(files, flags, target)
+    with suppress(CompilerError, OSError):
+        cached = library_cache.find(build.key, build.suffix)
+        if cached is not None:
+            return cached.read_bytes()
+    data = build.compile()
+    with suppress(CompilerError):
+        library_cache.store(build.key, build.suffix, data)
+    return data
+
+
+def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
+    """Load a shared library of C files. CompilerError as in shared_library, or if the system refuses to load it."""
+    path = shared_library(files, flags)
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise CompilerError(
+            f"the compiled library cannot be loaded: {error}; set KINFMU_CACHE to a folder where programs may run"
+        ) from None
+
+
+class _Build:
+    """What is compiled, by which compiler with which flags; key: what identifies the result."""
+
+    def __init__(self, files: Mapping[str, str], flags: Sequence[str], target: str | None) -> None:
+        self._files = files
+        self._compiler = command() if target is None else zig(target)
+        self._flags = (*FLAGS, *flags)
+        content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags]
+        content += [part for name in sorted(files) for part in (name, files[name])]
+        self.key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
+        self.suffix = _suffix(target)
+
+    def compile(self) -> bytes:
+        """Return the compiled library."""
+        try:
+            with tempfile.TemporaryDirectory() as scratch:
+                made = Path(scratch) / f"{self.key}{self.suffix}"
+                compiled(self._compiler, self._files, self._flags, made)
+                return made.read_bytes()
+        except OSError as error:
+            raise CompilerError(f"{self._compiler[0]} cannot compile the generated C: {error}") from None
 
 
 def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
@@ -136,18 +175,6 @@ def zig(target: str) -> tuple[str, ...]:
     if find_spec("ziglang") is None:
         raise CompilerError("compiling for other platforms needs ziglang; pip install 'kinfmu[native]'")
     return (*_ZIG, "-target", target)
-
-
-def cache_folder() -> Path:
-    """Where compiled libraries are kept."""
-    given = os.environ.get("KINFMU_CACHE")
-    if given:
-        return Path(given)
-    if os.name == "nt":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kinfmu" / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "kinfmu"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kinfmu"
 
 
 def _suffix(target: str | None) -> str:

@@ -72,12 +72,12 @@ class Told:
 
 
 class Library:
-    """The compiled model and solver of a plan. CompilerError if it cannot be compiled."""
+    """The compiled model and solver of a plan. CompilerError if it cannot be compiled, kept or loaded."""
 
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
         files = emit(plan) | emit_lanes(plan) | compiler.runtime()
-        library = self._library = ctypes.CDLL(str(compiler.shared_library(files, FLAGS)))
+        library = self._library = compiler.load(files, FLAGS)
         library.kf_sweep_new.restype = ctypes.c_void_p
         library.kf_sweep_new.argtypes = [_double]
         library.kf_sweep_free.argtypes = [ctypes.c_void_p]

@@ -117,5 +117,4 @@ def _compiled(
         if path.startswith("sources/") and path.endswith((".c", ".h"))
     }
     own = (f"-Wl,-install_name,@rpath/{identifier}.dylib",) if platform.suffix == ".dylib" else ()
-    library = compiler.shared_library(files | headers(fmi), (*FLAGS, *own), target)
-    return library.read_bytes()
+    return compiler.shared_library_bytes(files | headers(fmi), (*FLAGS, *own), target)
