@@ -24,6 +24,7 @@ from kinfmu.solver import Pose, Status, Stuck, with_parameters
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
+ROUNDING = 4.44e-16  # of a time: its last digits
 
 
 class Shown:
@@ -447,14 +448,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if not self._touched or current_time != self._time:
                 self._shown = self._motion = None  # inputs are held, or clocks differ: estimates see another time
             history = self._history
-            if len(history) == KEPT and history[-1][0] < current_time:  # _commit, without what is rare
+            if len(history) == KEPT and history[-1][0] < current_time - SAME_TIME * step_size - ROUNDING * abs(
+                current_time
+            ):  # _commit, without what is rare
                 self._history = (history[1], history[2], history[3], (current_time, pose.u))
                 self._committed = pose
                 self._touched = False
                 if self._wired:
                     self._committed_inputs = tuple(self._inputs)
             else:
-                self._commit(pose, current_time)
+                self._commit(pose, current_time, step_size)
             self._time = current_time + step_size
             return True
         except Exception as error:  # an exception here would be Fatal for the host
@@ -484,7 +487,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._pose = pose
         if not pose.good:
             return self._discard(pose, self._time)
-        self._commit(pose, self._time)
+        self._commit(pose, self._time, step_size)
         return True
 
     def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
@@ -494,9 +497,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         u, _, _ = self._solver.model.drive(current_time, self._constants)
         return self._solver.solve(self._committed, u)
 
-    def _commit(self, pose: Pose, t: float) -> None:
+    def _commit(self, pose: Pose, t: float, step_size: float) -> None:
         history = self._history
-        while history and history[-1][0] >= t:  # the host went back
+        same = t - SAME_TIME * step_size - ROUNDING * abs(t)
+        while history and history[-1][0] >= same:  # the host went back, or stayed
             history = history[:-1]
         self._history = (*history[1 - KEPT :], (t, pose.u))
         self._committed = pose

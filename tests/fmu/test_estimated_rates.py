@@ -67,6 +67,18 @@ def test_held_angle_comes_to_rest_and_reading_after_a_step_shows_the_committed_s
     assert host.get("crank.omega", "crank.alpha") == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("again", [0.4, math.nextafter(0.4, 0.0), math.nextafter(0.4, 1.0)])
+def test_point_that_is_stepped_again_replaces_its_sample(start: Callable[..., Host], again: float) -> None:
+    host = start()
+    for k, t in enumerate((0.0, 0.1, 0.2, 0.3, 0.4)):
+        host.set({"crank_angle": 0.5 + 0.1 * k})
+        assert host.step(t, 0.1)
+    host.set({"crank_angle": 0.9001})
+    assert host.step(again, 0.1)
+    assert host.get("crank.omega") == pytest.approx([1.0], abs=2e-3)
+    assert host.get("crank.alpha") == pytest.approx([0.0], abs=0.02)
+
+
 times = st.floats(0.01, 2.0)
 coefficients = st.floats(-5.0, 5.0)
 

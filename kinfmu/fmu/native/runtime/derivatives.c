@@ -81,7 +81,7 @@ static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
         way->dv[k] = seed[3 * k + 1];
         way->da[k] = seed[3 * k + 2];
     }
-    if (s->model_exchange) {
+    if (s->model_exchange || (s->ended && !s->touched)) { /* no estimates, or they come from samples alone */
         return;
     }
     memcpy(still, s->history, sizeof still);
@@ -91,8 +91,8 @@ static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
     kf_moment(s, &t, u);
     kf_estimated_rates(still, s->samples, t, way->du, dv, da);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        way->dv[k] += s->wired[3 * k + 1] ? 0.0 : dv[k];
-        way->da[k] += s->wired[3 * k + 2] ? 0.0 : da[k];
+        way->dv[k] += s->sources[3 * k + 1] ? 0.0 : dv[k];
+        way->da[k] += s->sources[3 * k + 2] ? 0.0 : da[k];
     }
 }
 
@@ -370,7 +370,15 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
         return kf_answered(instance, KF_ERROR, "%s: derivative of order %d = %g; orders 1 to %d and finite numbers are taken", name,
                       order, value, KF_INPUT_ORDERS);
     }
+    if (s->ahead) {
+        kf_forget(s);
+    }
+    kf_touch(s);
     s->input_rates[reference][order - 1] = value;
+    s->orders[reference] = order > s->orders[reference] ? (unsigned char)order : s->orders[reference];
+    s->wired[reference] = s->wired[reference] || (reference % 3 != 0 && value != 0.0);
+    kf_find_rate_sources(s);
+    kf_forget_motion(s);
     s->moving = true;
     s->stray = s->stray || s->driven_by_time;
     return KF_DONE;

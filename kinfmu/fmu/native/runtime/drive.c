@@ -34,11 +34,12 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
     }
 }
 
-/* How far estimated rates may be off: what one sample more says otherwise, and what differences take of the digits of u.
- * Of an acceleration from three samples nothing is known, nor of anything from two: infinite.
+/* Error estimates of estimated rates that hold `ahead` seconds after the last sample (t, u): the term that one more sample
+ * adds, and the rounding of the differences. An acceleration from three samples has no estimate, nor has any rate from two:
+ * infinite.
  */
-void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *of_ud,
-                                  double *of_udd)
+void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
+                                  double *of_ud, double *of_udd)
 {
     int k, i, order;
     while (count && samples[count - 1].t >= t) {
@@ -64,18 +65,21 @@ void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t,
         of_ud[k] = of_udd[k] = INFINITY;
         if (known > 1) {
             const double h2 = t - times[1], h1 = t - times[2], rounding = DBL_EPSILON * largest;
-            of_ud[k] = fabs(leading[2]) * h2;
-            if (known > 2) {
-                of_ud[k] = UNSURE * fabs(leading[3]) * h2 * h1;
-                of_udd[k] = 2.0 * UNSURE * fabs(leading[3]) * (h2 + h1) + 4.0 * rounding / (h2 * h1);
+            const double e2 = h2 + ahead, e1 = h1 + ahead;
+            of_ud[k] = fabs(leading[2]) * (e2 + ahead);
+            if (known > 2) { /* derivatives of c (x - t) (x - t1) (x - t2) at x = t + ahead */
+                of_ud[k] = UNSURE * fabs(leading[3]) * (e2 * e1 + ahead * (e2 + e1));
+                of_udd[k] = 2.0 * UNSURE * fabs(leading[3]) * (e2 + e1 + ahead) + 4.0 * rounding / (h2 * h1);
             }
-            of_ud[k] += 2.0 * rounding / h2;
+            of_ud[k] += 2.0 * rounding / h2 * (1.0 + 2.0 * ahead / h1);
         }
     }
 }
 
-/* The time and u of what the inputs ask for. */
-void kf_moment(const kf_state *s, double *t, double *u)
+/* The time and u of the sample that rates are estimated at, and how many seconds later they hold: 0, but a step at the end
+ * of a step that followed derivatives of inputs. What is extrapolated is no sample.
+ */
+double kf_moment(const kf_state *s, double *t, double *u)
 {
     int k;
     if (s->touched || !s->samples) {
@@ -86,24 +90,104 @@ void kf_moment(const kf_state *s, double *t, double *u)
     } else { /* nothing set since the commit: still the committed sample, at the time of its step */
         *t = s->history[s->samples - 1].t;
         memcpy(u, s->history[s->samples - 1].u, KF_DRIVERS * sizeof *u);
+        if (s->ended) {
+            return s->ended_step;
+        }
+    }
+    return 0.0;
+}
+
+/* Find where the speed (order 1) and the acceleration (order 2) of each driver come from: inputs count first, then the
+ * derivatives that the host gave of inputs of lower order, then estimates. Model exchange does not estimate.
+ */
+KF_RARE void kf_find_rate_sources(kf_state *s)
+{
+    int k, order;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        for (order = 1; order <= 2; ++order) {
+            kf_rate_source source = s->orders[3 * k] >= order ? KF_RATE_OF_VALUE : KF_RATE_ESTIMATED;
+            if (order == 2 && s->wired[3 * k + 1] && s->orders[3 * k + 1]) {
+                source = KF_RATE_OF_SPEED;
+            }
+            s->sources[3 * k + order] = s->model_exchange || s->wired[3 * k + order] ? KF_RATE_INPUT : source;
+        }
     }
 }
 
-/* ud, udd at time t: the inputs, with estimates for rates that are not wired. Model exchange does not estimate. */
+/* The rate of place 3 k + order: an input, a derivative of one, or the estimate. */
+static double chosen(const kf_state *s, const double *inputs, int place, int order, double estimate)
+{
+    switch (s->sources[place]) {
+    case KF_RATE_INPUT:
+        return inputs[place];
+    case KF_RATE_OF_VALUE:
+        return s->input_rates[place - order][order - 1];
+    case KF_RATE_OF_SPEED:
+        return s->input_rates[place - 1][0];
+    default:
+        return estimate;
+    }
+}
+
+/* ud, udd: what is given, over the estimates in them. */
+static void choose(const kf_state *s, const double *inputs, double *ud, double *udd)
+{
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        ud[k] = chosen(s, inputs, 3 * k + 1, 1, ud[k]);
+        udd[k] = chosen(s, inputs, 3 * k + 2, 2, udd[k]);
+    }
+}
+
+/* ud, udd at time t: the inputs, with estimates for rates that are not given. */
 static void by_inputs(const kf_state *s, const double *inputs, double t, const double *u, double *ud, double *udd)
 {
     int k;
-    bool all = s->model_exchange;
-    for (k = 0; !all && k < KF_DRIVERS && s->wired[3 * k + 1] && s->wired[3 * k + 2]; ++k) {
-        all = k == KF_DRIVERS - 1;
+    bool all = true;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        all = all && s->sources[3 * k + 1] && s->sources[3 * k + 2];
     }
     if (!all) {
         kf_estimated_rates(s->history, s->samples, t, u, ud, udd);
     }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        ud[k] = all || s->wired[3 * k + 1] ? inputs[3 * k + 1] : ud[k];
-        udd[k] = all || s->wired[3 * k + 2] ? inputs[3 * k + 2] : udd[k];
+    choose(s, inputs, ud, udd);
+}
+
+/* The end of a step that followed derivatives of inputs: they move to its end, and the rates there are found. Rates that are
+ * not given follow the parabola through the last samples: the inputs at the end are extrapolated and tell nothing new.
+ */
+void kf_end_of_step(kf_state *s, double step)
+{
+    const kf_sample *const last = &s->history[s->samples - 1];
+    int k;
+    for (k = 0; k < 3 * KF_DRIVERS; ++k) {
+        double *const rates = s->input_rates[k];
+        rates[0] += step * (rates[1] + 0.5 * step * rates[2]);
+        rates[1] += step * rates[2];
     }
+    kf_estimated_rates(s->history, s->samples, last->t, last->u, s->ended_ud, s->ended_udd);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        s->ended_ud[k] += step * s->ended_udd[k];
+    }
+    choose(s, s->real, s->ended_ud, s->ended_udd);
+    s->ended = true;
+    s->ended_step = step;
+}
+
+/* Derivatives of inputs hold for one step. */
+KF_RARE void kf_drop_input_derivatives(kf_state *s)
+{
+    memset(s->orders, 0, sizeof s->orders);
+    memset(s->input_rates, 0, sizeof s->input_rates);
+    kf_find_rate_sources(s);
+}
+
+/* u, ud, udd at the end of a step that followed derivatives of inputs. */
+static void ended_drive(const kf_state *s, double *u, double *ud, double *udd)
+{
+    memcpy(u, s->committed_u, sizeof s->committed_u);
+    memcpy(ud, s->ended_ud, sizeof s->ended_ud);
+    memcpy(udd, s->ended_udd, sizeof s->ended_udd);
 }
 
 /* u, ud, udd of what is asked for. */
@@ -111,6 +195,8 @@ void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
 {
     if (s->driven_by_time) {
         kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    } else if (s->ended && !s->touched) {
+        ended_drive(s, u, ud, udd);
     } else {
         double t;
         kf_moment(s, &t, u);
@@ -128,6 +214,8 @@ static void committed_drive(const kf_state *s, double *u, double *ud, double *ud
         memset(udd, 0, KF_DRIVERS * sizeof *udd);
     } else if (s->driven_by_time) {
         kf_drive(&s->solver.model, last->t, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    } else if (s->ended) {
+        ended_drive(s, u, ud, udd);
     } else {
         memcpy(u, last->u, sizeof last->u);
         by_inputs(s, s->committed_inputs, last->t, u, ud, udd);
@@ -167,20 +255,20 @@ void kf_find_errors(kf_state *s, double errors[3])
 {
     kf_pose *const pose = kf_shown(s);
     double rates[2][KF_ROOM(KF_OUTPUTS)], accelerations[2][KF_ROOM(KF_OUTPUTS)];
-    double of_ud[KF_DRIVERS], of_udd[KF_DRIVERS], u[KF_DRIVERS], t;
+    double of_ud[KF_DRIVERS], of_udd[KF_DRIVERS], u[KF_DRIVERS], t, ahead;
     int k;
     kf_find_drive(s);
     kf_errors(&s->solver, pose, s->ud, s->udd, errors);
     if (!KF_GOOD(s->status) || s->driven_by_time || s->model_exchange) {
         return;
     }
-    kf_moment(s, &t, u);
-    kf_errors_of_estimated_rates(s->history, s->samples, t, u, of_ud, of_udd);
+    ahead = kf_moment(s, &t, u);
+    kf_errors_of_estimated_rates(s->history, s->samples, t, u, ahead, of_ud, of_udd);
     kf_motion(&s->solver, pose, s->ud, s->udd, NULL, rates[0], accelerations[0]);
     for (k = 0; k < KF_DRIVERS; ++k) {
         const double ud = s->ud[k], udd = s->udd[k];
-        of_ud[k] = s->wired[3 * k + 1] ? 0.0 : of_ud[k];
-        of_udd[k] = s->wired[3 * k + 2] ? 0.0 : of_udd[k];
+        of_ud[k] = s->sources[3 * k + 1] ? 0.0 : of_ud[k];
+        of_udd[k] = s->sources[3 * k + 2] ? 0.0 : of_udd[k];
         if (isinf(of_ud[k])) {
             errors[1] = errors[2] = INFINITY;
             return;

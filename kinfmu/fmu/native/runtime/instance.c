@@ -1,6 +1,7 @@
 /* The life of an instance: initialization, steps, what is asked for and what is committed. */
 #include "instance.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -27,6 +28,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
         s->committed_inputs[k] = s->real[k];
     }
+    kf_find_rate_sources(s);
     kf_forget(s);
 }
 
@@ -42,6 +44,17 @@ inline void kf_forget(kf_state *s)
 {
     s->solved = s->ahead = false;
     kf_forget_motion(s);
+}
+
+void kf_touch(kf_state *s)
+{
+    if (!s->touched) {
+        s->touched = true;
+        if (s->ended && !s->moving) {
+            kf_drop_input_derivatives(s);
+        }
+        kf_forget_motion(s);
+    }
 }
 
 static KF_RARE kf_answer bind(kf_instance *instance)
@@ -104,11 +117,22 @@ inline kf_pose *kf_shown(kf_state *s)
 /* What is committed */
 
 /* The pose asked for becomes the one that all others are followed from. */
-static void commit(kf_state *s, double t)
+static void commit_pose(kf_state *s)
+{
+    memcpy(s->committed_u, KF_POSE_U(&s->poses[s->asked]), sizeof s->committed_u);
+    memcpy(s->committed_inputs, s->real, sizeof s->committed_inputs);
+    s->committed = s->asked;
+    s->committed_status = s->status;
+    s->touched = false;
+}
+
+/* The same, as a sample at time t; step: the size of the step that t is an end of, 0 if there is none. */
+static void commit(kf_state *s, double t, double step)
 {
     kf_sample *sample;
     const double *const u = KF_POSE_U(&s->poses[s->asked]);
-    while (s->samples && s->history[s->samples - 1].t >= t) { /* the host went back */
+    const double same = t - SAME_TIME * step - 2.0 * DBL_EPSILON * fabs(t);
+    while (s->samples && s->history[s->samples - 1].t >= same) { /* the host went back, or stayed */
         --s->samples;
     }
     if (s->samples == KF_SAMPLES) {
@@ -120,11 +144,8 @@ static void commit(kf_state *s, double t)
     sample = &s->history[s->samples++];
     sample->t = t;
     memcpy(sample->u, u, sizeof sample->u);
-    memcpy(s->committed_u, u, sizeof s->committed_u);
-    memcpy(s->committed_inputs, s->real, sizeof s->committed_inputs);
-    s->committed = s->asked;
-    s->committed_status = s->status;
-    s->touched = false;
+    s->ended = false;
+    commit_pose(s);
 }
 
 /* A step that cannot be done. Asked for again from the same point, no smaller, it will not be possible either: the master
@@ -155,7 +176,9 @@ static KF_RARE void move_inputs(kf_state *s, double step)
     kf_forget(s);
 }
 
-/* When inputs drive, the pose at the communication point is committed; at its end, too, if the inputs move. */
+/* When inputs drive, the pose at the communication point is committed as a sample. If the inputs move, the pose at the end is
+ * committed too, but not as a sample: its inputs are extrapolated, and the host may set others there.
+ */
 static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
 {
     kf_state *const s = &instance->now;
@@ -164,13 +187,16 @@ static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
     if (s->ahead) {
         kf_forget(s);
     }
+    if (s->ended && !s->moving) {
+        kf_drop_input_derivatives(s);
+    }
     if (!KF_GOOD(kf_ask(instance))) {
         return discard(instance, time, step, time);
     }
     is_current = s->touched & (time == s->time); /* or inputs are held, or clocks differ: estimates see another time */
     s->known &= KF_GIVEN_PARTS | (0u - (unsigned)is_current); /* no branch: clocks differ by chance, in the last digit */
     s->drive_known &= is_current;
-    commit(s, time);
+    commit(s, time, step);
     s->time = time + step;
     if (!s->moving) {
         return KF_DONE;
@@ -183,9 +209,9 @@ static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
         s->ahead = true;
         return discard(instance, time, step, time + step);
     }
-    commit(s, s->time);
+    commit_pose(s);
+    kf_end_of_step(s, step);
     s->moving = false;
-    memset(s->input_rates, 0, sizeof s->input_rates);
     return KF_DONE;
 }
 
@@ -204,7 +230,7 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
         if (!KF_GOOD(kf_ask(instance))) {
             return discard(instance, time, step, time);
         }
-        commit(s, time);
+        commit(s, time, step);
     }
     s->time = time + step;
     kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
@@ -213,7 +239,7 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
     if (!KF_GOOD(s->status)) {
         return discard(instance, time, step, s->time);
     }
-    commit(s, s->time);
+    commit(s, s->time, step);
     return KF_DONE;
 }
 
@@ -310,6 +336,6 @@ kf_answer kf_complete_integrator_step(kf_instance *instance)
     if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: it is too late for a smaller one */
         return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
     }
-    commit(s, s->time);
+    commit(s, s->time, 0.0);
     return KF_DONE;
 }

@@ -25,6 +25,9 @@ typedef enum {
     KF_TERMINATED
 } kf_mode;
 
+/* Where the rate of a driver comes from: an estimate, its own input, a derivative given of the driver's value or speed. */
+typedef enum { KF_RATE_ESTIMATED, KF_RATE_INPUT, KF_RATE_OF_VALUE, KF_RATE_OF_SPEED } kf_rate_source;
+
 /* A communication point and the driver values there. */
 typedef struct {
     double t;
@@ -54,8 +57,12 @@ typedef struct {
     bool ahead;   /* what is asked for is the end of a step that failed, not what was set */
     bool stray, stray_told; /* an input was set although time drives */
     bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
+    unsigned char sources[3 * KF_DRIVERS]; /* kf_rate_source of each rate */
     bool moving;                /* derivatives of inputs were given for the next step */
+    bool ended;                 /* the committed pose is the end of a step that followed derivatives of inputs */
+    unsigned char orders[3 * KF_DRIVERS]; /* highest order of the derivatives given of each input, 0 if none */
     double input_rates[3 * KF_DRIVERS][KF_INPUT_ORDERS];
+    double ended_step, ended_ud[KF_DRIVERS], ended_udd[KF_DRIVERS]; /* of the step that ended so: its size, the rates at its end */
     double committed_u[KF_DRIVERS], committed_inputs[3 * KF_DRIVERS];
     int samples;
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
@@ -140,12 +147,16 @@ kf_status kf_ask_anew(kf_instance *instance);
 kf_pose *kf_shown(kf_state *state);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
+void kf_end_of_step(kf_state *state, double step);
+void kf_drop_input_derivatives(kf_state *state);
+void kf_find_rate_sources(kf_state *state);
+void kf_touch(kf_state *state); /* something is set: what is shown is that at the current time, not at the commit */
 void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
 void kf_find_errors(kf_state *state, double errors[3]);
-void kf_moment(const kf_state *state, double *t, double *u);
+double kf_moment(const kf_state *state, double *t, double *u);
 void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
-void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *of_ud,
-                                  double *of_udd);
+void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
+                                  double *of_ud, double *of_udd);
 
 /* The pose asked for, good or not. */
 static inline kf_status kf_ask(kf_instance *instance)

@@ -219,7 +219,7 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
         s->unbound = true;
     }
     s->real[reference] = value;
-    s->touched = true;
+    kf_touch(s);
     kf_forget(s);
     return KF_DONE;
 }
@@ -236,14 +236,14 @@ static void set_input(kf_state *s, unsigned reference, double value)
         if (reference % 3 == 0) {
             kf_forget(s);
         } else {
-            s->wired[reference] = s->wired[reference] || value != 0.0;
+            if (value != 0.0 && !s->wired[reference]) {
+                s->wired[reference] = true;
+                kf_find_rate_sources(s);
+            }
             kf_forget_motion(s);
         }
     }
-    if (!s->touched) { /* from now on the rates are those at the current time, not at the commit */
-        s->touched = true;
-        kf_forget_motion(s);
-    }
+    kf_touch(s);
 }
 
 kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values)
