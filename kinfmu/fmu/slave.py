@@ -69,6 +69,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         super().__init__(**kwargs)
         parts = {part.name: part for part in self.layout.parts}
         self._inputs: list[float] = list(parts["inputs"].starts)  # value, speed, acceleration of each driver
+        self._input_starts = list(self._inputs)
         self._constants: Row = parts["constants"].starts
         self._parameters: Row = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
@@ -85,8 +86,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._touched = False  # something was set since the last commit
         self._wired: set[int] = set()  # value references of rates seen other than 0
         self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
-        self._stray: str | None = None  # an input that was set although time drives
-        self._stray_reported = False
+        self._stray_reported = False  # the host was warned that inputs have no effect
 
         self._committed: Pose = self._solver.anchor
         self._committed_inputs: Row = tuple(self._inputs)
@@ -344,8 +344,6 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                     self._pose = None
                 elif value != 0.0:
                     self._wired.add(vr)
-                if self._driven_by_time:
-                    self._stray = self._references.name(vr)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
         if not self._touched:  # from now on the rates are those at the current time, not at the commit
@@ -466,12 +464,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def _step(self, current_time: float, step_size: float) -> bool:
         """A step when time drives, which commits the poses at both its ends; or none, when a value was refused."""
-        if self._stray and not self._stray_reported:
-            self._stray_reported = True
-            self.log(
-                f"{self._stray} was set, but driven_by_time is true: the law drives, inputs have no effect",
-                Fmi2Status.warning,
-            )
+        if self._inputs != self._input_starts and self._driven_by_time and not self._stray_reported:
+            self._warn_of_inputs()
         if self._refused:
             for reason in self._refused.values():
                 self.log(f"at t = {current_time:g} s: {reason}", Fmi2Status.discard)
@@ -489,6 +483,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return self._discard(pose, self._time)
         self._commit(pose, self._time, step_size)
         return True
+
+    def _warn_of_inputs(self) -> None:
+        """Warn once if inputs were set although time drives."""
+        self._stray_reported = True
+        pairs = zip(self._inputs, self._input_starts, strict=True)
+        first = next(k for k, (value, start) in enumerate(pairs) if value != start)
+        names = next(part.variables for part in self.layout.parts if part.name == "inputs")
+        text = f"{names[first]} was set, but driven_by_time is true: the law drives, inputs have no effect"
+        self.log(text, Fmi2Status.warning)
 
     def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
         """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
@@ -526,7 +529,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "touched": self._touched,
             "wired": sorted(self._wired),
             "refused": dict(self._refused),
-            "stray": [self._stray, self._stray_reported],
+            "stray_reported": self._stray_reported,
             "committed": self._solver.dump(self._committed),
             "committed_inputs": list(self._committed_inputs),
             "history": [[t, list(u)] for t, u in self._history],
@@ -545,7 +548,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._touched = state["touched"]
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
-        self._stray, self._stray_reported = state["stray"]
+        self._stray_reported = state["stray_reported"]
         self._parameters = tuple(state["parameters"])
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)

@@ -118,6 +118,16 @@ def test_input_set_while_time_drives_is_warned_about_once(start: Start) -> None:
     assert host.get("crank.phi") == pytest.approx([math.radians(4.0)])
 
 
+@pytest.mark.parametrize(("drive", "is_warned"), [("time", False), ("inputs", True)])
+def test_warning_goes_by_what_drives_in_the_end(start: Start, drive: str, is_warned: bool) -> None:
+    host = start("fourbar", drive, initialize=False)
+    host.set({"crank_angle": 0.2})  # before the drive is chosen
+    host.set({"driven_by_time": is_warned})
+    host.initialize(0.0)
+    assert host.step(0.0, 0.1)
+    assert [status for status, _ in host.messages] == [1] * is_warned
+
+
 def test_driven_by_time_is_fixed_once_initialized(start: Start) -> None:
     host = start("fourbar", "time")
     host.set({"driven_by_time": False})

@@ -352,17 +352,37 @@ def test_impossible_parameters_are_an_error_with_the_reason(start: Start) -> Non
     assert host.status() == Status.OK
 
 
-def test_inputs_set_while_time_drives_are_warned_about_once(start: Start) -> None:
-    host = start("fourbar", "time")
+@pytest.mark.parametrize("model_exchange", [False, True])
+def test_inputs_set_while_time_drives_are_warned_about_once(start: Start, model_exchange: bool) -> None:
+    host = start("fourbar", "time", model_exchange=model_exchange)
+
+    def go(t: float) -> None:
+        if model_exchange:
+            host.fmu.setTime(t)
+            host.fmu.completedIntegratorStep()
+        else:
+            assert host.step(t, 1.0) == OK
+
     host.set({"crank_angle": 0.0})
-    assert host.step(0.0, 1.0) == OK
+    go(0.0)
     assert host.messages == []
     for k in range(1, 4):
-        host.set({"crank_angle": 0.1 * k})
-        assert host.step(float(k), 1.0) == OK
-    assert [status for status, _ in host.messages] == [WARNING]
-    assert "driven_by_time is true" in host.messages[0][1]
-    assert host.get("crank.phi") == pytest.approx([math.radians(4.0)])
+        host.set({"crank_speed": 0.1 * k})
+        go(float(k))
+    assert host.messages == [
+        (WARNING, "crank_speed was set, but driven_by_time is true: the law drives, inputs have no effect")
+    ]
+    assert host.get("crank.phi") == pytest.approx([math.radians(3.0 if model_exchange else 4.0)])
+
+
+@pytest.mark.parametrize(("drive", "is_warned"), [("time", False), ("inputs", True)])
+def test_warning_goes_by_what_drives_in_the_end(start: Start, drive: str, is_warned: bool) -> None:
+    host = start("fourbar", drive, initialize=False)
+    host.set({"crank_angle": 0.2})  # before the drive is chosen
+    host.set({"driven_by_time": is_warned})
+    host.initialize(0.0)
+    assert host.step(0.0, 0.1) == OK
+    assert [status for status, _ in host.messages] == [WARNING] * is_warned
 
 
 def test_rates_are_estimated_until_they_are_wired(start: Start) -> None:

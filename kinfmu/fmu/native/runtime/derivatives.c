@@ -380,6 +380,6 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     kf_find_rate_sources(s);
     kf_forget_motion(s);
     s->moving = true;
-    s->stray = s->stray || s->driven_by_time;
+    s->stray = reference + 1;
     return KF_DONE;
 }

@@ -243,10 +243,22 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
     return KF_DONE;
 }
 
+/* Warn once if inputs were set although time drives. */
+static kf_answer warn_of_inputs(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    if (!s->driven_by_time || !s->stray || s->stray_told) {
+        return KF_DONE;
+    }
+    s->stray_told = true;
+    return kf_answered(instance, KF_WARN, "%s was set, but driven_by_time is true: the law drives, inputs have no effect",
+                       kf_name_of(s->stray - 1));
+}
+
 kf_answer kf_step(kf_instance *instance, double time, double step)
 {
     kf_state *const s = &instance->now;
-    kf_answer answer = KF_DONE, done;
+    kf_answer answer, done;
     if (s->mode != KF_STEPPING) {
         return kf_answered(instance, KF_ERROR, "doStep before the end of initialization, or after terminate");
     }
@@ -254,11 +266,7 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
         return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time,
                       step);
     }
-    if (s->stray && !s->stray_told) {
-        s->stray_told = true;
-        answer = kf_answered(instance, KF_WARN,
-                        "inputs were set, but driven_by_time is true: the law drives, they have no effect");
-    }
+    answer = warn_of_inputs(instance);
     done = s->driven_by_time ? step_by_time(instance, time, step) : step_by_inputs(instance, time, step);
     if (done == KF_DONE) {
         s->failed = s->terminated = false;
@@ -337,5 +345,5 @@ kf_answer kf_complete_integrator_step(kf_instance *instance)
         return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
     }
     commit(s, s->time, 0.0);
-    return KF_DONE;
+    return warn_of_inputs(instance);
 }

@@ -55,7 +55,8 @@ typedef struct {
     double time;  /* the communication point, or the point that a failed step asked for */
     bool touched; /* something was set since the last commit */
     bool ahead;   /* what is asked for is the end of a step that failed, not what was set */
-    bool stray, stray_told; /* an input was set although time drives */
+    unsigned stray;         /* an input that was set: 1 + its value reference, 0 if none was */
+    bool stray_told;        /* the host was warned that time drives */
     bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
     unsigned char sources[3 * KF_DRIVERS]; /* kf_rate_source of each rate */
     bool moving;                /* derivatives of inputs were given for the next step */

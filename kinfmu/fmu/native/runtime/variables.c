@@ -232,7 +232,7 @@ static void set_input(kf_state *s, unsigned reference, double value)
     }
     if (value != s->real[reference]) {
         s->real[reference] = value;
-        s->stray = s->stray || s->driven_by_time;
+        s->stray = reference + 1;
         if (reference % 3 == 0) {
             kf_forget(s);
         } else {
