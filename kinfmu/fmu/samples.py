@@ -14,9 +14,10 @@ from kinfmu.run import Event, Run
 from kinfmu.sink import Sink
 from kinfmu.solver.status import Status
 
-PIECE = 64 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
+PIECE = 512 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
 FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own
 PERIOD = 0.5  # [s] by the clock
+LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
@@ -36,13 +37,14 @@ class Samples:
     ) -> None:
         interface = self._interface = about.interface
         self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
-        most = count + 1  # and one without numbers
-        self._reals = np.empty((most, self._ends[-1]))
-        self._t = np.empty(most)
-        self._counts = np.empty((most, 2), dtype=np.int64)
+        self._most = count + 1  # samples, and one without numbers
+        self._reals = np.empty((0, self._ends[-1]))  # the columns that are asked for
+        self._t = np.empty(self._most)
+        self._status, self._iterations = np.empty((2, self._most), np.int64)
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()
+        self._asked: list[int] | None = None  # columns that are asked for; None: all
         self._mechanism_text, self._model_description = mechanism_text, model_description
         self._info = {
             "name": interface.name,
@@ -79,42 +81,41 @@ class Samples:
         values = slave.get([slave.references[name] for name in names]) if names else []
         self.fixed = dict(zip(names, values, strict=True))
 
-    def begin(self, channels: Sequence[str] | None, sink: Sink | None) -> None:
+    def begin(self, slave: Slave, channels: Sequence[str] | None, sink: Sink | None) -> None:
         """Choose the variables to ask for, and begin the sink's run."""
         run = self._run(slice(0, 0))
         self._absent = absent_columns(run, channels)
         references = self._interface.value_references()
         columns = [name.removeprefix("driven.") for name in self._names]  # what a run calls them
-        self._asked = np.array([k for k, name in enumerate(columns) if name not in self._absent], dtype=np.int64)
-        first = _REALS.index("driven")
-        drives = (self._ends[first - 1] <= self._asked) & (self._asked < self._ends[first])
-        self._asked_of_drivers = self._asked[drives]
-        self._references, self._references_of_drivers = (
-            [references[self._names[k]] for k in asked] for asked in (self._asked, self._asked_of_drivers)
-        )
+        asked = [k for k, name in enumerate(columns) if name not in self._absent]
+        self._asked = asked if len(asked) < len(columns) else None
+        self._reals = np.empty((self._most, len(asked)))
+        self._read = slave.reader([references[self._names[k]] for k in asked], self._reals) if asked else None
+        part = _REALS.index("driven")
+        self._drivers = [place for place, k in enumerate(asked) if self._ends[part - 1] <= k < self._ends[part]]
+        self._references_of_drivers = [references[self._names[asked[place]]] for place in self._drivers]
         self._sink = sink
         if sink is not None:
-            self._piece = max(FEWEST, PIECE // (8 * (len(self._asked) + 3)))
+            self._piece = max(FEWEST, PIECE // (8 * (len(asked) + 3)))
             self._last_time = perf_counter()
             sink.begin(self._run(slice(0, 0)))
 
     def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
         """Read a sample if it is to be kept; False if it holds no numbers but the drivers' values asked for."""
         status, iterations = slave.counts()
-        good = status <= Status.BRIDGED
-        if good and not is_kept:
+        good = status <= LAST_GOOD
+        row = self._size
+        if not good:
+            self._reals[row] = np.nan
+            if self._drivers:
+                self._reals[row, self._drivers] = slave.get(self._references_of_drivers)
+        elif not is_kept:
             self._pass_on_what_is_due()
             return True
-        row = self._reals[self._size]
-        row.fill(np.nan)  # here, for filling the whole table would keep a long run waiting
-        if good:
-            if self._references:
-                row[self._asked] = slave.get(self._references)
-        elif self._references_of_drivers:
-            row[self._asked_of_drivers] = slave.get(self._references_of_drivers)
-        self._t[self._size] = t
-        self._counts[self._size] = status, iterations
-        self._size += 1
+        elif self._read:
+            self._read(row)
+        self._t[row], self._status[row], self._iterations[row] = t, status, iterations
+        self._size = row + 1
         self._pass_on_what_is_due()
         return good
 
@@ -146,11 +147,15 @@ class Samples:
         self._last_time = perf_counter()
 
     def _run(self, rows: slice, events: tuple[Event, ...] = ()) -> Run:
-        pieces = np.split(self._reals[rows].copy(), self._ends[:-1], axis=1)
-        part = dict(zip(_REALS, pieces, strict=True))
-        counts = self._counts[rows].copy()
+        reals, iterations = self._reals[rows], self._iterations[rows].copy()
+        if self._asked is None:
+            reals = reals.copy()
+        else:
+            asked, reals = reals, np.full((len(reals), self._ends[-1]), np.nan)
+            reals[:, self._asked] = asked
+        part = dict(zip(_REALS, np.split(reals, self._ends[:-1], axis=1), strict=True))
         if "solver.iterations" in self._absent:
-            counts[:, 1] = 0
+            iterations[:] = 0
         interface = self._interface
         return Run(
             t=self._t[rows].copy(),
@@ -162,8 +167,8 @@ class Samples:
             fixed=self.fixed,
             input_names=tuple(variable.name for variable in interface.part("inputs")),
             inputs=part["driven"],
-            status=counts[:, 0],
-            iterations=counts[:, 1],
+            status=self._status[rows].copy(),
+            iterations=iterations,
             residual=part["residual"][:, 0],
             margin=part["margin"][:, 0],
             error=part["errors"],

@@ -102,7 +102,7 @@ def simulate(
                 samples.read_fixed(one)
                 if interrupted():
                     raise KeyboardInterrupt
-                samples.begin(channels, sink)
+                samples.begin(one, channels, sink)
                 try:
                     driven = [] if table is None else [one.references[name] for name in table.names]
                     _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
@@ -240,24 +240,27 @@ def _step_through(
 
     kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values.
     """
-    is_kept = np.zeros(len(t), bool)
-    is_kept[kept] = True
-    for k, time in enumerate(map(float, t)):
+    kept_at = np.zeros(len(t), bool)
+    kept_at[kept] = True
+    is_kept, times = kept_at.data, t.data  # items of a memoryview are Python's own numbers, which is faster
+    last = len(t) - 1
+    set_inputs = slave.setter(inputs, rows) if inputs else None
+    for k, time in enumerate(times):
         samples.now = time
         if k and interrupted():
             samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
-        if inputs:
-            slave.set(inputs, rows[k].tolist())
+        if set_inputs:
+            set_inputs(k)
         good = samples.read(time, slave, is_kept=bool(is_kept[k]))
         if progress is not None:
             progress(k + 1, len(t))
         if not good:
             samples.log(DISCARD, f"at t = {time:g} s: {slave.message()}")
             return
-        if k + 1 == len(t):
+        if k == last:
             return
-        end = float(t[k + 1])
+        end = times[k + 1]
         samples.now = time if inputs else end  # what a step tells is of its inputs, or of where time drives to
         if not slave.step(time, end - time):
             if slave.counts()[0] > Status.BRIDGED:  # what the step asked for lies out of reach

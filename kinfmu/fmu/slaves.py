@@ -6,24 +6,33 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from ctypes import CFUNCTYPE, c_bool, c_double, c_int, c_void_p
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kinfmu.errors import FmuError, MissingPackageError
 from kinfmu.fmu.description import Description
+from kinfmu.fmu.row_call import WARNING, RowCall
 
 DISCARD = 2  # fmi2Discard and fmi3Discard
 Log = Callable[[int, str], None]  # status and text of a message
 
 
 class Slave(ABC):
-    """One slave; `fmpy` is fmpy's, for what is not wrapped here."""
+    """One slave; `fmpy` is fmpy's, for what is not wrapped here.
+
+    What is called in every step goes to the C functions directly: fmpy's methods take longer than a native step.
+    """
 
     fmpy: Any
+    _do_step: Any  # the C function
+    _step_end: tuple[Any, ...]  # its arguments after time and step
 
     def __init__(self, about: Description) -> None:
         self.references = about.interface.value_references()
-        self._counts = self.references["solver.status"], self.references["solver.iterations"]
         self._message = [self.references["solver.message"]]
 
     def free(self) -> None:
@@ -44,6 +53,14 @@ class Slave(ABC):
         self.fmpy.setBoolean([reference], [value])
 
     @abstractmethod
+    def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        """Return what reads Real variables into a row of the table (n, len(references))."""
+
+    @abstractmethod
+    def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        """Return what sets Real variables to the values in a row of the table (n, len(references))."""
+
+    @abstractmethod
     def counts(self) -> tuple[int, int]:
         """solver.status and solver.iterations."""
 
@@ -53,15 +70,14 @@ class Slave(ABC):
 
     def step(self, time: float, step: float) -> bool:
         """DoStep; False if it is Discard. Every other failure is an FmuError."""
+        status = self._do_step(self.fmpy.component, time, step, *self._step_end)
+        if status <= WARNING:
+            return True
+        if status == DISCARD:
+            return False
         from fmpy.fmi1 import FMICallException
 
-        try:
-            self.fmpy.doStep(time, step)
-        except FMICallException as failure:
-            if failure.status != DISCARD:
-                raise FmuError(f"at t = {time:g} s: {failure}") from None
-            return False
-        return True
+        raise FmuError(f"at t = {time:g} s: {FMICallException(function=self._do_step.__name__, status=status)}")
 
 
 class Slave2(Slave):
@@ -78,6 +94,12 @@ class Slave2(Slave):
             unzipDirectory=str(folder),
         )
         self._instantiate(folder, fmi2_callbacks(log))
+        self._do_step = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)(("fmi2DoStep", self.fmpy.dll))
+        self._step_end = (1,)  # the state before is not needed
+        found = np.zeros((1, 2), np.int32)
+        counts = [self.references[name] for name in ("solver.status", "solver.iterations")]
+        self._read_counts = RowCall(self.fmpy, "fmi2GetInteger", counts, found, has_value_count=False)
+        self._found = found[0]
 
     def _instantiate(self, folder: Path, callbacks: Any) -> None:
         """What fmpy's `instantiate` does, with the resources' address unquoted.
@@ -110,8 +132,15 @@ class Slave2(Slave):
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         self.fmpy.setReal(references, values)
 
+    def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        return RowCall(self.fmpy, "fmi2GetReal", references, rows, has_value_count=False)
+
+    def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        return RowCall(self.fmpy, "fmi2SetReal", references, rows, has_value_count=False)
+
     def counts(self) -> tuple[int, int]:
-        status, iterations = self.fmpy.getInteger(self._counts)
+        self._read_counts(0)
+        status, iterations = self._found.tolist()
         return status, iterations
 
     def message(self) -> str:
@@ -136,6 +165,17 @@ class Slave3(Slave):
             log(status, (message or b"").decode("utf-8", errors="replace"))
 
         self.fmpy.instantiate(loggingOn=True, logMessage=logger)
+        types = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
+        self._do_step = CFUNCTYPE(c_int, *types)(("fmi3DoStep", self.fmpy.dll))
+        self._step_end = (True, *((c_bool * 1)() for _ in range(3)), (c_double * 1)())  # flags and the time reached
+        self._status, self._iterations = np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int32)
+        self._read_status, self._read_iterations = (
+            RowCall(self.fmpy, function, [self.references[name]], found, has_value_count=True)
+            for function, name, found in (
+                ("fmi3GetInt64", "solver.status", self._status),
+                ("fmi3GetInt32", "solver.iterations", self._iterations),
+            )
+        )
 
     def initialize(self, start: float) -> None:
         self.fmpy.enterInitializationMode(startTime=start)
@@ -147,9 +187,16 @@ class Slave3(Slave):
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         self.fmpy.setFloat64(references, values)
 
+    def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        return RowCall(self.fmpy, "fmi3GetFloat64", references, rows, has_value_count=True)
+
+    def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
+        return RowCall(self.fmpy, "fmi3SetFloat64", references, rows, has_value_count=True)
+
     def counts(self) -> tuple[int, int]:
-        status, iterations = self._counts
-        return self.fmpy.getInt64([status])[0], self.fmpy.getInt32([iterations])[0]
+        self._read_status(0)
+        self._read_iterations(0)
+        return self._status.item(), self._iterations.item()
 
     def message(self) -> str:
         return str(self.fmpy.getString(self._message)[0])

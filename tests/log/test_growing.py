@@ -249,7 +249,7 @@ fmu, path = sys.argv[1:]
 
 def limit(done, _):
     if done == 1:  # the FMU is unpacked
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))
 
 try:
     kinfmu.simulate(fmu, step=0.01, sink=McapLog(path), progress=limit)
