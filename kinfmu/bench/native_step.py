@@ -23,7 +23,7 @@ from kinfmu.naming import derivative_name
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40
 INSTANCES = 200
-CLOSED_FORM_OUTPUTS = tuple(range(2, 17))  # value references of closed_form.c
+CLOSED_FORM_OUTPUTS = tuple(range(3, 18))  # value references of closed_form.c
 _SOURCES = Path(__file__).with_name("native_host")
 _WORDS = {2: "Real", 3: "Float64"}
 
@@ -105,7 +105,7 @@ def _rounds(fmi: int, library: Any, instance: ctypes.c_void_p, outputs: Sequence
     def one() -> None:
         first, degree = ctypes.c_long(next(rounds) * STEPS), ctypes.c_double(math.pi / 180.0)
         length, steps = ctypes.c_size_t(len(outputs)), ctypes.c_long(STEPS)
-        failed = step(instance, *functions, 0, references, length, values, first, steps, degree)
+        failed = step(instance, *functions, 1, references, length, values, first, steps, degree)
         if failed:
             raise RuntimeError(f"{failed} calls failed")
 

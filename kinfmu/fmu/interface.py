@@ -77,7 +77,10 @@ class Part:
 
 @dataclass(frozen=True)
 class Interface:
-    """All variables of an FMU, part by part; the value reference of a variable is its place in the list.
+    """All variables of an FMU, part by part; the value reference of a variable is its place in the list, from 1.
+
+    FMI 2.0 counts variables from 1 in dependencies, FMI 3.0 names value references there. The two are the same numbers
+    here, so a host that takes one for the other reads the same dependencies.
 
     coordinate_count: how many of the outputs are generalized coordinates (they come first).
     """
@@ -104,7 +107,7 @@ class Interface:
 
     def value_references(self) -> dict[str, int]:
         """Value reference by name."""
-        return {variable.name: reference for reference, variable in enumerate(self)}
+        return {variable.name: reference for reference, variable in enumerate(self, start=1)}
 
 
 def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False) -> Interface:

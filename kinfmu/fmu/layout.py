@@ -22,7 +22,7 @@ class Layout(NamedTuple):
 
 
 class Places:
-    """Where the variable of a value reference is found: value references count the variables of a layout."""
+    """Where the variable of a value reference is found: value references count the variables of a layout from 1."""
 
     _NOT_REAL = ("counts", "drive", "message")
 
@@ -32,15 +32,15 @@ class Places:
 
     def real(self, vr: int) -> tuple[int, int] | tuple[None, int]:
         """Part and place of a Real variable, (None, 0) if the value reference is none of those."""
-        if 0 <= vr < len(self._places):
-            part, place = self._places[vr]
+        if 1 <= vr <= len(self._places):
+            part, place = self._places[vr - 1]
             if self.layout.parts[part].name not in self._NOT_REAL:
                 return part, place
         return None, 0
 
     def name(self, vr: int) -> str:
         """Name of the variable, empty if there is none."""
-        if 0 <= vr < len(self._places):
-            part, place = self._places[vr]
+        if 1 <= vr <= len(self._places):
+            part, place = self._places[vr - 1]
             return self.layout.parts[part].variables[place]
         return ""

@@ -84,7 +84,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._initialized = False
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
         self._touched = False  # something was set since the last commit
-        self._wired: set[int] = set()  # value references of rates seen other than 0
+        self._wired: set[int] = set()  # places among the inputs of rates seen other than 0
         self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
         self._stray_reported = False  # the host was warned that inputs have no effect
 
@@ -323,7 +323,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self._inputs
-        if len(vrs) == 1 and vrs[0] == 0 and not (self._driven_by_time or self._refused):  # the one driver's value
+        if len(vrs) == 1 and vrs[0] == 1 and not (self._driven_by_time or self._refused):  # the one driver's value
             value = values[0]
             if value - value == 0.0:
                 if value != inputs[0]:
@@ -334,16 +334,17 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._touched = True
                 return
         for vr, value in zip(vrs, values):  # noqa: B905  # the host's lists are equally long
-            if not (0 <= vr < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
+            k = vr - 1
+            if not (0 <= k < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
                 self._set_other_real(vr, value)
                 continue
-            if value != inputs[vr]:
-                inputs[vr] = value
+            if value != inputs[k]:
+                inputs[k] = value
                 self._shown = self._motion = None
-                if vr % 3 == 0:
+                if k % 3 == 0:
                     self._pose = None
                 elif value != 0.0:
-                    self._wired.add(vr)
+                    self._wired.add(k)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
         if not self._touched:  # from now on the rates are those at the current time, not at the commit

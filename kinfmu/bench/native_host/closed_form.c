@@ -1,6 +1,6 @@
 /* The least that an FMU of a parallelogram four-bar can do: closed forms of q, qd, qdd, written by hand.
  *
- * Value references: 0 crank angle, 1 crank speed, then five outputs, their rates and accelerations. FMI is 2 or 3.
+ * Value references: 1 crank angle, 2 crank speed, then five outputs, their rates and accelerations. FMI is 2 or 3.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -32,10 +32,10 @@ static int get(fmu *m, const unsigned *references, size_t count, double *values)
     size_t k;
     compute(m);
     for (k = 0; k < count; ++k) {
-        if (references[k] >= VARIABLES) {
+        if (references[k] - 1u >= VARIABLES) {
             return 3;
         }
-        values[k] = m->values[references[k]];
+        values[k] = m->values[(size_t)references[k] - 1];
     }
     return 0;
 }
@@ -44,10 +44,10 @@ static int set(fmu *m, const unsigned *references, size_t count, const double *v
 {
     size_t k;
     for (k = 0; k < count; ++k) {
-        if (references[k] > 1 || !isfinite(values[k])) {
+        if (references[k] - 1u > 1 || !isfinite(values[k])) {
             return 3;
         }
-        m->values[references[k]] = values[k];
+        m->values[(size_t)references[k] - 1] = values[k];
     }
     return 0;
 }

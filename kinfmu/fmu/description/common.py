@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
@@ -116,6 +117,15 @@ def attributes(variable: Variable, references: Mapping[str, int]) -> dict[str, s
         "variability": variable.variability,
     }
     return told | ({"initial": variable.initial} if variable.initial else {})
+
+
+def shown(variable: Variable, kinds: Collection[str]) -> Variable:
+    """Return the variable as descriptions for these kinds of simulation show it.
+
+    Where model exchange is offered it is not the derivative of another one: some importers, OMSimulator among them,
+    take every derivative for that of a continuous state, and there are none.
+    """
+    return replace(variable, derivative_of=None) if "ModelExchange" in kinds else variable
 
 
 def typed(variable: Variable) -> dict[str, str]:

@@ -31,7 +31,7 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
     references = interface.value_references()
     variables = SubElement(root, "ModelVariables")
     for variable in interface:
-        _variable(variables, variable, references)
+        _variable(variables, common.shown(variable, kinds), references)
     _structure(root, interface, references)
 
 
@@ -39,19 +39,18 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
     scalar = SubElement(parent, "ScalarVariable", common.attributes(variable, references))
     kind = common.typed(variable)
     if variable.derivative_of:
-        kind["derivative"] = str(references[variable.derivative_of] + 1)
+        kind["derivative"] = str(references[variable.derivative_of])
     SubElement(scalar, variable.type, kind)
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Outputs and InitialUnknowns. An index is the place in the list, counted from 1."""
+    """Outputs and InitialUnknowns. An index is the place in the list from 1, and so is a value reference."""
     structure = SubElement(root, "ModelStructure")
-    places = {name: reference + 1 for name, reference in references.items()}
     lists: tuple[tuple[str, common.UnknownKind], ...] = (("Outputs", "outputs"), ("InitialUnknowns", "initial"))
     for element, kind in lists:
         parent = SubElement(structure, element)
-        for variable, depends in common.unknowns(interface, kind, places):
-            SubElement(parent, "Unknown", {"index": str(places[variable.name])} | depends)
+        for variable, depends in common.unknowns(interface, kind, references):
+            SubElement(parent, "Unknown", {"index": str(references[variable.name])} | depends)
 
 
 def parts(root: Element) -> Element | None:

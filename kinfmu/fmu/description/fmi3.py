@@ -33,7 +33,7 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
     references = interface.value_references()
     variables = SubElement(root, "ModelVariables")
     for variable in interface:
-        _variable(variables, variable, references)
+        _variable(variables, common.shown(variable, kinds), references)
     _structure(root, interface, references)
     common.annotation(SubElement(SubElement(root, "Annotations"), "Annotation", type=common.TOOL), interface)
 

@@ -82,7 +82,7 @@ def _header(variables: Interface, version: str, token: str) -> str:
         "",
         f"#define KF_TOKEN {string(token)}",
         f"#define KF_VARIABLES {len(references)}",
-        f"#define KF_REALS {real} /* they come first; the place of a variable is its value reference */",
+        f"#define KF_REALS {real} /* they come first; value references count all variables from 1 */",
         "",
         "/* Variables that are computed together, and stand together. */",
         "enum {",

@@ -87,7 +87,7 @@ static int step(instance c, double t, double h)
 
 int main(void)
 {
-    unsigned outputs[OUTPUTS], angle = 0, parameter = (unsigned)(PARAMETER);
+    unsigned outputs[OUTPUTS], angle = 1, parameter = (unsigned)(PARAMETER);
     double values[OUTPUTS], others[OUTPUTS], begin, u, one = 1.0, nan_value = NAN, known;
     void *state = NULL, *again = NULL;
     unsigned char *bytes;

@@ -47,7 +47,11 @@ def test_description_reads_back_as_the_interface_it_was_written_from(data: bytes
     written = interface(compile_plan(mechanism), "time", has_time=fmi == 3)
     place = written.value_references()
     assert list(read.interface) == [
-        replace(v, initial_dependencies=v.initial_dependencies and tuple(sorted(v.initial_dependencies, key=place.get)))
+        replace(
+            v,
+            initial_dependencies=v.initial_dependencies and tuple(sorted(v.initial_dependencies, key=place.get)),
+            derivative_of=None,
+        )
         for v in written
     ]
     assert [(part.name, part.names) for part in read.interface.parts] == [(p.name, p.names) for p in written.parts]
@@ -137,9 +141,45 @@ def test_units_and_display_units_are_defined(root: ET.Element) -> None:
         assert element.get("displayUnit") in {None, *units[element.get("unit")]}
 
 
-def test_derivatives_lead_from_acceleration_to_velocity_to_position(data: bytes) -> None:
-    variables = {v.name: v for v in description.read(data, "it").interface}
-    some = "coupler" if "coupler.ax" in variables else "lower"
-    assert variables[f"{some}.ax"].derivative_of == f"{some}.vx"
-    assert variables[f"{some}.vx"].derivative_of == f"{some}.x"
-    assert variables[f"{some}.x"].derivative_of is None
+# Importers that read descriptions otherwise
+
+
+def _unknowns(root: ET.Element) -> list[ET.Element]:
+    """The elements of the model structure that list dependencies, of both versions."""
+    return [element for element in root.iterfind("ModelStructure//*") if element.get("dependencies") is not None]
+
+
+def test_dependencies_are_the_same_read_as_indices_and_as_value_references(root: ET.Element) -> None:
+    """OMSimulator reads dependencies of FMI 3.0 as places from 1, as FMI 2.0 has them."""
+    elements = list(root.iterfind("ModelVariables/*"))
+    by_reference = {int(element.get("valueReference", -1)): element for element in elements}
+    assert 0 not in by_reference
+    unknowns = _unknowns(root)
+    listed = [int(one) for unknown in unknowns for one in unknown.get("dependencies", "").split()]
+    named = [int(unknown.get("index") or unknown.get("valueReference", -1)) for unknown in unknowns]
+    assert len(listed) > 20
+    for number in (*listed, *named):
+        assert 1 <= number <= len(elements)
+        assert elements[number - 1] is by_reference[number]
+
+
+def test_no_variable_looks_like_the_derivative_of_a_state(root: ET.Element) -> None:
+    """OMSimulator counts every continuous variable with the attribute `derivative` as a state in model exchange."""
+    assert root.find("ModelExchange") is not None
+    assert [element.tag for element in root.iter() if element.get("derivative") is not None] == []
+    assert [e.tag for e in root.iterfind("ModelStructure//*") if "Derivative" in e.tag] == []
+
+
+def test_initial_unknowns_are_those_that_importers_work_out_from_the_variables(root: ET.Element, fmi: int) -> None:
+    """OMSimulator compares the list with its own and refuses an FMU where they differ."""
+    elements = list(root.iterfind("ModelVariables/*"))
+    expected = {
+        element.get("valueReference")
+        for element in elements
+        if (element.get("causality") == "output" and element.get("initial") in ("calculated", "approx"))
+        or element.get("causality") == "calculatedParameter"
+    }
+    place = "ModelStructure/InitialUnknowns/Unknown" if fmi == 2 else "ModelStructure/InitialUnknown"
+    found = [unknown.get("index") or unknown.get("valueReference") for unknown in root.iterfind(place)]
+    assert set(found) == expected
+    assert len(found) == len(expected)

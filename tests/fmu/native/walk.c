@@ -55,7 +55,7 @@ static void must(int status, const char *what, int k)
 int main(int count_of_arguments, char **arguments)
 {
     void *const library = count_of_arguments == 5 ? OPEN(arguments[1]) : NULL;
-    const unsigned input = 0, first = library ? (unsigned)atoi(arguments[3]) : 0;
+    const unsigned input = 1, first = library ? (unsigned)atoi(arguments[3]) : 0;
     const size_t count = library ? (size_t)atoi(arguments[4]) : 0;
     unsigned *const outputs = malloc((count + 1) * sizeof *outputs);
     double *const values = malloc((count + 1) * sizeof *values);

@@ -287,17 +287,19 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
 
 static bool is_unknown(unsigned reference)
 {
-    return reference < KF_REALS && !(KF_BIT(kf_part_of[reference]) & KF_GIVEN_PARTS);
+    const unsigned place = KF_PLACE(reference);
+    return place < KF_REALS && !(KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS);
 }
 
 /* What may move: inputs and time, before the end of initialization parameters too. */
 static bool is_known(const kf_state *s, unsigned reference)
 {
-    if (reference >= KF_REALS) {
+    const unsigned place = KF_PLACE(reference);
+    if (place >= KF_REALS) {
         return reference == KF_TIME;
     }
-    return kf_part_of[reference] == KF_PART_INPUTS ||
-           (s->mode <= KF_INITIALIZATION && (KF_BIT(kf_part_of[reference]) & KF_GIVEN_PARTS) != 0);
+    return kf_part_of[place] == KF_PART_INPUTS ||
+           (s->mode <= KF_INITIALIZATION && (KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS) != 0);
 }
 
 kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
@@ -315,7 +317,7 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
             return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no directional derivative",
                           name ? name : "what is not there", unknowns[k]);
         }
-        parts |= KF_BIT(kf_part_of[unknowns[k]]);
+        parts |= KF_BIT(kf_part_of[KF_PLACE(unknowns[k])]);
     }
     for (k = 0; k < known_count; ++k) {
         if (!is_known(s, knowns[k]) || !isfinite(seed[k])) {
@@ -326,7 +328,7 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
         if (knowns[k] == KF_TIME) {
             time_seed += seed[k];
         } else {
-            instance->seed[knowns[k]] += seed[k];
+            instance->seed[KF_PLACE(knowns[k])] += seed[k];
         }
     }
     if (!KF_GOOD(kf_ask(instance))) {
@@ -335,7 +337,7 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
     kf_find_drive(s);
     answer = along(instance, time_seed, parts);
     for (k = 0; answer == KF_DONE && k < unknown_count; ++k) {
-        sensitivity[k] = instance->slope[unknowns[k]];
+        sensitivity[k] = instance->slope[KF_PLACE(unknowns[k])];
     }
     return answer;
 }
@@ -343,9 +345,9 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
 /* Of positions orders 1 and 2, of rates order 1. */
 kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int order, double *value)
 {
-    const int part = reference < KF_REALS ? kf_part_of[reference] : KF_PARTS;
+    const unsigned place = KF_PLACE(reference);
+    const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
     const int wanted = part + order;
-    unsigned place;
     kf_answer answer;
     if ((part != KF_PART_VALUES && part != KF_PART_RATES) || order < 1 || wanted > KF_PART_ACCELERATIONS) {
         const char *const name = kf_name_of(reference);
@@ -353,8 +355,7 @@ kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int or
                       "rates 1", name ? name : "what is not there", reference, order);
     }
     answer = kf_read(instance, KF_BIT(wanted));
-    place = reference - (unsigned)kf_part_first[part];
-    *value = instance->now.real[(unsigned)kf_part_first[wanted] + place];
+    *value = instance->now.real[kf_part_first[wanted] - kf_part_first[part] + (int)place];
     return answer;
 }
 
@@ -363,7 +364,8 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
 {
     kf_state *const s = &instance->now;
     const char *const name = kf_name_of(reference);
-    if (reference >= 3 * KF_DRIVERS) {
+    const unsigned place = KF_PLACE(reference);
+    if (place >= 3 * KF_DRIVERS) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
     if (order < 1 || order > KF_INPUT_ORDERS || !isfinite(value)) {
@@ -374,12 +376,12 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
         kf_forget(s);
     }
     kf_touch(s);
-    s->input_rates[reference][order - 1] = value;
-    s->orders[reference] = order > s->orders[reference] ? (unsigned char)order : s->orders[reference];
-    s->wired[reference] = s->wired[reference] || (reference % 3 != 0 && value != 0.0);
+    s->input_rates[place][order - 1] = value;
+    s->orders[place] = order > s->orders[place] ? (unsigned char)order : s->orders[place];
+    s->wired[place] = s->wired[place] || (place % 3 != 0 && value != 0.0);
     kf_find_rate_sources(s);
     kf_forget_motion(s);
     s->moving = true;
-    s->stray = reference + 1;
+    s->stray = place + 1;
     return KF_DONE;
 }

@@ -252,7 +252,7 @@ static kf_answer warn_of_inputs(kf_instance *instance)
     }
     s->stray_told = true;
     return kf_answered(instance, KF_WARN, "%s was set, but driven_by_time is true: the law drives, inputs have no effect",
-                       kf_name_of(s->stray - 1));
+                       kf_name_of(s->stray));
 }
 
 kf_answer kf_step(kf_instance *instance, double time, double step)

@@ -36,7 +36,7 @@ typedef struct {
 
 /* Everything that a result depends on, and what is known of it: plain data, so that the state of an FMU is a copy of it.
  *
- * Real variables stand in `real` by their value references; a bit of `known` says that those of a part are up to date.
+ * `real` holds the Real variables by their place in the list; a bit of `known` says that those of a part are up to date.
  */
 typedef struct {
     kf_pose poses[2];
@@ -55,7 +55,7 @@ typedef struct {
     double time;  /* the communication point, or the point that a failed step asked for */
     bool touched; /* something was set since the last commit */
     bool ahead;   /* what is asked for is the end of a step that failed, not what was set */
-    unsigned stray;         /* an input that was set: 1 + its value reference, 0 if none was */
+    unsigned stray;         /* value reference of an input that was set, 0 if none was */
     bool stray_told;        /* the host was warned that time drives */
     bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
     unsigned char sources[3 * KF_DRIVERS]; /* kf_rate_source of each rate */
@@ -109,7 +109,10 @@ kf_answer kf_set_time(kf_instance *instance, double time);
 kf_answer kf_complete_integrator_step(kf_instance *instance);
 kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
 
-/* Variables, by value references. */
+/* Variables, by value references: the place in the list, counted from 1 as FMI 2.0 counts the places of variables. So the
+ * reference 0 belongs to no variable; as a place it wraps round and is past the end.
+ */
+#define KF_PLACE(reference) ((reference) - 1u)
 kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values);
 kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values);
 kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value);

@@ -12,7 +12,7 @@
 
 const char *kf_name_of(unsigned reference)
 {
-    return reference < KF_VARIABLES ? kf_variable_names[reference] : NULL;
+    return KF_PLACE(reference) < KF_VARIABLES ? kf_variable_names[KF_PLACE(reference)] : NULL;
 }
 
 kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type)
@@ -114,7 +114,7 @@ static KF_RARE kf_answer get_unusual(kf_instance *instance, const unsigned *refe
     for (k = 0; answer <= KF_DISCARD && k < count; ++k) {
         if (references[k] == KF_TIME) {
             values[k] = instance->now.time;
-        } else if (references[k] < KF_REALS) {
+        } else if (KF_PLACE(references[k]) < KF_REALS) {
             const kf_answer one = kf_get_real(instance, &references[k], 1, &values[k]);
             answer = one > answer ? one : answer;
         } else {
@@ -133,7 +133,8 @@ static unsigned parts_of(kf_list *list, const unsigned *references, size_t count
         return list->parts;
     }
     for (k = 0; k < count; ++k) {
-        parts |= kf_bit_of[references[k] < KF_VARIABLES ? references[k] : KF_VARIABLES];
+        const unsigned place = KF_PLACE(references[k]);
+        parts |= kf_bit_of[place < KF_VARIABLES ? place : KF_VARIABLES];
     }
     if (count && count <= KF_LISTED) {
         list->count = count;
@@ -157,7 +158,7 @@ kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t 
     }
     KF_UNROLLED
     for (k = 0; k < count; ++k) {
-        values[k] = real[references[k]];
+        values[k] = real[(size_t)references[k] - 1];
     }
     return answer;
 }
@@ -200,16 +201,17 @@ kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **
 static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, double value)
 {
     kf_state *const s = &instance->now;
-    const int part = reference < KF_REALS ? kf_part_of[reference] : KF_PARTS;
+    const unsigned place = KF_PLACE(reference);
+    const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
     const char *const name = kf_name_of(reference);
     if (part != KF_PART_INPUTS && part != KF_PART_CONSTANTS && part != KF_PART_PARAMETERS && part != KF_PART_TOLERANCE) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
     if (!isfinite(value)) {
-        return kf_answered(instance, KF_ERROR, "%s = %g is not a finite number; %.17g stays", name, value, s->real[reference]);
+        return kf_answered(instance, KF_ERROR, "%s = %g is not a finite number; %.17g stays", name, value, s->real[place]);
     }
-    if (kf_real_is_positive[reference] && !(value > 0.0)) {
-        return kf_answered(instance, KF_ERROR, "%s = %.17g must be positive; %.17g stays", name, value, s->real[reference]);
+    if (kf_real_is_positive[place] && !(value > 0.0)) {
+        return kf_answered(instance, KF_ERROR, "%s = %.17g must be positive; %.17g stays", name, value, s->real[place]);
     }
     if (part == KF_PART_PARAMETERS) {
         if (s->mode > KF_INITIALIZATION) {
@@ -218,26 +220,26 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
         }
         s->unbound = true;
     }
-    s->real[reference] = value;
+    s->real[place] = value;
     kf_touch(s);
     kf_forget(s);
     return KF_DONE;
 }
 
-/* An input, the value finite. */
-static void set_input(kf_state *s, unsigned reference, double value)
+/* Input number k, the value finite. */
+static void set_input(kf_state *s, unsigned k, double value)
 {
     if (s->ahead) {
         kf_forget(s);
     }
-    if (value != s->real[reference]) {
-        s->real[reference] = value;
-        s->stray = reference + 1;
-        if (reference % 3 == 0) {
+    if (value != s->real[k]) {
+        s->real[k] = value;
+        s->stray = k + 1;
+        if (k % 3 == 0) {
             kf_forget(s);
         } else {
-            if (value != 0.0 && !s->wired[reference]) {
-                s->wired[reference] = true;
+            if (value != 0.0 && !s->wired[k]) {
+                s->wired[k] = true;
                 kf_find_rate_sources(s);
             }
             kf_forget_motion(s);
@@ -254,12 +256,12 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
         return kf_answered(instance, KF_ERROR, "nothing can be set after terminate");
     }
     for (k = 0; k < count; ++k) {
-        const unsigned reference = references[k];
+        const unsigned place = KF_PLACE(references[k]);
         const double value = values[k];
-        if (reference < 3 * KF_DRIVERS && value - value == 0.0) { /* inputs come first; a finite number */
-            set_input(s, reference, value);
+        if (place < 3 * KF_DRIVERS && value - value == 0.0) { /* inputs come first; a finite number */
+            set_input(s, place, value);
         } else {
-            const kf_answer answer = set_other(instance, reference, value);
+            const kf_answer answer = set_other(instance, references[k], value);
             if (answer != KF_DONE) {
                 return answer;
             }
