@@ -84,6 +84,9 @@ class MissingPackageError(KinfmuError):
     """An optional package is not installed."""
 
 
+LONGEST_WORD = 200  # characters of a word that may be a misspelt name
+
+
 def listed(names: Iterable[str]) -> str:
     """`a, b, c`, or `none`: how messages list what would be valid."""
     return ", ".join(names) or "none"
@@ -93,6 +96,8 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     """`; did you mean 'coupler'?` when something known is close to `word`, else nothing."""
     import difflib
 
+    if len(word) > LONGEST_WORD:  # no misspelt name, and slow to compare
+        return ""
     known = list(known)
     near = difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -16,3 +16,9 @@ def derivative_name(name: str, order: int) -> str:
 def quantity_of(name: str, order: int = 0) -> Quantity:
     """What a coordinate such as 'coupler.x' or 'coupler.phi' measures, or its derivative of the given order."""
     return Quantity("angle" if name.endswith(".phi") else "length", order)
+
+
+def is_coordinate(name: str) -> bool:
+    """Return True for a name such as 'coupler.x'."""
+    owner, _, coordinate = name.rpartition(".")
+    return bool(owner) and coordinate in _DERIVATIVES

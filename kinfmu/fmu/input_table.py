@@ -12,6 +12,7 @@ import numpy as np
 
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.interface import Interface
+from kinfmu.mechanism.decimal_number import decimal
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.short_way import short_way
 from kinfmu.units import Quantity, factors, quantity_in
@@ -108,7 +109,10 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             delimiter = next((mark for mark in ("\t", ";") if mark in first), ",")
             file.seek(0)
             reader = csv.reader(file, delimiter=delimiter)
-            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+            try:
+                rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+            except csv.Error as error:
+                raise FmuError(f"{path}, line {reader.line_num}: {error}") from None
     except UnicodeDecodeError:
         raise FmuError(f"{path}: is not a text file") from None
     except OSError as error:
@@ -126,10 +130,10 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             raise FmuError(f"{path}, line {line}: {len(row)} values, the header names {len(header)} columns")
         for name, cell, factor in zip(header, row, into, strict=True):
             try:
-                columns[name].append(float(cell) * factor)
+                columns[name].append(decimal(cell) * factor)
             except ValueError:
                 point = "; decimals are written with a point" if "," in cell else ""
-                raise FmuError(f"{path}, line {line}: {name} = '{cell.strip()}' is not a number{point}") from None
+                raise FmuError(f"{path}, line {line}: {name} = {quoted(cell.strip())} is not a number{point}") from None
     arrays = {name: np.array(values) for name, values in columns.items()}
     table = _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
     return replace(table, unitless=tuple(name for name, unit in titles if not unit))
@@ -156,7 +160,8 @@ def _check_names(where: str, names: list[str], known: Sequence[str]) -> None:
     for name in names:
         if name != TIME and name not in known:
             raise FmuError(
-                f"{where}: '{name}' is no input of this FMU{_meant(name, known)}; columns: {listed((TIME, *known))}"
+                f"{where}: {quoted(name)} is no input of this FMU{_meant(name, known)}; "
+                f"columns: {listed((TIME, *known))}"
             )
         if names.count(name) > 1:
             raise FmuError(f"{where}: the column '{name}' is there twice")
@@ -171,11 +176,12 @@ def _meant(title: str, known: Sequence[str]) -> str:
     names = (TIME, *known)
     base, bracket, unit = title.partition("(")
     if bracket and base.strip() in names:
-        return f"; did you mean '{base.strip()} [{unit.rstrip(' )')}]'?"
+        meant = f"{base.strip()} [{unit.rstrip(' )')}]"
+        return f"; did you mean {quoted(meant)}?"
     if any(name in title.split() for name in names):
         return "; columns are parted by commas, semicolons or tabs"
     try:
-        float(title)
+        decimal(title)
     except ValueError:
         return suggestion(title, names)
     return "; the first line must name the columns"

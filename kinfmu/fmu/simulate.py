@@ -6,10 +6,7 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
-import tempfile
-import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +21,7 @@ from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.interrupt import interruptible
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
+from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Run
@@ -78,8 +76,9 @@ def simulate(
     if isinstance(fmu_path, Mechanism):
         raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")
     path = Path(fmu_path)
-    with _unpacked(path) as folder:
-        about = description.read((folder / "modelDescription.xml").read_bytes(), str(path))
+    with unpacked(path) as folder:
+        xml = text_in(path, folder, DESCRIPTION, LARGEST)
+        about = description.read(xml.encode(), str(path))
         interface = about.interface
         if wrap and inputs is None:
             raise RequestError("wrap follows angles among the inputs, and no inputs are given")
@@ -89,8 +88,7 @@ def simulate(
         rows = np.empty((len(t), 0)) if table is None else table.at(t)
         kept = kept_samples(t, rate)
         settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-        xml = _text_in(folder, "modelDescription.xml")
-        text = _as_set(_text_in(folder, "resources/mechanism.toml"), settings)
+        text = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
         samples = Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
         if not _time_drives(interface, settings):
             samples.extend(undriven(interface, table, float(t[0])))
@@ -112,35 +110,15 @@ def simulate(
             return samples.end()
 
 
-def _text_in(folder: Path, name: str) -> str:
-    return (folder / name).read_text(encoding="utf-8")
-
-
-def _as_set(mechanism_text: str, settings: Mapping[str, float | bool]) -> str:
+def _as_set(mechanism_text: str, settings: Mapping[str, float | bool], where: str) -> str:
     """The mechanism as it moves: with the values that the FMU is given, where it can have them."""
-    mechanism = toml_file.parse(mechanism_text)
+    mechanism = toml_file.parse(mechanism_text, where)
     own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
     values = {name: value for name, value in settings.items() if name in own}
     try:
         return toml_text.text(mechanism.with_parameters(values)) if values else mechanism_text
     except MechanismError:
         return mechanism_text  # the FMU will say why
-
-
-@contextmanager
-def _unpacked(path: Path) -> Iterator[Path]:
-    """The FMU in a temporary folder, which goes away in the end."""
-    with tempfile.TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
-        try:
-            with zipfile.ZipFile(path) as zipped:
-                zipped.extractall(folder)
-                if "modelDescription.xml" not in zipped.namelist():
-                    raise FmuError(f"{path}: is no FMU (modelDescription.xml is missing)")
-        except zipfile.BadZipFile:
-            raise FmuError(f"{path}: is no FMU (not a zip archive)") from None
-        except OSError as error:
-            raise FmuError(f"{path}: cannot be read ({error.strerror or error})") from None
-        yield Path(folder)
 
 
 def _times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:

@@ -23,10 +23,11 @@ def law_keys(law: type[Law]) -> list[str]:
     return [*keys, "file"] if law is Spline else keys
 
 
-def read_law(where: str, table: Mapping[str, Any], law: type[Law], folder: Path) -> Law:
+def read_law(where: str, table: Mapping[str, Any], law: type[Law], folder: Path | None) -> Law:
     """The law of a class from the table of its driver or joint; numbers stay as written, the mechanism reads them.
 
-    folder: where a file named in the table is looked for, unless its path is absolute. Raises a MechanismError.
+    folder: where a file named in the table is looked for, unless its path is absolute; without one a file is refused.
+    Raises a MechanismError.
     """
     values: dict[str, Any] = {}
     for key in fields(law):  # type: ignore[arg-type]

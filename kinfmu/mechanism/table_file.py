@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism.decimal_number import decimal
 from kinfmu.mechanism.quoted import quoted
 
 LARGEST_TABLE = 4_000_000  # [bytes]
 
 
-def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ...]:
+def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, Any], ...]:
     """The rows of a CSV file of two columns, x and u, as numbers, or as text where the header gives a unit.
 
     The first line may be a header; units in it stand in brackets: `angle [deg], lift [mm]`. Columns are parted by
@@ -23,6 +24,8 @@ def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ..
     if not isinstance(name, str):
         raise MechanismError(f"{where} = {quoted(name)} must be the name of a CSV file")
     where = f"{where} = {quoted(name)}"
+    if folder is None:
+        raise MechanismError(f"{where}: only a mechanism file can name a file; text needs the points themselves")
     try:
         with (folder / name).open("rb") as file:
             content = file.read(LARGEST_TABLE + 1)
@@ -38,7 +41,10 @@ def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ..
     units, rows = ("", ""), []
     for place, (k, line) in enumerate(numbered):
         delimiter = next((mark for mark in ("\t", ";") if mark in line), ",")
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+        try:
+            cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+        except csv.Error as error:
+            raise MechanismError(f"{where}, line {k}: {error}") from None
         if len(cells) != 2:
             raise MechanismError(f"{where}, line {k}: {len(cells)} columns; there must be two, x and u")
         if place == 0 and not any(map(_is_number, cells)):
@@ -50,7 +56,7 @@ def read_table(where: str, name: Any, folder: Path) -> tuple[tuple[Any, Any], ..
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        decimal(cell)
     except ValueError:
         return False
     return True
@@ -65,6 +71,7 @@ def _unit(title: str) -> str:
 def _number(where: str, line: int, cell: str, unit: str) -> float | str:
     if not _is_number(cell):
         raise MechanismError(f"{where}, line {line}: {quoted(cell)} must be a number")
-    if not math.isfinite(float(cell)):
+    number = decimal(cell)
+    if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
-    return f"{float(cell)!r} {unit}" if unit else float(cell)
+    return f"{number!r} {unit}" if unit else number

@@ -68,10 +68,11 @@ def read(path: str | Path) -> Mechanism:
         raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
 
 
-def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mechanism:
-    """The mechanism that TOML text describes.
+def parse(text: str, where: str = "mechanism", folder: str | Path | None = None) -> Mechanism:
+    """Return the mechanism that TOML text describes.
 
-    where: names the text in messages; folder: where files that it names are looked for.
+    where: names the text in messages; folder: where files that it names are looked for; without one, as for the text
+    inside an FMU or a record, no file is opened. Raises a MechanismError that names the table and the key at fault.
     """
     deep = _deep_key(text)
     if deep is not None:
@@ -86,7 +87,7 @@ def parse(text: str, where: str = "mechanism", folder: str | Path = "") -> Mecha
     except ValueError:  # Python refuses whole numbers of thousands of digits
         raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
     try:
-        return _mechanism(document, Path(folder))
+        return _mechanism(document, None if folder is None else Path(folder))
     except MechanismError as error:
         raise type(error)(f"{where}: {error}", **error.data) from None
 
@@ -98,7 +99,7 @@ def _deep_key(text: str) -> int | None:
     return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
 
 
-def _mechanism(document: dict[str, Any], folder: Path) -> Mechanism:
+def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
     check_keys("", document, _TABLES)
     units = table_of(document, "units")
     check_keys("[units]", units, ("length",))
@@ -142,7 +143,7 @@ def _checked_unit(unit: str) -> str:
 class _Reader:
     """Reads tables whose numbers may carry units."""
 
-    def __init__(self, length_unit: str, folder: Path) -> None:
+    def __init__(self, length_unit: str, folder: Path | None) -> None:
         self.length_unit = length_unit
         self.folder = folder
 

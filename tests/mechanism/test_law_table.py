@@ -264,10 +264,27 @@ def test_a_wrong_law_is_told_in_one_line(case: str, tmp_path: Path) -> None:
         (b"x,u\n0,nan\n", ", line 2: nan must be a finite number"),
         (b"x,1\n0,0\n", ", line 1: 'x' must be a number"),
         (b"0,0\n1,inf\n", ", line 2: inf must be a finite number"),
+        (b"0,0\n1,1_0\n", ", line 2: '1_0' must be a number"),
+        (b"0,0\n1,Infinity\n", ", line 2: 'Infinity' must be a number"),
+        ("0,0\n1,\u0663\n".encode(), ", line 2: '\u0663' must be a number"),
+        (b"0,0\n1," + b"1" * 200_000, ", line 2: field larger than field limit (131072)"),
         (b"\x00\xff\xfe", " is no text file (byte 1 is not UTF-8)"),
         (b"0,0\n" * 1_000_001, " is too large for a table (largest: 4000000 bytes)"),
     ],
-    ids=["three columns", "one column", "a word", "not a number", "half a header", "infinite", "binary", "too large"],
+    ids=[
+        "three columns",
+        "one column",
+        "a word",
+        "not a number",
+        "half a header",
+        "infinite",
+        "an underscore",
+        "another word",
+        "another script",
+        "a large field",
+        "binary",
+        "too large",
+    ],
 )
 def test_what_is_wrong_in_a_csv_file_is_told_with_its_line(tmp_path: Path, content: bytes, line: str) -> None:
     (tmp_path / "a.csv").write_bytes(content)

@@ -8,11 +8,14 @@ from typing import Any, Literal, cast
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
-from kinfmu.errors import FmuError
+from kinfmu.errors import FmuError, KinfmuError
 from kinfmu.fmu.description import fmi2, fmi3
+from kinfmu.fmu.description.checks import check
 from kinfmu.fmu.description.common import number, text
 from kinfmu.fmu.interface import Interface, Part, Variable
 from kinfmu.mechanism import RunSettings
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import check_name
 
 FmiVersion = Literal["2.0", "3.0"]
 _VERSIONS: dict[FmiVersion, Any] = {"2.0": fmi2, "3.0": fmi3}
@@ -63,22 +66,32 @@ def read(data: bytes, where: str) -> Description:
         raise FmuError(f"{where}: modelDescription.xml is not XML ({error})") from None
     said = root.get("fmiVersion", "unknown")
     if said not in _VERSIONS:
-        raise FmuError(f"{where}: FMI version {said}; kinfmu simulates FMI 2.0 and 3.0")
+        raise FmuError(f"{where}: FMI version {quoted(said)[1:-1]}; kinfmu simulates FMI 2.0 and 3.0")
     version = _VERSIONS[said]
     parts = version.parts(root)
     simulation = root.find("CoSimulation")
     if parts is None or simulation is None:
-        tool = root.get("generationTool", "an unknown tool")
+        tool = quoted(root.get("generationTool", "an unknown tool"))[1:-1]
         raise FmuError(f"{where}: made by {tool}; kinfmu simulates the co-simulation FMUs that kinfmu built")
-    interface = _interface(root, parts, [_variable(**fields) for fields in version.variables(root)])
-    return Description(
-        interface,
-        token=root.get(version.TOKEN, ""),
-        model_identifier=simulation.get("modelIdentifier", ""),
-        generation_tool=root.get("generationTool", ""),
-        version=said,
-        sources=tuple(file.get("name", "") for file in simulation.iterfind("SourceFiles/File")),
-    )
+    try:
+        interface = _interface(root, parts, [_variable(**fields) for fields in version.variables(root)])
+        about = Description(
+            interface,
+            token=root.get(version.TOKEN, ""),
+            model_identifier=simulation.get("modelIdentifier", ""),
+            generation_tool=root.get("generationTool", ""),
+            version=said,
+            sources=tuple(file.get("name", "") for file in simulation.iterfind("SourceFiles/File")),
+        )
+        check_name("modelName", interface.name)
+        check_name("modelIdentifier", about.model_identifier)  # a part of the library's path
+        check(interface)
+    except KeyError as error:
+        raise FmuError(f"{where}: modelDescription.xml is damaged: {error} is not known") from None
+    except (ValueError, StopIteration, OverflowError, KinfmuError) as error:
+        reason = str(error) or "a variable has no type"
+        raise FmuError(f"{where}: modelDescription.xml is damaged: {reason}") from None
+    return about
 
 
 def _interface(root: Element, parts: Element, variables: Sequence[Variable]) -> Interface:

@@ -1,0 +1,55 @@
+"""What a model description must hold so that kinfmu can step its FMU: descriptions of others may hold anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kinfmu.errors import FmuError, listed
+from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.naming import derivative_name, is_coordinate
+from kinfmu.units import METRES
+
+_ALONE = {  # parts of one variable, or of a fixed number of them
+    "residual": ("solver.residual",),
+    "margin": ("solver.margin",),
+    "errors": ("solver.error_q", "solver.error_qd", "solver.error_qdd"),
+    "counts": ("solver.status", "solver.iterations"),
+    "message": ("solver.message",),
+}
+
+
+def check(interface: Interface) -> None:
+    """Raise an FmuError for an interface that is not as `interface` makes them."""
+    if interface.length_unit not in METRES:
+        raise FmuError(f"unit of length {quoted(interface.length_unit)} is not one of {listed(METRES)}")
+    for name, variables in _ALONE.items():
+        if not set(variables) <= set(_names(interface.part(name))):
+            raise FmuError(f"part {name} does not hold {listed(variables)}")
+    switches = interface.part("drive")
+    if [(variable.type, type(variable.start)) for variable in switches] != [("Boolean", bool)]:
+        raise FmuError("part drive must be one Boolean variable with a start value")
+    _check_motion(interface)
+
+
+def _check_motion(interface: Interface) -> None:
+    """Raise an FmuError unless the outputs are coordinates, with their rates, and every driver has three inputs."""
+    outputs = _names(interface.part("values"))
+    for name in (*outputs, *_names(interface.part("fixed"))):
+        if not is_coordinate(name):
+            raise FmuError(f"{quoted(name)} is no coordinate such as 'crank.phi'")
+    for order, part in enumerate(("values", "rates", "accelerations")):
+        if _names(interface.part(part)) != [derivative_name(name, order) for name in outputs]:
+            raise FmuError(f"part {part} does not hold the derivatives of the outputs")
+    if not 0 <= interface.coordinate_count <= len(outputs):
+        raise FmuError(f"{interface.coordinate_count} of {len(outputs)} outputs cannot be coordinates")
+    inputs = _names(interface.part("inputs"))
+    if len(inputs) % 3 or _names(interface.part("driven")) != [f"driven.{name}" for name in inputs]:
+        raise FmuError("part driven does not hold the inputs, three for each driver")
+    for name in _names(interface.part("watch")):
+        if not name.startswith("watch."):
+            raise FmuError(f"{quoted(name)} is no watch")
+
+
+def _names(variables: Sequence[Variable]) -> list[str]:
+    return [variable.name for variable in variables]
