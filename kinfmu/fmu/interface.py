@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from kinfmu.errors import FmuError
+from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.status import Status
@@ -304,8 +305,11 @@ def _margin(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
 
 def _errors(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
     for order, suffix in enumerate(("q", "qd", "qdd")):
-        text = f"Estimated error of {suffix}: the largest among the outputs, lengths relative to the mechanism's size"
-        yield _solver_output(plan, every, f"solver.error_{suffix}", text, order, minimum=0.0)
+        text = (
+            f"Estimated error of {suffix}: the largest among the outputs, lengths relative to the mechanism's size; "
+            f"{UNKNOWN_ERROR:g} where there is no estimate"
+        )
+        yield _solver_output(plan, every, f"solver.error_{suffix}", text, order, minimum=0.0, maximum=UNKNOWN_ERROR)
 
 
 def _watches(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:

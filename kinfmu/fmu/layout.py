@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+UNKNOWN_ERROR = 1e30  # of solver.error_q, _qd, _qdd: an error without an estimate; many hosts cannot record an infinity
+
 
 class PartLayout(NamedTuple):
     """Variables that are computed together: their names, and start values where they have some."""

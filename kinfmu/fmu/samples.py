@@ -9,6 +9,7 @@ import numpy as np
 
 from kinfmu.channels import absent_columns
 from kinfmu.fmu.description import Description
+from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import Slave
 from kinfmu.run import Event, Run
 from kinfmu.sink import Sink
@@ -171,7 +172,7 @@ class Samples:
             iterations=iterations,
             residual=part["residual"][:, 0],
             margin=part["margin"][:, 0],
-            error=part["errors"],
+            error=np.where(part["errors"] >= UNKNOWN_ERROR, np.inf, part["errors"]),
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],
             length_unit=interface.length_unit,

@@ -18,7 +18,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import KEPT, Sample, errors_of_estimated_rates, estimated_rates
 from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
-from kinfmu.fmu.layout import Layout, Places
+from kinfmu.fmu.layout import UNKNOWN_ERROR, Layout, Places
 from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
@@ -224,7 +224,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if shown.errors is None:
             _, ud, udd = self._drive(shown)
             off = None if shown.stale or self._driven_by_time else self._errors_of_drive()
-            shown.errors = self._solver.errors(shown.pose, ud, udd, off)
+            errors = self._solver.errors(shown.pose, ud, udd, off)
+            shown.errors = tuple([min(error, UNKNOWN_ERROR) for error in errors])
         return shown.errors
 
     def _errors_of_drive(self) -> tuple[Row, Row]:

@@ -277,3 +277,12 @@ def test_fmpys_own_loop_ends_past_a_limit_with_the_last_good_pose(pendulum: Path
     assert rows["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0, 2.0]
     assert rows["solver.status"].tolist() == [0, 0, 0, 0, 1, 3]
     assert rows["lower.phi"][-1] == rows["lower.phi"][-2]
+
+
+def test_errors_without_an_estimate_are_infinite_in_the_run_and_finite_in_the_fmu(built: Callable[..., Path]) -> None:
+    run = simulate(
+        built("fourbar", "inputs"), stop=0.5, step=0.1, inputs={"time": [0.0, 1.0], "crank_angle": [0.1, 0.6]}
+    )
+    assert np.isinf(run.error[:2, 1:]).all()
+    assert np.isfinite(run.error[:, 0]).all()
+    assert (run.error[3:] < 1e-3).all()

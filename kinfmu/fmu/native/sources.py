@@ -11,6 +11,7 @@ from kinfmu.backends.c import compiler, emit
 from kinfmu.backends.c.text import array, booleans, string
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -95,6 +96,7 @@ def _header(variables: Interface, version: str, token: str) -> str:
         f"#define KF_DRIVEN_BY_TIME {references['driven_by_time']}",
         f"#define KF_MESSAGE_TEXT {references['solver.message']}",
         f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
+        f"#define KF_UNKNOWN_ERROR {UNKNOWN_ERROR!r} /* of solver.error_q, _qd, _qdd: there is no estimate */",
         f'#define KF_REAL_WORD "{words[0]}"',
         f'#define KF_STATUS_WORD "{words[1]}"',
         f'#define KF_ITERATIONS_WORD "{words[2]}"',

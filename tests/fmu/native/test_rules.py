@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.sources import HEADERS, headers
 from kinfmu.solver.status import Status
 from tests.fmu.native.conftest import Build, Start
@@ -383,6 +384,30 @@ def test_warning_goes_by_what_drives_in_the_end(start: Start, drive: str, is_war
     host.initialize(0.0)
     assert host.step(0.0, 0.1) == OK
     assert [status for status, _ in host.messages] == [WARNING] * is_warned
+
+
+@pytest.mark.parametrize("name", ["fourbar", "five_bar", "double_pendulum"])
+@pytest.mark.parametrize("wired", [0, 1, 2])
+def test_no_output_is_infinite_and_errors_without_an_estimate_are_the_declared_maximum(
+    start: Start, name: str, wired: int
+) -> None:
+    host = start(name)
+    inputs = [variable.name for variable in host.about.interface.part("inputs")]
+    first = dict(zip(inputs[::3], host.get(*inputs[::3]), strict=True))
+    (maximum,) = {variable.maximum for variable in host.about.interface.part("errors")}
+    assert maximum == UNKNOWN_ERROR
+    seen = set()
+    for k in range(6):
+        for driver in range(0, len(inputs), 3):
+            rates = (first[inputs[driver]] + 0.01 * k * k, 0.2 * k, 0.0)
+            host.set(dict(zip(inputs[driver : driver + 1 + wired], rates, strict=False)))
+        for _ in range(2):
+            assert all(map(math.isfinite, host.outputs()))
+            seen.update(host.get("solver.error_qd", "solver.error_qdd"))
+            assert host.step(0.1 * k, 0.1) == OK
+    assert max(seen) == UNKNOWN_ERROR
+    assert min(seen) < 1e-6
+    assert not [value for value in seen if 1e3 < value < UNKNOWN_ERROR]
 
 
 def test_rates_are_estimated_until_they_are_wired(start: Start) -> None:

@@ -142,6 +142,7 @@ static bool try_at(kf_solver *solver, kf_pose *start, kf_pose *pose, const doubl
     }
     if (parts & KF_BIT(KF_PART_ERRORS)) {
         kf_errors(solver, pose, drive[1], drive[2], row + kf_part_first[KF_PART_ERRORS]);
+        kf_bound_errors(row + kf_part_first[KF_PART_ERRORS]);
     }
     if (parts & KF_BIT(KF_PART_WATCH)) {
         kf_watches(&solver->model, &pose->found, row + kf_part_first[KF_PART_WATCH]);

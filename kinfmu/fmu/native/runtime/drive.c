@@ -250,8 +250,8 @@ static double largest_gap(const double *there, const double *here)
     return largest;
 }
 
-/* Estimated errors of q, qd, qdd of what is shown, with what estimated rates are off by. */
-void kf_find_errors(kf_state *s, double errors[3])
+/* Estimated errors of q, qd, qdd of what is shown, with the errors of estimated rates; infinite if unknown. */
+static void find_errors(kf_state *s, double errors[3])
 {
     kf_pose *const pose = kf_shown(s);
     double rates[2][KF_ROOM(KF_OUTPUTS)], accelerations[2][KF_ROOM(KF_OUTPUTS)];
@@ -287,4 +287,19 @@ void kf_find_errors(kf_state *s, double errors[3])
         s->udd[k] = udd;
         errors[2] += largest_gap(accelerations[1], accelerations[0]);
     }
+}
+
+/* Many hosts cannot record an infinity. */
+void kf_bound_errors(double errors[3])
+{
+    int order;
+    for (order = 0; order < 3; ++order) {
+        errors[order] = errors[order] < KF_UNKNOWN_ERROR ? errors[order] : KF_UNKNOWN_ERROR;
+    }
+}
+
+void kf_find_errors(kf_state *s, double errors[3])
+{
+    find_errors(s, errors);
+    kf_bound_errors(errors);
 }

@@ -157,6 +157,7 @@ void kf_find_rate_sources(kf_state *state);
 void kf_touch(kf_state *state); /* something is set: what is shown is that at the current time, not at the commit */
 void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
 void kf_find_errors(kf_state *state, double errors[3]);
+void kf_bound_errors(double errors[3]);
 double kf_moment(const kf_state *state, double *t, double *u);
 void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
 void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
