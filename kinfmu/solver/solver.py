@@ -19,7 +19,7 @@ from .advance import (
 from .estimate import estimated_errors, with_drive_errors
 from .linear import reciprocal_condition
 from .message import place
-from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of
+from .pose import ALONE, Model, Pose, Vector, evaluated, failed, on_road, tangent_of
 from .road import laid
 from .span import REGULAR
 from .status import Status
@@ -45,9 +45,10 @@ class Solver:
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
+        if start.base is not None and u != start.u:
+            start = start.base
         if u == start.u:
-            return start
-        start = start.base or start
+            return self._again(start)
         road = start.road
         if self._one:  # most samples: one trusted step, away from all that is singular
             s = u[0] - start.u[0]
@@ -66,6 +67,25 @@ class Solver:
         pose = advance(self.model, start, u, road)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
+        return self._checked(pose)
+
+    def _again(self, start: Pose) -> Pose:
+        """The pose at the driver values of `start`: `start` itself, unless nothing has judged it yet, as the anchor."""
+        pose = start
+        if start.margin < REGULAR and start.status == Status.OK and start.road is None:
+            road = surveyed(self.model, start, start) if self._one else None
+            found = start if road is None else advance(self.model, start, start.u, road)
+            if not isinstance(found, Limit):
+                pose = found
+            if pose is start and pose.margin < NEAR_SINGULAR:
+                pose = on_road(start, None)
+                pose.status = Status.NEAR_SINGULAR
+        if pose.residual <= self.tolerance and pose.watch <= self.tolerance:
+            return pose
+        return self._checked(on_road(pose, pose.road))
+
+    def _checked(self, pose: Pose) -> Pose:
+        """The pose, rejected if its rows do not close or the rows set aside as redundant do not hold."""
         tolerance = self.tolerance
         if not (pose.residual <= tolerance and pose.watch <= tolerance):
             self._reject(pose)

@@ -29,6 +29,7 @@ LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
 REGULAR = 0.02  # magnitudes are taken where what must stay positive is above
 STILL = 1e-3  # of the largest of its kind: below, a column hardly moves
 PASSES, PIECES = 14, 32
+FAR, FAR_PLACES = 4.0, 400  # [rad, lengths] that limits of several drivers are looked for in
 
 Floats = NDArray[np.float64]
 
@@ -288,6 +289,18 @@ class Walk:
                     here = target
                     now = {name: angles[name][k] for name in names}
         return Expected(side, angles, tightest)
+
+    def limit(self, here: Floats, direction: Floats) -> float | None:
+        """How far a straight way goes before the first limit, in steps of `direction`; None if it goes far."""
+        part = np.linspace(0.0, FAR, FAR_PLACES)
+        with np.errstate(all="ignore"):
+            for _ in range(PASSES):
+                values = _lowest(self.drawn.positions(here + direction * part[:, None]).closing.limits, len(part))
+                bad = _first_bad(values)
+                if bad is None or bad == 0:
+                    return None
+                part = np.linspace(part[bad - 1], part[bad], PIECES)
+        return float(part[0])
 
     def _least(self, here: Floats, target: Floats, lowest: Any) -> float:
         k = int(np.argmin(lowest))

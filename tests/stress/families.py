@@ -494,6 +494,41 @@ def five_bars(rng: Draw) -> Sketch:
     return Sketch(points, poses, drivers, kinds=("angle", "angle"))
 
 
+def robots(rng: Draw) -> Sketch:
+    """Two driven cranks with two bars between their ends; at times a third crank, with two bars from its end to theirs.
+
+    Samples lead to singular poses and back: see patterns.
+    """
+    base = five_bars(rng)
+    if rng.random() < 0.5:
+        return base
+    points = {body: dict(given) for body, given in base.points.items()}
+    reach = points["forearm"]["T"]
+    d, f, h, i = _place(rng, 2.0), *(drawn_length(rng, 0.4, 2.0) for _ in range(3))
+    side = _side(rng)
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = base.poses(numbers, u, closing)
+        at_d, at_e = standing(numbers, *d, u[0]), world(numbers, moving["forearm"], reach)
+        at_f = at_d + turned(u[2], numbers.number(f))
+        way = between(closing, at_e, (numbers.number(h), numbers.number(i)), at_f, side)
+        return {
+            **moving,
+            "third": Pose(at_d, u[2]),
+            "link": Pose(at_e, way.first.heading()),
+            "brace": Pose(at_f, way.second.heading()),
+        }
+
+    def drivers(frame: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        return (*base.drivers(frame, start), AngleDriver("wrist", "third", ConstantSpeed(start[2], 1.0)))
+
+    points["ground"]["D"], points["forearm"]["E"] = d, reach
+    points["third"] = {"D": ORIGIN, "F": (f, 0)}
+    points["link"] = {"E": ORIGIN, "X": (h, 0)}
+    points["brace"] = {"F": ORIGIN, "X": (i, 0)}
+    return Sketch(points, poses, drivers, kinds=("angle",) * 3)
+
+
 def cylinders(rng: Draw) -> Sketch:
     """A boom raised by a cylinder; at times with a stick on it, moved by a second one."""
     has_stick = rng.random() < 0.5
@@ -548,5 +583,6 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "geared five-bars": (geared_five_bars, 4),
     "redundant parallelograms": (redundant_parallelograms, 5),
     "five-bars": (five_bars, 4),
+    "robots": (robots, 4),
     "cylinders": (cylinders, 4),
 }

@@ -130,7 +130,7 @@ PATTERNS: dict[str, Callable[[Random, Interval], Values]] = {
 def drawn_steps(rng: Random, branch: Interval | Walk) -> tuple[list[str], Floats]:
     """Names of three patterns, and their driver values (n, d) one after the other."""
     if isinstance(branch, Walk):
-        return ["ways"], _ways(rng, branch)
+        return ["ways", "to limits and back"], np.concatenate([_ways(rng, branch), _to_limits(rng, branch)])
     names = rng.sample(sorted(PATTERNS), 3)
     steps: list[float] = []
     outside = 0
@@ -159,4 +159,23 @@ def _ways(rng: Random, branch: Walk) -> Floats:
             found.append(here)
         if reach < 0.5:
             here = found[-1]
+    return np.array(found)
+
+
+def _to_limits(rng: Random, branch: Walk) -> Floats:
+    """Of several drivers: straight to 1e-1 ... 1e-6 before a limit and back, by the same places or by others."""
+    drawn = branch.drawn
+    units = np.array([1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds])
+    generator = np.random.default_rng(rng.getrandbits(64))
+    here = np.array(drawn.start)
+    found = [here]
+    for _ in range(3):
+        direction = units * generator.uniform(-1.0, 1.0, len(units))
+        limit = branch.limit(here, direction)
+        if limit is None:
+            continue
+        gaps = np.sort(10.0 ** generator.uniform(-6.0, -1.0, 6))[::-1]
+        back = gaps[-2::-1] if generator.uniform() < 0.5 else np.sort(10.0 ** generator.uniform(-6.0, -1.0, 4))
+        found += [here + (limit - gap) * direction for gap in [*gaps, *back] if gap < limit]
+        found.append(here)
     return np.array(found)

@@ -63,6 +63,16 @@ static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
     return base;
 }
 
+static inline bool is_same(const double *a, const double *b)
+{
+    bool same = true;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        same = same && a[k] == b[k];
+    }
+    return same;
+}
+
 /* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
 static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *road)
 {
@@ -84,26 +94,53 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
     return false;
 }
 
+/* The pose, rejected if its rows do not close or the rows set aside as redundant do not hold. */
+static kf_status checked(kf_solver *solver, kf_pose *pose)
+{
+    if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
+        solver->message[0] = '\0';
+        return rejected(solver, pose);
+    }
+    return pose->status;
+}
+
+/* The pose at the driver values of the start: the start itself, unless nothing has judged it yet, as the anchor. */
+static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
+{
+    const kf_pose *found = NULL;
+    if (start->found.margin < KF_REGULAR && start->status == KF_OK && start->road < 0) {
+        kf_limit limit;
+        int road = -1;
+        if (KF_DRIVERS == 1) {
+            kf_needed(solver, start->road, start->road, start->road);
+            road = kf_surveyed(solver, start, start);
+        }
+        found = road < 0 ? NULL : kf_advance(solver, start, road, KF_POSE_U(start), &limit);
+    }
+    *pose = found == NULL ? *start : *found;
+    if (pose->status == KF_OK && pose->found.margin < KF_NEAR) {
+        pose->status = KF_NEAR_SINGULAR;
+    }
+    return checked(solver, pose);
+}
+
 inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     kf_pose *found;
     kf_limit limit;
     double sum = 0.0;
-    bool is_same = true;
     int road, k;
     if (solver->stuck) {
         return failed(pose, KF_INCONSISTENT);
     }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        is_same = is_same && u[k] == KF_POSE_U(start)[k];
-        sum += u[k];
-    }
-    if (is_same) {
-        *pose = *start;
-        return pose->status;
-    }
-    if (start->has_base) {
+    if (start->has_base && !is_same(u, KF_POSE_U(start))) {
         start = base_of(solver, start);
+    }
+    if (is_same(u, KF_POSE_U(start))) {
+        return again(solver, start, pose);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum += u[k];
     }
     road = start->road;
     if (KF_DRIVERS == 1 && is_near(solver, start, u, pose, &road)) { /* most samples */
@@ -121,10 +158,7 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
         return failed(pose, KF_OUTSIDE);
     }
     *pose = *found;
-    if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
-        return rejected(solver, pose);
-    }
-    return pose->status;
+    return checked(solver, pose);
 }
 
 /* Outputs, rates and accelerations from the derivatives that the pose holds: those with respect to the only driver, or
