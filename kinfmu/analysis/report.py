@@ -14,6 +14,7 @@ from kinfmu.analysis.named import NamedLoop, find_named
 from kinfmu.analysis.pose_matrices import pose_matrices
 from kinfmu.analysis.run_notes import run_notes
 from kinfmu.analysis.singular import DriverRange, SingularPoint, driver_range
+from kinfmu.analysis.start_notes import start_notes
 from kinfmu.analysis.text import lines
 from kinfmu.analysis.way import follow
 from kinfmu.equations.system import System
@@ -129,6 +130,7 @@ def check(mechanism: Mechanism) -> Report:
         loops = find_named(mechanism, redundancy, ())
         problem = better_told(problem, redundancy, advice)
         return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
+    notes += start_notes(system)
     ways = []
     for number, driver in enumerate(mechanism.drivers):
         try:

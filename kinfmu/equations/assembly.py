@@ -31,6 +31,9 @@ _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
+_LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
+_SHORTEST = 1e-3  # the same; where steps get shorter a limit lies between
+_CORRECTION = 0.02  # [rad, sizes]; a prediction that is corrected by more may have left the branch
 _SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
 
@@ -143,23 +146,118 @@ def null_space(matrix: FloatArray, small: float = _RANK) -> FloatArray:
     return np.asarray(right[rank:].T)
 
 
+class StartValues(NamedTuple):
+    """Where assembly begins: a rough pose q (n,) and driver values u (d,).
+
+    is_followed: True if the start poses and the laws give different driver values; is_moved: True if those of the laws
+    were taken, because they cannot be reached from those of the start poses.
+    """
+
+    q: FloatArray
+    u: FloatArray
+    is_followed: bool = False
+    is_moved: bool = False
+
+
 def rough_start(system: System) -> FloatArray:
-    """The start pose as the mechanism gives it; what it leaves out is 0."""
-    return np.array([value or 0.0 for body in system.mechanism.moving_bodies for value in body.start])
+    """Return the rough pose from which the mechanism is assembled, (n,): what the file leaves out is 0."""
+    return start_values(system).q
 
 
 def start_targets(system: System) -> FloatArray:
-    """Driver values of the start pose, (d,): measured in it where it gives what the driver moves, else by the law."""
-    given = [value is not None for body in system.mechanism.moving_bodies for value in body.start]
-    q = rough_start(system)
-    measured = system.measure(q)
-    targets = []
+    """Return the driver values at which the mechanism is assembled, (d,)."""
+    return start_values(system).u
+
+
+def start_values(system: System) -> StartValues:
+    """Return the rough pose and the driver values at which a mechanism is assembled.
+
+    The driver's value decides. Driven angles of the start poses are moved by whole turns to the start of the laws. From
+    there the pose is followed to the start of the laws: if it does not close, or a limit lies between, the mechanism is
+    assembled at the start of the laws.
+    """
+    given = start_from_poses(system)
+    return _decided(system)[0] if given.is_followed else given
+
+
+@lru_cache(maxsize=4)
+def _decided(system: System) -> tuple[StartValues, Assembled | None]:
+    """Return the start values of a mechanism whose start poses and laws give different ones, and the assembled pose."""
+    given, law = start_from_poses(system), law_targets(system)
+    found = _assembled(system, given)
+    if len(system.coordinates) > MOST_DENSE or (found is not None and _is_reached(system, found, law)):
+        return given, found
+    if found is None and len(system.rows) > len(system.coordinates):
+        return given, None  # joints that contradict each other may close at single poses that are not meant
+    moved = StartValues(_with_angles(system, given.q, law - given.u), law, is_followed=True, is_moved=True)
+    there = _assembled(system, moved)
+    return (moved, there) if there is not None and there.margin > SINGULAR else (given, found)
+
+
+def law_targets(system: System) -> FloatArray:
+    """Return the driver values at which the laws start, (d,)."""
+    mechanism = system.mechanism
+    return np.array([driver.law.at(mechanism.run.start) for driver in mechanism.drivers], dtype=float)
+
+
+def start_from_poses(system: System) -> StartValues:
+    """Return the start poses and the driver values in them, angles moved by whole turns to the start of the laws.
+
+    A driver whose value the start poses leave out is at the start of its law.
+    """
+    bodies = system.mechanism.moving_bodies
+    given = [value is not None for body in bodies for value in body.start]
+    q = np.array([value or 0.0 for body in bodies for value in body.start])
+    measured, law = system.measure(q), law_targets(system)
+    targets = law.copy()
+    turns = np.zeros(len(law))
     for k, driver in enumerate(system.mechanism.drivers):
         member = system.members[len(system.mechanism.joints) + k]
         (seen,) = system.gradients(member, q) != 0.0
-        is_given = all(given[column] for column, used in zip(member.columns, seen, strict=True) if used)
-        targets.append(measured[k] if is_given else driver.law.at(system.mechanism.run.start))
-    return np.array(targets, dtype=float)
+        if all(given[column] for column, used in zip(member.columns, seen, strict=True) if used):
+            if driver.quantity.kind == "angle":
+                turns[k] = math.tau * round((law[k] - measured[k]) / math.tau)
+            targets[k] = measured[k] + turns[k]
+    return StartValues(_with_angles(system, q, turns), targets, is_followed=not np.array_equal(targets, law))
+
+
+def _with_angles(system: System, q: FloatArray, change: FloatArray) -> FloatArray:
+    """Return a rough pose with driven angles changed by `change` (d,); driven lengths are left to assembly."""
+    q = q.copy()
+    for k, driver in enumerate(system.mechanism.drivers):
+        if driver.quantity.kind == "angle" and change[k] != 0.0:
+            member = system.members[len(system.mechanism.joints) + k]
+            (slopes,) = system.gradients(member, q)
+            turned = int(np.abs(slopes).argmax())
+            q[member.columns[turned]] += change[k] / slopes[turned]
+    return q
+
+
+def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
+    """True if a straight way of the drivers leads from a pose to other driver values: no limit lies between."""
+    q, u, at_rest = found.q, found.u, np.zeros(len(target))
+    way = target - u
+    done, step = 0.0, 1.0 / max(1.0, float(np.abs(way / _reaches(system)).max()) / _LONGEST)
+    while done < 1.0:
+        step = min(step, 1.0 - done)
+        ahead = target if step == 1.0 - done else u + step * way
+        jacobian = system.jacobian(q)
+        qd = np.linalg.lstsq(jacobian, system.nu(q, u, step * way), rcond=_RANK)[0]
+        qdd = np.linalg.lstsq(jacobian, system.gamma(q, qd, u, step * way, at_rest), rcond=_RANK)[0]
+        predicted = q + qd + 0.5 * qdd
+        trial, gap = close(system, predicted, ahead)
+        if gap <= CLOSED and np.abs((trial - predicted) / system.column_scales).max() <= _CORRECTION:
+            q, u, done, step = trial, ahead, done + step, 2.0 * step
+        else:
+            step /= 2.0
+            if step * float(np.abs(way / _reaches(system)).max()) < _SHORTEST:
+                return False
+    return True
+
+
+def _reaches(system: System) -> FloatArray:
+    """What counts as one unit of each driver, (d,): a radian, or the mechanism's size."""
+    return np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
 
 
 class Assembled(NamedTuple):
@@ -170,18 +268,23 @@ class Assembled(NamedTuple):
     margin: float  # the smallest over the blocks of smallest over largest singular value of the scaled Jacobian
 
 
-@lru_cache(maxsize=4)
 def assemble(system: System) -> Assembled | None:
     """The start pose, closed; if it is singular or nearly so, the most regular of it and the poses a little beside it.
 
     Block by block where rows and coordinates allow an order; all rows at once where they do not, or where a block is
     open or singular. None if the rows, all together, do not close near the start pose.
     """
-    u = start_targets(system)
+    values = start_values(system)
+    return _decided(system)[1] if values.is_followed else _assembled(system, values)
+
+
+def _assembled(system: System, start: StartValues) -> Assembled | None:
+    """Return what `assemble` does, from a rough pose and driver values."""
+    u = start.u
     order = in_order(system)
-    found, trouble = _assembled_in_order(system, u, rough_start(system), order)
-    if order.blocks and (found is None or _off(system, found) > NEAR):
-        found = _thrown_together(system, u, found, order)
+    found, trouble = _assembled_in_order(system, u, start.q, order)
+    if order.blocks and (found is None or _off(system, start, found) > NEAR):
+        found = _thrown_together(system, start, found, order)
     if found is not None:
         return found
     if len(system.coordinates) > MOST_DENSE:
@@ -189,15 +292,15 @@ def assemble(system: System) -> Assembled | None:
             f"a mechanism of {len(system.coordinates)} coordinates (more than {MOST_DENSE}) must assemble block by "
             f"block from its start pose, but {trouble}"
         )
-    q, gap = close(system, rough_start(system), u)
+    q, gap = close(system, start.q, u)
     if gap > CLOSED:
-        return None if order.blocks else _thrown_together(system, u, None, order)
+        return None if order.blocks else _thrown_together(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
     beside = []
     for side in (1.0, -1.0):
-        way = side * BESIDE * np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
+        way = side * BESIDE * _reaches(system)
         if found.margin > SINGULAR:
             near = _walked(system, q, u, way)
             back = None if near is None else _walked(system, near, u + way, -way)
@@ -277,10 +380,11 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     )
 
 
-def _thrown_together(system: System, u: FloatArray, first: Assembled | None, order: Ordered) -> Assembled | None:
+def _thrown_together(system: System, start: StartValues, first: Assembled | None, order: Ordered) -> Assembled | None:
     """Of a first pose and regular ones from seeded random values of what the start poses leave out, the one that comes
     nearest to what they give: the first that comes near, else the nearest of all.
     """
+    u = start.u
     is_open = np.array([value is None for body in system.mechanism.moving_bodies for value in body.start])
     if not is_open.any():
         return first
@@ -294,7 +398,7 @@ def _thrown_together(system: System, u: FloatArray, first: Assembled | None, ord
     nearest = first
     throws = _DENSE_THROWS if not order.blocks else _THROWS if first is None else _THROWS_TO_COME_NEARER
     for _ in range(throws):
-        thrown = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), rough_start(system))
+        thrown = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), start.q)
         if order.blocks:
             found, _ = _assembled_in_order(system, u, thrown, order)
         else:
@@ -302,20 +406,20 @@ def _thrown_together(system: System, u: FloatArray, first: Assembled | None, ord
             found = Assembled(q, u, margin(system, q)) if gap <= CLOSED else None
         if found is None or found.margin <= comfortable(system):
             continue
-        if nearest is None or _off(system, found) < _off(system, nearest):
+        if nearest is None or _off(system, start, found) < _off(system, start, nearest):
             nearest = found
-        if _off(system, nearest) <= NEAR:
+        if _off(system, start, nearest) <= NEAR:
             break
     return nearest
 
 
-def _off(system: System, found: Assembled) -> float:
+def _off(system: System, start: StartValues, found: Assembled) -> float:
     """How far a pose is from what the start poses give, in radians (without whole turns) and sizes."""
     largest = 0.0
-    given = (value for body in system.mechanism.moving_bodies for value in body.start)
-    for name, value, q in zip(system.coordinates, given, found.q, strict=True):
-        if value is not None:
-            off = float(q) - value
+    is_given = (value is not None for body in system.mechanism.moving_bodies for value in body.start)
+    for name, counts, value, q in zip(system.coordinates, is_given, start.q, found.q, strict=True):
+        if counts:
+            off = float(q) - float(value)
             off = math.remainder(off, math.tau) if name.endswith(".phi") else off / system.size
             largest = max(largest, abs(off))
     return largest

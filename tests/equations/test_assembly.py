@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -84,3 +85,67 @@ def test_a_start_angle_alone_chooses_the_assembly() -> None:
         assert report.problem is None, report.problem
         run = kinfmu.solve(replace(mechanism, bodies=bodies), crank_angle=[0.0, 1.0])
         assert np.sign(np.sin(run["coupler.phi"][1] - run["rocker.phi"][1])) == -side
+
+
+def _started(name: str, phi: float) -> Mechanism:
+    """A mechanism of the gallery whose driven body has another rough start angle."""
+    mechanism = kinfmu.load(name)
+    driven = mechanism.drivers[0].of  # type: ignore[attr-defined]  # an AngleDriver
+    bodies = (replace(body, start=body.start._replace(phi=phi)) for body in mechanism.bodies if body.name == driven)
+    (moved,) = bodies
+    return replace(mechanism, bodies=tuple(moved if body.name == driven else body for body in mechanism.bodies))
+
+
+@pytest.mark.parametrize("name", ["triple_rocker", "stephenson_six_bar", "inverted_slider_crank", "peaucellier"])
+@pytest.mark.parametrize("turns", [1, -1, 30])
+def test_whole_turns_of_a_start_pose_change_nothing(name: str, turns: int) -> None:
+    """The driver's value decides how many turns a driven body has made."""
+    mechanism = kinfmu.load(name)
+    law = mechanism.drivers[0].law
+    start, wanted = float(law.at(mechanism.run.start)), assemble(System(mechanism))
+    moved = assemble(System(_started(name, start + turns * math.tau)))
+    assert wanted is not None
+    assert moved is not None
+    np.testing.assert_allclose(moved.u, wanted.u, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(moved.q, wanted.q, rtol=0, atol=1e-11 * np.abs(wanted.q).max())
+
+
+@pytest.mark.parametrize("degrees", [425.0, -295.0, 60.0, 80.0, -65.0, 87.0, 200.0, 273.0, 447.0])
+def test_the_start_of_the_law_decides_whatever_the_rough_angle_of_the_driven_body(degrees: float) -> None:
+    mechanism = kinfmu.load("triple_rocker")
+    times = np.linspace(0.0, 2.0, 9)
+    wanted, run = (kinfmu.solve(one, times) for one in (mechanism, _started("triple_rocker", math.radians(degrees))))
+    assert run.good.all()
+    np.testing.assert_allclose(run.values, wanted.values, rtol=0, atol=1e-11)
+
+
+def test_a_start_pose_past_a_limit_gives_one_note() -> None:
+    report = kinfmu.check(_started("triple_rocker", math.radians(87.0)))
+    assert report.problem is None
+    assert report.notes == (
+        "the start poses give left = 1.51843645 rad (87 deg); the law starts at left = 1.13446401 rad (65 deg), which "
+        "cannot be reached from there: the mechanism is assembled at the start of the law",
+    )
+    assert kinfmu.check(_started("triple_rocker", math.radians(60.0))).notes == ()
+
+
+def test_start_poses_on_another_branch_than_the_law_can_reach_give_way() -> None:
+    """Two ranges of one four-bar, mirrored: the start pose is in one, the law starts in the other."""
+    bodies = [
+        Body("ground", {"O": (0, 0), "C": (4, 0)}),
+        Body("crank", {"O": (0, 0), "P": (3, 0)}, (0, 0, -0.9)),
+        Body("coupler", {"P": (0, 0), "Q": (3, 0)}),
+        Body("rocker", {"C": (0, 0), "Q": (1.2, 0)}),
+    ]
+    joints = [
+        Revolute("O", ("ground.O", "crank.O")),
+        Revolute("P", ("crank.P", "coupler.P")),
+        Revolute("Q", ("coupler.Q", "rocker.Q")),
+        Revolute("C", ("ground.C", "rocker.C")),
+    ]
+    low = math.acos((9 + 16 - 1.8**2) / 24)  # coupler folded over the rocker
+    for start in (0.6, -0.6):
+        assert low < abs(start)
+        mechanism = Mechanism("ranges", bodies, joints, [AngleDriver("crank", "crank", ConstantSpeed(start, 0.0))])
+        assert kinfmu.solve(mechanism, crank_angle=[start]).good.all()
+        assert len(kinfmu.check(mechanism).notes) == (start > 0)
