@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from hashlib import sha256
 from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
@@ -25,6 +26,7 @@ LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.goo
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 ROUNDING = 4.44e-16  # of a time: its last digits
+DIGEST = 32  # bytes of a SHA-256
 
 
 class Shown:
@@ -44,6 +46,11 @@ class Shown:
         self.rates: Row | None = None
         self.accelerations: Row | None = None
         self.errors: Row | None = None
+
+
+def _numbers(values: Sequence[float], like: Sequence[float]) -> Row:
+    """As many numbers as there are in `like`; ValueError or TypeError if they are not."""
+    return tuple([float(value) for value, _ in zip(values, like, strict=True)])
 
 
 class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
@@ -82,6 +89,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._unbound = False  # parameters were set and not yet bound
 
         self._initialized = False
+        self._running = False  # from the end of initialization to terminate
+        self._start_time = self.layout.start_time
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
         self._touched = False  # something was set since the last commit
         self._wired: set[int] = set()  # places among the inputs of rates seen other than 0
@@ -409,22 +418,33 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._refused[name] = f"{name} {why}"
         self.log(self._refused[name], Fmi2Status.error)
 
+    def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, *rest: Any, **more: Any) -> None:
+        """Log a text: in FMI 2.0 a message is a format, in which #r1# stands for a variable, so % and # are doubled."""
+        super().log(msg.replace("%", "%%").replace("#", "##"), status, *rest, **more)
+
     def _report_defect(self, error: Exception) -> None:
         self.log(f"defect in the FMU: {type(error).__name__}: {error}", Fmi2Status.error)
 
     # Run
 
     def setup_experiment(self, start_time: float, *_: Any) -> None:
-        self._time = start_time
+        if not math.isfinite(start_time):
+            self._refuse("start time", f"= {start_time!r} s is not a finite number; {self._start_time!r} s stays")
+            return
+        self._time = self._start_time = start_time
+        self._refused.pop("start time", None)
         self._forget()
 
     def exit_initialization_mode(self) -> None:
         try:
-            self._initialized = True
+            self._initialized = self._running = True
             if self._unbound:
                 self._bind()
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
+
+    def terminate(self) -> None:
+        self._running = False
 
     def _bind(self) -> None:
         """Bind the parameters: their anchor is reached by continuation, or every pose fails and says why."""
@@ -436,6 +456,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
+            end = current_time + step_size
+            if not (self._running and end - end == 0.0 and step_size >= 0.0 and current_time >= self._start_time):
+                reason = self._no_step(current_time, step_size)
+                if reason:
+                    self.log(reason, Fmi2Status.discard)
+                    return False
             if self._driven_by_time or self._refused:
                 return self._step(current_time, step_size)
             pose = self._pose
@@ -458,11 +484,21 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                     self._committed_inputs = tuple(self._inputs)
             else:
                 self._commit(pose, current_time, step_size)
-            self._time = current_time + step_size
+            self._time = end
             return True
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
             return False
+
+    def _no_step(self, current_time: float, step_size: float) -> str:
+        """Why a step is none, or nothing."""
+        if not self._running:
+            return "doStep before the end of initialization, or after terminate"
+        if not (math.isfinite(current_time + step_size) and step_size >= 0.0):
+            return f"doStep from t = {current_time:g} s by {step_size:g} s: a step needs finite numbers, not below 0"
+        if current_time < self._start_time - SAME_TIME * step_size:
+            return f"doStep from t = {current_time!r} s: that is before the start at {self._start_time!r} s"
+        return ""
 
     def _step(self, current_time: float, step_size: float) -> bool:
         """A step when time drives, which commits the poses at both its ends; or none, when a value was refused."""
@@ -527,6 +563,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "tolerance": self._tolerance,
             "driven_by_time": self._driven_by_time,
             "initialized": self._initialized,
+            "running": self._running,
+            "start_time": self._start_time,
             "time": self._time,
             "touched": self._touched,
             "wired": sorted(self._wired),
@@ -538,34 +576,46 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if state.get("token") != self.layout.token:
-            self._refuse("state", f"is not one of this FMU ({self.layout.token})")
-            return
-        self._inputs = list(state["inputs"])
-        self._constants = tuple(state["constants"])
-        self._tolerance = state["tolerance"]
+        before = dict(self.__dict__)
+        try:
+            if state.get("token") != self.layout.token:
+                self._refuse("state", f"is damaged, or not one of this FMU ({self.layout.token})")
+                return
+            self._restore(state)
+        except Exception as error:  # an exception here would be Fatal for the host
+            self.__dict__.update(before)
+            self._refuse("state", f"is damaged: {type(error).__name__}: {error}")
+
+    def _restore(self, state: dict[str, Any]) -> None:
+        self._inputs = list(_numbers(state["inputs"], self._inputs))
+        self._constants = _numbers(state["constants"], self._constants)
+        self._tolerance = float(state["tolerance"])
         self._driven_by_time = state["driven_by_time"]
         self._initialized = state["initialized"]
+        self._running = state["running"]
+        self._start_time = state["start_time"]
         self._time = state["time"]
         self._touched = state["touched"]
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
         self._stray_reported = state["stray_reported"]
-        self._parameters = tuple(state["parameters"])
+        self._parameters = _numbers(state["parameters"], self._parameters)
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.restore(state["committed"])
-        self._committed_inputs = tuple(state["committed_inputs"])
+        self._committed_inputs = _numbers(state["committed_inputs"], self._inputs)
         self._history = tuple((t, tuple(u)) for t, u in state["history"])
         self._forget()
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state).encode()
+        """The state as JSON after its SHA-256."""
+        data = json.dumps(state).encode()
+        return sha256(data).digest() + data
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        try:
-            return dict(json.loads(state))
-        except (ValueError, TypeError):
+        data = bytes(state[DIGEST:])
+        if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
             return {}  # refused when it is set: an exception here would be Fatal for the host
+        return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes

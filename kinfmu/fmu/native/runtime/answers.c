@@ -11,7 +11,7 @@ const char *const kf_categories[3] = {"logStatusWarning", "logStatusDiscard", "l
 
 kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...)
 {
-    char text[KF_MESSAGE + 120];
+    char text[KF_LONGEST];
     const int category = answer == KF_WARN ? 0 : answer == KF_DISCARD ? 1 : 2;
     va_list arguments;
     if (instance->tell != NULL && !instance->silent && !(instance->muted >> category & 1u)) {
@@ -23,13 +23,22 @@ kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char 
     return answer;
 }
 
+/* Error if one of two arrays of a call is NULL although it has elements. */
+kf_answer kf_no_array(const kf_instance *instance, size_t count)
+{
+    return kf_answered(instance, KF_ERROR, "a call with %zu elements has NULL for an array", count);
+}
+
 /* Of the categories named, or of all if none is. */
 kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories)
 {
     kf_answer answer = KF_DONE;
     unsigned named = 0;
     size_t k;
-    for (k = 0; categories != NULL && k < count; ++k) {
+    if (count && categories == NULL) {
+        return kf_no_array(instance, count);
+    }
+    for (k = 0; k < count; ++k) {
         int category = 0;
         while (category < 3 && (categories[k] == NULL || strcmp(categories[k], kf_categories[category]) != 0)) {
             ++category;

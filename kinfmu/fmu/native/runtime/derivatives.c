@@ -348,13 +348,14 @@ kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int or
 {
     const unsigned place = KF_PLACE(reference);
     const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
-    const int wanted = part + order;
+    int wanted;
     kf_answer answer;
-    if ((part != KF_PART_VALUES && part != KF_PART_RATES) || order < 1 || wanted > KF_PART_ACCELERATIONS) {
+    if ((part != KF_PART_VALUES && part != KF_PART_RATES) || order < 1 || order > KF_PART_ACCELERATIONS - part) {
         const char *const name = kf_name_of(reference);
         return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no derivative of order %d: positions have 1 and 2, "
                       "rates 1", name ? name : "what is not there", reference, order);
     }
+    wanted = part + order;
     answer = kf_read(instance, KF_BIT(wanted));
     *value = instance->now.real[kf_part_first[wanted] - kf_part_first[part] + (int)place];
     return answer;
@@ -368,6 +369,9 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     const unsigned place = KF_PLACE(reference);
     if (place >= 3 * KF_DRIVERS) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
+    }
+    if (s->model_exchange) {
+        return kf_answered(instance, KF_ERROR, "setRealInputDerivatives: this instance is for model exchange, which has no steps");
     }
     if (order < 1 || order > KF_INPUT_ORDERS || !isfinite(value)) {
         return kf_answered(instance, KF_ERROR, "%s: derivative of order %d = %g; orders 1 to %d and finite numbers are taken", name,

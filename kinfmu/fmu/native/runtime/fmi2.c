@@ -13,10 +13,20 @@ typedef struct {
     fmi2ComponentEnvironment environment;
 } instance2;
 
+/* In FMI 2.0 a message is a format, in which `#r1#` stands for a variable: text has its % and # twice. */
 static void tell(const void *host, kf_answer answer, const char *category, const char *message)
 {
     const instance2 *const instance = host;
-    instance->logger(instance->environment, instance->name, (fmi2Status)answer, category, message);
+    char text[2 * KF_LONGEST];
+    size_t n = 0;
+    for (; *message; ++message) {
+        text[n++] = *message;
+        if (*message == '%' || *message == '#') {
+            text[n++] = *message;
+        }
+    }
+    text[n] = '\0';
+    instance->logger(instance->environment, instance->name, (fmi2Status)answer, category, text);
 }
 
 static kf_instance *common(fmi2Component c)
@@ -87,13 +97,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     (void)tolerance;
     (void)stopTimeDefined;
     (void)stopTime;
-    if (c == NULL) {
-        return fmi2Error;
-    }
-    if (common(c)->now.mode != KF_INSTANTIATED) {
-        return unsupported(c, "setupExperiment: the instance is initialized already; reset it first");
-    }
-    return (fmi2Status)kf_set_time(common(c), startTime);
+    return c ? (fmi2Status)kf_set_start_time(common(c), startTime) : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
@@ -122,12 +126,13 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
-    return c ? (fmi2Status)kf_get_real(common(c), vr, nvr, value) : fmi2Error;
+    const kf_answer answer = kf_check(common(c), vr, value, nvr);
+    return (fmi2Status)(answer == KF_DONE ? kf_get_real(common(c), vr, nvr, value) : answer);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         long long number = 0;
@@ -139,7 +144,7 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         bool flag = false;
@@ -151,7 +156,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         answer = kf_get_string(common(c), vr[k], &value[k]);
@@ -161,18 +166,19 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
-    return c ? (fmi2Status)kf_set_real(common(c), vr, nvr, value) : fmi2Error;
+    const kf_answer answer = kf_check(common(c), vr, value, nvr);
+    return (fmi2Status)(answer == KF_DONE ? kf_set_real(common(c), vr, nvr, value) : answer);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
-    (void)value;
-    return c && nvr == 0 ? fmi2OK : c ? (fmi2Status)kf_not_settable(common(c), vr[0], "Integer") : fmi2Error;
+    const kf_answer answer = kf_check(common(c), vr, value, nvr);
+    return (fmi2Status)(answer == KF_DONE && nvr ? kf_not_settable(common(c), vr[0], "Integer") : answer);
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         answer = kf_set_boolean(common(c), vr[k], value[k] != fmi2False);
@@ -182,8 +188,8 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    (void)value;
-    return c && nvr == 0 ? fmi2OK : c ? (fmi2Status)kf_not_settable(common(c), vr[0], "String") : fmi2Error;
+    const kf_answer answer = kf_check(common(c), vr, value, nvr);
+    return (fmi2Status)(answer == KF_DONE && nvr ? kf_not_settable(common(c), vr[0], "String") : answer);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
@@ -230,8 +236,14 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[])
 {
-    return c ? (fmi2Status)kf_directional(common(c), vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown)
-             : fmi2Error;
+    kf_answer answer = kf_check(common(c), vUnknown_ref, dvUnknown, nUnknown);
+    if (answer == KF_DONE) {
+        answer = kf_check(common(c), vKnown_ref, dvKnown, nKnown);
+    }
+    if (answer == KF_DONE) {
+        answer = kf_directional(common(c), vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
+    }
+    return (fmi2Status)answer;
 }
 
 /* Model exchange: there are no continuous states and no events. */
@@ -313,8 +325,11 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
                                        const fmi2Real value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
+    if (answer == KF_DONE && nvr && order == NULL) {
+        answer = kf_no_array(common(c), nvr);
+    }
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         answer = kf_set_input_derivative(common(c), vr[k], order[k], value[k]);
     }
@@ -324,8 +339,11 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
                                         fmi2Real value[])
 {
-    kf_answer answer = c ? KF_DONE : KF_ERROR;
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
     size_t k;
+    if (answer == KF_DONE && nvr && order == NULL) {
+        answer = kf_no_array(common(c), nvr);
+    }
     for (k = 0; answer == KF_DONE && k < nvr; ++k) {
         answer = kf_output_derivative(common(c), vr[k], order[k], &value[k]);
     }
@@ -355,8 +373,8 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
 {
-    if (c == NULL || s != fmi2LastSuccessfulTime) {
-        return c ? fmi2Discard : fmi2Error;
+    if (c == NULL || value == NULL || s != fmi2LastSuccessfulTime) {
+        return c && value ? fmi2Discard : fmi2Error;
     }
     *value = common(c)->now.last_time;
     return fmi2OK;
@@ -371,8 +389,8 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
 {
-    if (c == NULL || s != fmi2Terminated) {
-        return c ? fmi2Discard : fmi2Error;
+    if (c == NULL || value == NULL || s != fmi2Terminated) {
+        return c && value ? fmi2Discard : fmi2Error;
     }
     *value = common(c)->now.terminated ? fmi2True : fmi2False;
     return fmi2OK;

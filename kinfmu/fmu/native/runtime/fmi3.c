@@ -152,35 +152,33 @@ fmi3Status fmi3Reset(fmi3Instance instance)
     return fmi3OK;
 }
 
-/* Every variable is a scalar: as many values as references. */
-static KF_RARE fmi3Status wrong_count(fmi3Instance instance, size_t references, size_t values)
+static KF_RARE kf_answer wrong_count(fmi3Instance instance, size_t references, size_t values)
 {
-    return (fmi3Status)kf_answered(common(instance), KF_ERROR, "%zu value references, but %zu values: every variable is a scalar",
-                              references, values);
+    return kf_answered(common(instance), KF_ERROR, "%zu value references, but %zu values: every variable is a scalar",
+                       references, values);
+}
+
+/* Every variable is a scalar: as many values as references. */
+static kf_answer check(fmi3Instance instance, const void *references, size_t count, const void *values, size_t value_count)
+{
+    if (instance && count != value_count) {
+        return wrong_count(instance, count, value_count);
+    }
+    return kf_check(common(instance), references, values, count);
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
-    if (instance == NULL) {
-        return fmi3Error;
-    }
-    if (nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
-    }
-    return (fmi3Status)kf_get_real(common(instance), valueReferences, nValueReferences, values);
+    const kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
+    return (fmi3Status)(answer == KF_DONE ? kf_get_real(common(instance), valueReferences, nValueReferences, values) : answer);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
-    if (instance == NULL) {
-        return fmi3Error;
-    }
-    if (nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
-    }
-    return (fmi3Status)kf_set_real(common(instance), valueReferences, nValueReferences, values);
+    const kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
+    return (fmi3Status)(answer == KF_DONE ? kf_set_real(common(instance), valueReferences, nValueReferences, values) : answer);
 }
 
 /* solver.status is an enumeration, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */
@@ -188,11 +186,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     fmi3Status fmi3Get##word(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,  \
                              fmi3##word values[], size_t nValues)                                                       \
     {                                                                                                                  \
-        kf_answer answer = instance ? KF_DONE : KF_ERROR;                                                              \
+        kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);                        \
         size_t k;                                                                                                      \
-        if (instance && nValues != nValueReferences) {                                                                 \
-            return wrong_count(instance, nValueReferences, nValues);                                                   \
-        }                                                                                                              \
         for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {                                                  \
             long long number = 0;                                                                                      \
             answer = kf_get_count(common(instance), valueReferences[k], #word, &number);                               \
@@ -207,11 +202,8 @@ GET_COUNT(Int64)
 fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Boolean values[], size_t nValues)
 {
-    kf_answer answer = instance ? KF_DONE : KF_ERROR;
+    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
     size_t k;
-    if (instance && nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
-    }
     for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
         answer = kf_get_boolean(common(instance), valueReferences[k], &values[k]);
     }
@@ -221,11 +213,8 @@ fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueR
 fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Boolean values[], size_t nValues)
 {
-    kf_answer answer = instance ? KF_DONE : KF_ERROR;
+    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
     size_t k;
-    if (instance && nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
-    }
     for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
         answer = kf_set_boolean(common(instance), valueReferences[k], values[k]);
     }
@@ -235,11 +224,8 @@ fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference valueR
 fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                          fmi3String values[], size_t nValues)
 {
-    kf_answer answer = instance ? KF_DONE : KF_ERROR;
+    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
     size_t k;
-    if (instance && nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
-    }
     for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
         answer = kf_get_string(common(instance), valueReferences[k], &values[k]);
     }
@@ -249,16 +235,14 @@ fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueRe
 /* Types that no variable has, or none that can be set. */
 static fmi3Status none_to_get(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
 {
-    return instance && count == 0 ? fmi3OK
-           : instance             ? (fmi3Status)kf_not_a(common(instance), references[0], type)
-                                  : fmi3Error;
+    const kf_answer answer = kf_check(common(instance), references, references, count);
+    return (fmi3Status)(answer == KF_DONE && count ? kf_not_a(common(instance), references[0], type) : answer);
 }
 
 static fmi3Status none_to_set(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
 {
-    return instance && count == 0 ? fmi3OK
-           : instance             ? (fmi3Status)kf_not_settable(common(instance), references[0], type)
-                                  : fmi3Error;
+    const kf_answer answer = kf_check(common(instance), references, references, count);
+    return (fmi3Status)(answer == KF_DONE && count ? kf_not_settable(common(instance), references[0], type) : answer);
 }
 
 #define NONE_TO_GET(word)                                                                                              \
@@ -396,13 +380,14 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    if (instance == NULL) {
-        return fmi3Error;
+    kf_answer answer = check(instance, unknowns, nUnknowns, sensitivity, nSensitivity);
+    if (answer == KF_DONE) {
+        answer = check(instance, knowns, nKnowns, seed, nSeed);
     }
-    if (nSeed != nKnowns || nSensitivity != nUnknowns) {
-        return wrong_count(instance, nKnowns + nUnknowns, nSeed + nSensitivity);
+    if (answer == KF_DONE) {
+        answer = kf_directional(common(instance), unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
     }
-    return (fmi3Status)kf_directional(common(instance), unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -620,10 +605,10 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 {
-    kf_answer answer = instance ? KF_DONE : KF_ERROR;
+    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
     size_t k;
-    if (instance && nValues != nValueReferences) {
-        return wrong_count(instance, nValueReferences, nValues);
+    if (answer == KF_DONE && nValueReferences && orders == NULL) {
+        answer = kf_no_array(common(instance), nValueReferences);
     }
     for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
         answer = kf_output_derivative(common(instance), valueReferences[k], orders[k], &values[k]);

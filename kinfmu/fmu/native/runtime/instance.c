@@ -255,22 +255,33 @@ static kf_answer warn_of_inputs(kf_instance *instance)
                        kf_name_of(s->stray));
 }
 
-kf_answer kf_step(kf_instance *instance, double time, double step)
+/* Why a step is none. */
+static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, double step)
 {
-    kf_state *const s = &instance->now;
-    kf_answer answer, done;
+    const kf_state *const s = &instance->now;
     if (s->mode != KF_STEPPING) {
         return kf_answered(instance, KF_ERROR, "doStep before the end of initialization, or after terminate");
     }
-    if (!(isfinite(time) && isfinite(step) && step >= 0.0)) {
-        return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time,
-                      step);
+    if (isfinite(time + step) && step >= 0.0) {
+        return kf_answered(instance, KF_ERROR, "doStep from t = %.17g s: that is before the start at %.17g s", time,
+                           s->start_time);
+    }
+    return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time, step);
+}
+
+kf_answer kf_step(kf_instance *instance, double time, double step)
+{
+    kf_state *const s = &instance->now;
+    const double end = time + step;
+    kf_answer answer, done;
+    if (!(s->mode == KF_STEPPING && end - end == 0.0 && step >= 0.0 && time >= s->start_time - SAME_TIME * step)) {
+        return refuse_step(instance, time, step);
     }
     answer = warn_of_inputs(instance);
     done = s->driven_by_time ? step_by_time(instance, time, step) : step_by_inputs(instance, time, step);
     if (done == KF_DONE) {
         s->failed = s->terminated = false;
-        s->last_time = time + step;
+        s->last_time = end;
         return answer;
     }
     return done;
@@ -288,7 +299,7 @@ kf_answer kf_enter_initialization(kf_instance *instance, double start_time)
         return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", start_time);
     }
     s->mode = KF_INITIALIZATION;
-    s->time = s->last_time = start_time;
+    s->time = s->last_time = s->start_time = start_time;
     kf_forget(s);
     return KF_DONE;
 }
@@ -320,18 +331,40 @@ kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function)
     return KF_DONE;
 }
 
-kf_answer kf_set_time(kf_instance *instance, double time)
+static void move_to(kf_state *s, double time)
 {
-    kf_state *const s = &instance->now;
-    if (!isfinite(time)) {
-        return kf_answered(instance, KF_ERROR, "setTime: %g s is not a finite number", time);
-    }
     if (time != s->time) {
         s->time = time;
         if (s->driven_by_time) {
             kf_forget(s);
         }
     }
+}
+
+kf_answer kf_set_start_time(kf_instance *instance, double time)
+{
+    if (instance->now.mode != KF_INSTANTIATED) {
+        return kf_answered(instance, KF_ERROR, "setupExperiment: the instance is initialized already; reset it first");
+    }
+    if (!isfinite(time)) {
+        return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", time);
+    }
+    move_to(&instance->now, time);
+    return KF_DONE;
+}
+
+kf_answer kf_set_time(kf_instance *instance, double time)
+{
+    if (!instance->now.model_exchange) {
+        return kf_answered(instance, KF_ERROR, "setTime: this instance is for co-simulation, where doStep sets the time");
+    }
+    if (instance->now.mode == KF_TERMINATED) {
+        return kf_answered(instance, KF_ERROR, "setTime: not possible after terminate");
+    }
+    if (!isfinite(time)) {
+        return kf_answered(instance, KF_ERROR, "setTime: %g s is not a finite number", time);
+    }
+    move_to(&instance->now, time);
     return KF_DONE;
 }
 

@@ -69,6 +69,7 @@ typedef struct {
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
     bool failed, terminated;
     double failed_time, failed_step, last_time;
+    double start_time;
     kf_solver solver; /* the last: what it needs for a call only is not copied */
 } kf_state;
 
@@ -94,9 +95,12 @@ typedef struct {
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 
+#define KF_LONGEST (KF_MESSAGE + 120) /* bytes of a message with what is said about it */
+
 /* Messages: `kf_answered` formats one, hands it to the host and returns `answer`. */
 extern const char *const kf_categories[3];
 KF_RARE kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...);
+KF_RARE kf_answer kf_no_array(const kf_instance *instance, size_t count);
 kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories);
 
 /* Life. kf_start: as freshly instantiated. */
@@ -105,6 +109,7 @@ void kf_start(kf_instance *instance, bool model_exchange);
 kf_answer kf_enter_initialization(kf_instance *instance, double start_time);
 kf_answer kf_exit_initialization(kf_instance *instance);
 kf_answer kf_step(kf_instance *instance, double time, double step);
+kf_answer kf_set_start_time(kf_instance *instance, double time);
 kf_answer kf_set_time(kf_instance *instance, double time);
 kf_answer kf_complete_integrator_step(kf_instance *instance);
 kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
@@ -162,6 +167,15 @@ double kf_moment(const kf_state *state, double *t, double *u);
 void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd);
 void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
                                   double *of_ud, double *of_udd);
+
+/* Whether a call can be done as far as its arguments go: an instance, and arrays that are there. */
+static inline kf_answer kf_check(const kf_instance *instance, const void *references, const void *values, size_t count)
+{
+    if (instance == NULL) {
+        return KF_ERROR;
+    }
+    return count && (references == NULL || values == NULL) ? kf_no_array(instance, count) : KF_DONE;
+}
 
 /* The pose asked for, good or not. */
 static inline kf_status kf_ask(kf_instance *instance)

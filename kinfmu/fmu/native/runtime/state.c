@@ -1,10 +1,28 @@
-/* States: a copy of what an instance knows. Serialized ones carry the FMU's token: they fit no other one. */
+/* States: a copy of what an instance knows.
+ *
+ * Serialized: the FMU's token, so that it fits no other one; a checksum, since a solver that goes on from changed bytes may
+ * do anything; and the copy.
+ */
 #include "instance.h"
 
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const char token[] = KF_TOKEN;
+
+#define CHECKED (sizeof token + sizeof(uint64_t)) /* where the copy begins */
+
+/* FNV-1a of 64 bits: each change of a single byte changes it. */
+static uint64_t checksum(const unsigned char *bytes)
+{
+    uint64_t sum = 14695981039346656037u;
+    size_t k;
+    for (k = 0; k < KF_STATE_SIZE; ++k) {
+        sum = (sum ^ bytes[k]) * 1099511628211u;
+    }
+    return sum;
+}
 
 kf_answer kf_copy_state(kf_instance *instance, void **state)
 {
@@ -26,30 +44,44 @@ kf_answer kf_restore_state(kf_instance *instance, const void *state)
     if (state == NULL) {
         return kf_answered(instance, KF_ERROR, "setFMUState: there is no state");
     }
+    if (((const kf_state *)state)->model_exchange != instance->now.model_exchange) {
+        return kf_answered(instance, KF_ERROR, "setFMUState: the state is of an instance for %s, this one is for %s",
+                           instance->now.model_exchange ? "co-simulation" : "model exchange",
+                           instance->now.model_exchange ? "model exchange" : "co-simulation");
+    }
     memcpy(&instance->now, state, KF_STATE_SIZE);
     return KF_DONE;
 }
 
 size_t kf_serialized_size(void)
 {
-    return sizeof token + KF_STATE_SIZE;
+    return CHECKED + KF_STATE_SIZE;
 }
 
 kf_answer kf_serialize(kf_instance *instance, const void *state, unsigned char *bytes, size_t size)
 {
+    uint64_t sum;
     if (state == NULL || bytes == NULL || size < kf_serialized_size()) {
         return kf_answered(instance, KF_ERROR, "serializeFMUState: a state and room for %zu bytes are needed",
                       kf_serialized_size());
     }
     memcpy(bytes, token, sizeof token);
-    memcpy(bytes + sizeof token, state, KF_STATE_SIZE);
+    memcpy(bytes + CHECKED, state, KF_STATE_SIZE);
+    sum = checksum(bytes + CHECKED);
+    memcpy(bytes + sizeof token, &sum, sizeof sum);
     return KF_DONE;
 }
 
 kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size_t size, void **state)
 {
+    uint64_t sum;
     if (bytes == NULL || state == NULL || size != kf_serialized_size() || memcmp(bytes, token, sizeof token) != 0) {
-        return kf_answered(instance, KF_ERROR, "deserializeFMUState: these bytes are not a state of this FMU (%s)", token);
+        return kf_answered(instance, KF_ERROR, "deserializeFMUState: these %zu bytes are not a state of this FMU (%s), which "
+                      "has %zu", bytes ? size : 0, token, kf_serialized_size());
+    }
+    memcpy(&sum, bytes + sizeof token, sizeof sum);
+    if (sum != checksum(bytes + CHECKED)) {
+        return kf_answered(instance, KF_ERROR, "deserializeFMUState: the state is damaged, its checksum does not fit");
     }
     if (*state == NULL) {
         *state = malloc(KF_STATE_SIZE);
@@ -57,6 +89,6 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
     if (*state == NULL) {
         return kf_answered(instance, KF_ERROR, "deserializeFMUState: out of memory");
     }
-    memcpy(*state, bytes + sizeof token, KF_STATE_SIZE);
+    memcpy(*state, bytes + CHECKED, KF_STATE_SIZE);
     return KF_DONE;
 }
