@@ -39,6 +39,7 @@ from kinfmu.mechanism import toml_file
 from kinfmu.run import Event, Run
 
 ROWS = 4096  # samples in a chunk of a run that is there as a whole; more take memory, fewer time
+LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
 SAMPLE_TOPIC = "/sample"
 MECHANISM_FILE = "mechanism.toml"
 MODEL_DESCRIPTION = "modelDescription.xml"
@@ -60,8 +61,9 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
         try:
-            for start in range(0, len(run), ROWS):
-                content.add(run.part(slice(start, start + ROWS)))
+            rows = max(1, min(ROWS, LARGEST_CHUNK // (64 + 8 * sum(1 for _ in run.places()))))
+            for start in range(0, len(run), rows):
+                content.add(run.part(slice(start, start + rows)))
             content.log(unexplained(status_events(run), run.events), run.events)
             content.end(run)
         finally:

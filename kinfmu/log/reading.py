@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,9 +26,10 @@ from kinfmu.log.mcap_file import (
     sample_template,
     write_mcap,
 )
-from kinfmu.log.record import column_count, events_of, run_of
+from kinfmu.log.record import lists_in, run_of
+from kinfmu.log.record_text import events_of, samples_of, whole_number
 from kinfmu.log.scan import Scan
-from kinfmu.run import Event, FloatArray, Run
+from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 
 
 def read(path: str | Path) -> Run:
@@ -99,24 +101,34 @@ def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
         end = {}
     if not (end or is_cut):
         raise LogError("how the run ended is missing or damaged")
-    blocks, fault = _samples(scan, channel, sample_template(column_count(texts)), is_cut=is_cut)
+    about = lists_in(texts)
+    count = samples_of(end) if end else MOST_SAMPLES
+    events = events_of(end) if end else ()
+    blocks, fault = _samples(scan, channel, sample_template(len(about["columns"])), count, is_cut=is_cut)
     samples = sum(map(len, blocks))
-    if end and samples != int(end["samples"]):
-        fault = fault or f"holds {samples} of {end['samples']} samples"
+    if end and samples != count:
+        fault = fault or f"holds {samples} of {count} samples"
     if fault and not is_cut:
         raise LogError(fault)
-    run = run_of(texts, blocks, (), info, attachments[MECHANISM_FILE], attachments[MODEL_DESCRIPTION])
-    events = events_of(end) if end else _logged_events(scan, run.t)
-    return replace(run, events=events), fault
+    run = run_of(about, blocks, events, info, attachments[MECHANISM_FILE], attachments[MODEL_DESCRIPTION])
+    return run if end else replace(run, events=_logged_events(scan, run.t)), fault
 
 
-def _samples(scan: Scan, channel: int, template: Template, *, is_cut: bool) -> tuple[list[NDArray[np.uint64]], str]:
-    """Rows of samples, in blocks in the order of their numbers, and why there are no more."""
+def _samples(
+    scan: Scan, channel: int, template: Template, count: int, *, is_cut: bool
+) -> tuple[list[NDArray[np.uint64]], str]:
+    """Rows of samples, in blocks in the order of their numbers, and why there are no more; count: the most there are.
+
+    What the file says of their number bounds the memory: it ends there.
+    """
     blocks: list[NDArray[np.uint64]] = []
     numbers: list[NDArray[np.uint32]] = []
-    fault = scan.fault
+    fault, found = scan.fault, 0
     try:
-        for block in scan.blocks(channel):
+        for block in scan.blocks(channel, template.length):
+            found += len(block.sequence)
+            if found > count:
+                raise LogError(f"holds more than {count} samples")
             if block.payloads.shape[1] != template.length:
                 raise LogError(f"a sample has {block.payloads.shape[1]} bytes instead of {template.length}")
             blocks.append(template.read(block.payloads))
@@ -141,7 +153,7 @@ def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
     about = scan.metadata.get(ABOUT, {})
     if channel is None:
         return ()
-    zero = int(about.get("time_zero_s", "0"))
+    zero = whole_number(about, "time_zero_s")
     events = []
     times = dict(zip((nanoseconds(t) - zero * NANOSECONDS).tolist(), t.tolist(), strict=True))
     try:
@@ -150,8 +162,8 @@ def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
                 event = event_in(payload.tobytes(), times.get(stamp, zero + stamp / NANOSECONDS))
                 if event:
                     events.append(event)
-    except LogError:
-        pass  # the samples say why the file ends there
+    except (LogError, ValueError, IndexError, struct.error):
+        pass  # the samples say why the file ends there; what is no message of the log ends it, too
     return tuple(events)
 
 

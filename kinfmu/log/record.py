@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
@@ -15,7 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import LogError
+from kinfmu.log.record_text import lists_of
+from kinfmu.mechanism.quoted import quoted
 from kinfmu.run import Event, Run
+from kinfmu.solver.status import Status
 
 FORMAT = "2"  # raised when files written before can no longer be read the same way
 _INTEGERS = ("status", "iterations")
@@ -43,14 +47,15 @@ def ending(run: Run) -> dict[str, str]:
     return {"samples": json.dumps(len(run)), "events": json.dumps(run.events, ensure_ascii=False)}
 
 
-def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
-    """The events in the texts of `ending`."""
-    return tuple(Event(float(t), level, text) for t, level, text in json.loads(texts["events"]))
-
-
-def column_count(texts: Mapping[str, str]) -> int:
-    """Number of columns that a description tells of."""
-    return len(json.loads(texts.get("columns", "[]")))
+def lists_in(texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return what `description` put into texts; LogError for another format, and for lists that do not go together."""
+    if texts.get("format") != FORMAT:
+        raise LogError(f"format {quoted(texts.get('format'))} of the record; this kinfmu reads {FORMAT!r}")
+    about = lists_of(texts)
+    names = [place.name for place in _empty(about, 0).places()]
+    if names != about["columns"]:
+        raise LogError("columns of the record are not those of its outputs, inputs and watches")
+    return about
 
 
 def is_integer(table: str) -> bool:
@@ -87,18 +92,35 @@ def _of_columns(table: NDArray[Any]) -> NDArray[Any]:
 
 
 def run_of(
-    texts: Mapping[str, str],
+    about: Mapping[str, Any],
     blocks: Sequence[NDArray[np.uint64]],
     events: Sequence[Event],
     info: Mapping[str, str],
     mechanism_text: str,
     model_description: str,
 ) -> Run:
-    """The run that `description` and the rows of `tables`, in blocks (k, columns), were made of."""
-    if texts.get("format") != FORMAT:
-        raise LogError(f"format {texts.get('format')!r} of the record; this kinfmu reads {FORMAT!r}")
-    about = {key: json.loads(text) for key, text in texts.items() if key != "format"}
-    n = sum(map(len, blocks))
+    """The run that was written; about: of `lists_in`; blocks: (k, columns) rows of `tables`.
+
+    Raises a LogError for samples whose status or time is none.
+    """
+    run = replace(
+        _empty(about, sum(map(len, blocks))),
+        mechanism_text=mechanism_text,
+        model_description=model_description,
+        info=dict(info),
+        events=tuple(events),
+    )
+    _fill(run, blocks)
+    if not np.isin(run.status, list(Status)).all():
+        row = int(np.argmin(np.isin(run.status, list(Status))))
+        raise LogError(f"sample {row} has the status {run.status[row]}; known: 0 to {max(Status):d}")
+    if not np.isfinite(run.t).all():
+        raise LogError(f"time of sample {int(np.argmin(np.isfinite(run.t)))} is not a finite number")
+    return run
+
+
+def _empty(about: Mapping[str, Any], n: int) -> Run:
+    """A run of n samples that are not filled in yet; columns that were not kept hold NaN."""
     outputs, inputs, watches = (tuple(about[key]) for key in ("outputs", "input_names", "watch_names"))
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
@@ -113,17 +135,12 @@ def run_of(
         input_names=inputs,
         watch_names=watches,
         length_unit=about["length_unit"],
-        mechanism_text=mechanism_text,
-        model_description=model_description,
-        info=dict(info),
-        events=tuple(events),
         absent=frozenset(about["absent"]),
         **blank,
     )
     for place in empty.places(kept=False):
         if place.name in empty.absent and not is_integer(place.table):
             _of_columns(getattr(empty, place.table))[:, place.column or 0] = np.nan
-    _fill(empty, blocks)
     return empty
 
 

@@ -14,6 +14,15 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import LogError, MissingPackageError
 from kinfmu.log.container import MAGIC, MESSAGE, Bytes, Opcode
+from kinfmu.mechanism.quoted import quoted
+
+MOST_IN_CHUNK = 2**27  # [bytes] unpacked; twice what a chunk of ours holds
+ALWAYS = 2**20  # [bytes] that every chunk may unpack to, whatever its index says
+MOST_UNPACKED = 2**27  # [bytes] in all chunks of a channel, or LARGEST_RATIO times the file
+LARGEST_RATIO = 2000  # of unpacked to packed; an index of 16 bytes a message leaves less
+MOST_RECORDS = 2**22  # in chunks that mix messages of several channels or lengths
+_HEAD = struct.Struct("<BQ")  # of a record: its kind and its length
+_ENTRY = 16  # [bytes] of a message in the index of its chunk
 
 
 class Channel(NamedTuple):
@@ -33,11 +42,17 @@ class Block(NamedTuple):
 
 @dataclass
 class _Chunk:
-    """Where a chunk's record stands, and the channels that its index names; none if it has no index."""
+    """Where a chunk's record is, and how many messages of each channel its index counts; none without an index."""
 
     place: int
     length: int
-    channels: set[int] = field(default_factory=set)
+    messages: dict[int, int] = field(default_factory=dict)
+
+    def most(self, channel: int, length: int | None) -> int:
+        """Bytes that it may unpack to; length: of a message's payload, if all have the same."""
+        if length is None or list(self.messages) != [channel]:
+            return MOST_IN_CHUNK
+        return min(MOST_IN_CHUNK, max(ALWAYS, 2 * self.messages[channel] * (MESSAGE.itemsize + length)))
 
 
 class Scan:
@@ -50,19 +65,28 @@ class Scan:
         self._path = path
         self._chunks: list[_Chunk] = []
         with path.open("rb") as file:
-            self.fault = self._read(file, path.stat().st_size)
+            self._size = path.stat().st_size
+            self.fault = self._read(file, self._size)
 
     def id_of(self, topic: str) -> int | None:
         """The channel of a topic."""
         return next((number for number, channel in self.channels.items() if channel.topic == topic), None)
 
-    def blocks(self, channel: int) -> Iterator[Block]:
-        """The messages of a channel in file order; LogError where a chunk is damaged."""
+    def blocks(self, channel: int, length: int | None = None) -> Iterator[Block]:
+        """The messages of a channel in file order; length: of every payload, if they are known to have the same.
+
+        Raises a LogError where a chunk is damaged, and where one or all of them unpack to more than they can hold.
+        """
+        left = max(MOST_UNPACKED, LARGEST_RATIO * self._size)
+        budget = [MOST_RECORDS]
         with self._path.open("rb") as file:
             for chunk in self._chunks:
-                if not chunk.channels or channel in chunk.channels:
+                if not chunk.messages or channel in chunk.messages:
                     file.seek(chunk.place)
-                    yield from _messages(_unpacked(file.read(chunk.length), chunk.place), channel)
+                    most = min(left, chunk.most(channel, length))
+                    raw = _unpacked(file.read(chunk.length), chunk.place, most)
+                    left -= len(raw)
+                    yield from _messages(raw, channel, chunk.place, budget)
 
     def _read(self, file: BinaryIO, size: int) -> str:
         if file.read(len(MAGIC)) != MAGIC:
@@ -89,7 +113,10 @@ class Scan:
         if kind == Opcode.CHUNK:
             self._chunks.append(_Chunk(file.tell(), length))
         elif kind == Opcode.MESSAGE_INDEX and self._chunks:
-            self._chunks[-1].channels.add(*struct.unpack("<H", file.read(2)))
+            number, entries = _Body(file.read(min(length, 6))).numbers("<HI")
+            if entries > length - 6:
+                raise ValueError("a field goes beyond its end")
+            self._chunks[-1].messages[number] = entries // _ENTRY
         elif kind == Opcode.CHANNEL:
             body = _Body(file.read(length))
             number, _ = body.numbers("<HH")
@@ -139,13 +166,15 @@ class _Body:
         return found
 
 
-def _unpacked(data: bytes, place: int) -> Bytes:
-    """The messages of a chunk, whose record has this body at this byte of the file."""
+def _unpacked(data: bytes, place: int, most: int) -> Bytes:
+    """The messages of a chunk, whose record has this body at this byte of the file; most: bytes that they may have."""
     try:
         body = _Body(data)
         _, _, size = body.numbers("<QQQ")
         (crc,) = body.numbers("<I")
         compression = body.text()
+        if size > most:
+            raise ValueError(f"it says that it unpacks to {size} bytes, and {most} is the most here")
         (count,) = body.numbers("<Q")
         raw = _decompressed(compression, body.taken(count), size)
     except (ValueError, struct.error) as error:
@@ -172,16 +201,19 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
             import lz4.frame
 
             try:
-                return bytes(lz4.frame.decompress(data))
-            except RuntimeError as error:
+                return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+            except (RuntimeError, EOFError) as error:
                 raise ValueError(str(error)) from None
     except ImportError as error:
         raise MissingPackageError(f"chunks of {compression} need {error.name}: pip install {error.name}") from None
-    raise ValueError(f"compression '{compression}' is not known")
+    raise ValueError(f"compression {quoted(compression)} is not known")
 
 
-def _messages(raw: Bytes, channel: int) -> Iterator[Block]:
-    """Messages of a channel among the records of a chunk."""
+def _messages(raw: Bytes, channel: int, place: int, budget: list[int]) -> Iterator[Block]:
+    """Messages of a channel among the records of a chunk, which begins at this byte of the file.
+
+    budget: records of mixed chunks that may still be looked at; it goes down.
+    """
     length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
     if length and len(raw) % length == 0:
         table = raw.reshape(-1, length)
@@ -190,13 +222,18 @@ def _messages(raw: Bytes, channel: int) -> Iterator[Block]:
             if heads["channel"][0] == channel:
                 yield _block(table)
             return
-    at = 0
+    at, view = 0, raw.data
     while at + 9 <= len(raw):
-        length = 9 + int(raw[at + 1 : at + 9].view("<u8")[0])
-        record = raw[at : at + length].reshape(1, -1)
-        if raw[at] == Opcode.MESSAGE and record[0, 9:11].view("<u2")[0] == channel:
-            yield _block(record)
-        at += length
+        kind, length = _HEAD.unpack_from(view, at)
+        budget[0] -= 1
+        if at + 9 + length > len(raw) or (kind == Opcode.MESSAGE and 9 + length < MESSAGE.itemsize) or budget[0] < 0:
+            told = "too many records" if budget[0] < 0 else "a record goes beyond its end"
+            raise LogError(f"the chunk at byte {place} is damaged: {told}")
+        if kind == Opcode.MESSAGE:
+            record = raw[at : at + 9 + length].reshape(1, -1)
+            if record[0, 9:11].view("<u2")[0] == channel:
+                yield _block(record)
+        at += 9 + length
 
 
 def _are_alike(heads: NDArray[np.void]) -> bool:

@@ -74,6 +74,8 @@ def parse(text: str, where: str = "mechanism", folder: str | Path | None = None)
     where: names the text in messages; folder: where files that it names are looked for; without one, as for the text
     inside an FMU or a record, no file is opened. Raises a MechanismError that names the table and the key at fault.
     """
+    if len(text) > LARGEST_FILE:
+        raise MechanismError(f"{where}: too large for a mechanism (largest: {LARGEST_FILE} characters)")
     deep = _deep_key(text)
     if deep is not None:
         line = text.count("\n", 0, deep) + 1

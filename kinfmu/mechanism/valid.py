@@ -41,8 +41,13 @@ def is_number(value: object) -> bool:
 
 def check_line(where: str, text: str) -> None:
     """Raise a MechanismError unless `text` is one line that terminals, TOML and XML take."""
-    if not all(map(_is_text, text)):
+    if not is_line(text):
         raise MechanismError(f"{where} = {quoted(text)} must be one line of text without control characters")
+
+
+def is_line(text: str) -> bool:
+    """Return True for one line of text that terminals, TOML and XML take."""
+    return all(map(_is_text, text))
 
 
 def _is_text(character: str) -> bool:

@@ -1,0 +1,133 @@
+"""The texts of a record, read: a file of others may hold anything under a valid checksum."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from kinfmu.errors import LogError, listed
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import is_line
+from kinfmu.naming import is_coordinate
+from kinfmu.run import MOST_SAMPLES, Event
+from kinfmu.units import METRES
+
+MOST_COLUMNS = 500_000  # three times those of the largest mechanism
+LEVELS = ("info", "warning", "error")
+_ORDERS = ("", "_speed", "_acceleration")  # of the inputs of a driver
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
+
+
+def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return what `record.description` put into the texts: names by kind, units, constants, counts.
+
+    Raises a LogError for what is missing or of another kind, for names that cannot be names, and for too many of them.
+    """
+    kinds: dict[str, tuple[Callable[[Any], bool], str]] = {
+        "columns": (_are_lines, "names"),
+        "units": (_are_texts, "texts by name"),
+        "absent": (_are_lines, "names"),
+        "outputs": (_are_coordinates, "coordinates"),
+        "coordinate_count": (_is_count, "a count"),
+        "fixed": (_are_constants, "numbers by coordinate"),
+        "input_names": (_are_inputs, "inputs, three for each driver"),
+        "watch_names": (_are_lines, "names"),
+        "length_unit": (lambda value: isinstance(value, str) and value in METRES, f"one of {listed(METRES)}"),
+    }
+    found = {}
+    for key, (is_valid, valid) in kinds.items():
+        found[key] = value = _value(texts, key)
+        if isinstance(value, list | dict) and len(value) > MOST_COLUMNS:
+            raise LogError(f"{key} of the record: {len(value)} entries; {MOST_COLUMNS} at most")
+        if not is_valid(value):
+            raise LogError(f"{key} of the record = {quoted(value)} must be {valid}")
+    if found["coordinate_count"] > len(found["outputs"]):
+        raise LogError(f"coordinate_count of the record = {found['coordinate_count']} is more than its outputs")
+    if len(set(found["columns"])) < len(found["columns"]):
+        raise LogError("columns of the record hold a name twice")
+    return found
+
+
+def samples_of(texts: Mapping[str, str]) -> int:
+    """Return the number of samples in the texts of `record.ending`; LogError if there is none."""
+    count = _value(texts, "samples")
+    if not _is_count(count):
+        raise LogError(f"samples of the record = {quoted(count)} must be a count")
+    return int(count)
+
+
+def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
+    """Return the events in the texts of `record.ending`; LogError for what is no event."""
+    entries = _value(texts, "events")
+    if not isinstance(entries, list):
+        raise LogError(f"events of the record = {quoted(entries)} must be a list")
+    for entry in entries:
+        if not _is_event(entry):
+            raise LogError(f"events of the record: {quoted(entry)} must be [time, level, text]")
+    return tuple(Event(float(t), level, text) for t, level, text in entries)
+
+
+def whole_number(texts: Mapping[str, str], key: str) -> int:
+    """Return a whole number that is written as a text, 0 if there is none; LogError for any other text."""
+    text = texts.get(key, "0")
+    if not re.fullmatch(r"[+-]?[0-9]{1,12}", text):
+        raise LogError(f"{key} of the record = {quoted(text)} must be a whole number")
+    return int(text)
+
+
+def _value(texts: Mapping[str, str], key: str) -> Any:
+    """The JSON value of a text."""
+    if key not in texts:
+        raise LogError(f"{key} of the record is missing")
+    try:
+        return json.loads(texts[key])
+    except RecursionError:
+        raise LogError(f"{key} of the record is nested too deeply") from None
+    except ValueError as error:
+        raise LogError(f"{key} of the record is not JSON ({error})") from None
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_SAMPLES
+
+
+def _is_number(value: Any) -> bool:
+    """True for a number that a double holds; infinity and NaN are numbers of JSON in Python."""
+    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1e300)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
+
+
+def _are_lines(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) and is_line(name) for name in value)
+
+
+def _are_coordinates(value: Any) -> bool:
+    return _are_lines(value) and all(_NAME.fullmatch(name) and is_coordinate(name) for name in value)
+
+
+def _are_constants(value: Any) -> bool:
+    return isinstance(value, dict) and _are_coordinates(list(value)) and all(map(_is_number, value.values()))
+
+
+def _are_inputs(value: Any) -> bool:
+    return (
+        _are_lines(value)
+        and len(value) % 3 == 0
+        and all(_NAME.fullmatch(name) and name.endswith(_ORDERS[k % 3]) for k, name in enumerate(value))
+    )
+
+
+def _is_event(entry: Any) -> bool:
+    return (
+        isinstance(entry, list)
+        and len(entry) == 3
+        and _is_number(entry[0])
+        and entry[1] in LEVELS
+        and isinstance(entry[2], str)
+        and not any("\ud800" <= character <= "\udfff" for character in entry[2])
+    )

@@ -1,0 +1,201 @@
+"""Records made to do harm: odd texts under valid checksums, sizes that lie, chunks that unpack to gigabytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+import time
+import tracemalloc
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+
+from kinfmu.errors import LogError
+from kinfmu.log import mcap_file, read, record, record_text, recover, scan, write_mcap
+from kinfmu.log.container import MESSAGE, ZSTD, Opcode
+from kinfmu.run import Run
+
+NAMES = 600_000  # more than a record may hold
+
+
+def line_of(path: Path) -> str:
+    """The one line that reading and recovering say, without the name of the file."""
+    with pytest.raises(LogError) as caught:
+        read(path)
+    (line,) = str(caught.value).splitlines()
+    try:
+        recover(path, path.with_name("again.mcap"))
+    except LogError as error:
+        assert len(str(error).splitlines()) == 1  # noqa: PT017  # the file may have a beginning that is whole
+    assert line.startswith(f"{path}: ")
+    assert len(line) < 1000
+    return line.removeprefix(f"{path}: ").removesuffix(f"; kinfmu recover {path} keeps what is there")
+
+
+def with_texts(run: Run, path: Path, begin: dict[str, str], end: dict[str, str] | None = None) -> Path:
+    """The record of a run with other texts, whose checksums fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mcap_file, "description", lambda run: record.description(run) | begin)
+        patch.setattr(mcap_file, "ending", lambda run: record.ending(run) | (end or {}))
+        write_mcap(run.part(slice(0, 3)), path, channels=["-drawn"])
+    return path
+
+
+DEEP = "[" * 100_000
+ODD: list[Any] = [None, True, -1, 1.5, 10**400, "a", [], {}, [1], {"a": 1}, {"a.x": []}]
+ODD += [["\ud800"], ["a\nb"], [["a.x"]]]
+KEYS = ("columns", "units", "absent", "outputs", "coordinate_count", "fixed", "input_names", "watch_names")
+KEYS += ("length_unit", "format")
+FITTING = {"absent": ([],), "units": ({},), "watch_names": (), "fixed": ({},), "coordinate_count": ()}  # by key
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_odd_texts_at_the_beginning_are_one_line(run: Run, tmp_path: Path, key: str) -> None:
+    for value in ODD:
+        if value in FITTING.get(key, ()):
+            continue
+        line = line_of(with_texts(run, tmp_path / "a.mcap", {key: json.dumps(value)}))
+        assert key.removesuffix("s") in line or "columns of the record" in line
+    for text in ("", "{", "nul", DEEP, "[" + "1," * 10, "9" * 5000, '"\ud800"'.encode("utf-8", "replace").decode()):
+        assert key.removesuffix("s") in line_of(with_texts(run, tmp_path / "a.mcap", {key: text}))
+
+
+@pytest.mark.parametrize("key", ["samples", "events"])
+def test_odd_texts_at_the_end_are_one_line(run: Run, tmp_path: Path, key: str) -> None:
+    events: list[Any] = [["a"], [[0.0, "info"]], [[0.0, "shout", "a"]], [["0", "info", "a"]], [[0.0, "info", "\ud800"]]]
+    values = [value for value in ODD if not (key == "events" and value == [])] + (events if key == "events" else [])
+    for text in (*map(json.dumps, values), "", "{", DEEP):
+        assert key in line_of(with_texts(run, tmp_path / "a.mcap", {}, {key: text}))
+
+
+@pytest.mark.parametrize(
+    ("begin", "words"),
+    [
+        ({"outputs": '["crank.psi"]'}, "outputs of the record = ['crank.psi'] must be coordinates"),
+        ({"outputs": '["a b.x"]'}, "must be coordinates"),
+        ({"input_names": '["a_angle", "a_speed"]'}, "must be inputs, three for each driver"),
+        ({"input_names": '["a_angle", "a_acceleration", "a_speed"]'}, "must be inputs, three for each driver"),
+        ({"length_unit": '"parsec"'}, "length_unit of the record = 'parsec' must be one of m, mm"),
+        ({"coordinate_count": "8"}, "coordinate_count of the record = 8 is more than its outputs"),
+        ({"watch_names": '["AB", "CD"]'}, "columns of the record are not those of its outputs, inputs and watches"),
+        ({"absent": '["coupler.x"]'}, "columns of the record are not those of its outputs, inputs and watches"),
+        ({"columns": '["time", "time"]'}, "columns of the record hold a name twice"),
+        ({"format": "9\n9"}, r"format '9\n9' of the record; this kinfmu reads '2'"),
+    ],
+)
+def test_texts_that_do_not_go_together_are_one_line(
+    run: Run, tmp_path: Path, begin: dict[str, str], words: str
+) -> None:
+    assert words in line_of(with_texts(run, tmp_path / "a.mcap", begin))
+
+
+@pytest.mark.parametrize("key", ["outputs", "columns", "absent", "watch_names"])
+def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str) -> None:
+    names = json.dumps([f"a{k}.x" for k in range(NAMES)])
+    path = with_texts(run, tmp_path / "a.mcap", {key: names})
+    began = time.process_time()
+    told = f"{key} of the record: {NAMES} entries; {record_text.MOST_COLUMNS} at most"
+    assert line_of(path) == told
+    assert time.process_time() - began < 5.0
+
+
+def test_a_status_and_a_time_that_are_none_are_one_line(run: Run, tmp_path: Path) -> None:
+    odd = dataclasses.replace(run, status=np.where(np.arange(len(run)) == 1, 17, run.status))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mcap_file, "sentence", lambda _: "")
+        patch.setattr(mcap_file, "status_events", lambda _: [])
+        write_mcap(odd, tmp_path / "a.mcap")
+    assert line_of(tmp_path / "a.mcap") == "sample 1 has the status 17; known: 0 to 5"
+
+
+# ------------------------------------------------------------------------------------------------ sizes that lie
+
+
+def chunk(raw: bytes, size: int | None = None, compression: str = ZSTD, packed: bytes | None = None) -> bytes:
+    """The record of a chunk of these messages; size: what it says that it unpacks to."""
+    if packed is None:
+        packed = zstandard.ZstdCompressor(level=1).compress(raw)
+    name = compression.encode()
+    body = struct.pack("<QQQI", 0, 0, len(raw) if size is None else size, zlib.crc32(raw) if raw else 0)
+    body += struct.pack("<I", len(name)) + name + struct.pack("<Q", len(packed)) + packed
+    return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+
+
+def behind_the_first(run: Run, path: Path, *chunks: bytes) -> Path:
+    """The record of a run with more chunks before the end of its data."""
+    write_mcap(run, path)
+    whole = path.read_bytes()
+    at = whole.rindex(struct.pack("<BQ", Opcode.DATA_END, 4))
+    path.write_bytes(whole[:at] + b"".join(chunks) + whole[at:])
+    return path
+
+
+def test_a_chunk_that_says_it_unpacks_to_a_terabyte_is_refused(run: Run, tmp_path: Path) -> None:
+    path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 2**40, packed=b""))
+    tracemalloc.start()
+    try:
+        assert f"it says that it unpacks to {2**40} bytes, and {scan.MOST_IN_CHUNK} is the most here" in line_of(path)
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_chunks_that_unpack_to_gigabytes_are_refused_together(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scan, "MOST_UNPACKED", 2**22)
+    monkeypatch.setattr(scan, "LARGEST_RATIO", 1)
+    empty = struct.pack("<BQ", Opcode.DATA_END, 2**20 - 9) + bytes(2**20 - 9)
+    path = behind_the_first(run, tmp_path / "a.mcap", *[chunk(empty)] * 10)
+    assert "it says that it unpacks to 1048576 bytes, and" in line_of(path)
+
+
+def test_a_chunk_may_unpack_to_little_more_than_its_index_says(run: Run, tmp_path: Path) -> None:
+    write_mcap(run, tmp_path / "a.mcap")
+    opened = scan.Scan(tmp_path / "a.mcap")
+    channel = opened.id_of("/sample")
+    assert channel is not None
+    first = next(one for one in opened._chunks if channel in one.messages)
+    length = next(opened.blocks(channel)).payloads.shape[1]
+    true = first.messages[channel] * (MESSAGE.itemsize + length)
+    assert true <= first.most(channel, length) <= max(2 * true, scan.ALWAYS)
+
+
+RECORDS = {
+    "of no length": bytes(9) * 100,
+    "a record beyond the end": struct.pack("<BQ", Opcode.MESSAGE, 2**60) + bytes(100),
+    "a message that is too short": struct.pack("<BQ", Opcode.MESSAGE, 3) + bytes(3) + bytes(9),
+    "half a head": bytes(9) + b"\x05\x01",
+}
+
+
+@pytest.mark.parametrize("case", RECORDS)
+def test_records_of_odd_lengths_in_a_chunk_are_one_line_or_nothing(run: Run, tmp_path: Path, case: str) -> None:
+    path = behind_the_first(run, tmp_path / "a.mcap", chunk(RECORDS[case]))
+    if case in ("of no length", "half a head"):
+        assert len(read(path)) == len(run)
+    else:
+        assert "is damaged: a record goes beyond its end" in line_of(path)
+
+
+def test_millions_of_tiny_records_are_refused(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scan, "MOST_RECORDS", 1000)
+    path = behind_the_first(run, tmp_path / "a.mcap", chunk(bytes(9) * 1001))
+    assert "is damaged: too many records" in line_of(path)
+
+
+def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_says(run: Run, tmp_path: Path) -> None:
+    lz4 = pytest.importorskip("lz4.frame")
+    raw = bytes(2**24)
+    path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 100, "lz4", lz4.compress(raw)))
+    tracemalloc.start()
+    try:
+        assert "its checksum does not fit" in line_of(path)
+        assert tracemalloc.get_traced_memory()[1] < 8e6
+    finally:
+        tracemalloc.stop()
