@@ -56,29 +56,25 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
     """Estimated errors of q, qd, qdd: the largest among the outputs, in radians and sizes, a second and a second^2."""
     drive = _drive(pose, ud, udd)
     rates = _rates(model, pose, drive)
-    angles = [abs(value) for value, name in zip(model.outputs(pose.values), model.OUTPUTS) if name[-4:] == ".phi"]  # noqa: B905
-    largest = max(angles, default=0.0)
-    v = max([abs(a) / r for a, r in zip(ud, model.REACH)], default=0.0)  # noqa: B905  one a driver, both
-    a = max([abs(a) / r for a, r in zip(udd, model.REACH)], default=0.0)  # noqa: B905
+    first, second, speed, curve = rates
+    here = model.motion(pose.values, ud, udd, first, second)
+    largest = max([abs(here[k]) for k in model.ANGLES], default=0.0)
     if len(ud) == 1:
         r = model.REACH[0]
-        speed, curve = rates.speed * r * v, rates.curve * r * r * v * v + rates.speed * r * a
-    else:
-        speed, curve = rates.speed, rates.curve
+        v = abs(ud[0]) / r
+        speed, curve = speed * r * v, curve * r * r * v * v + speed * r * (abs(udd[0]) / r)
     least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
     squares = [0.0, 0.0, 0.0]
-    here = model.motion(pose.values, ud, udd, rates.first, rates.second)
-    n = len(model.OUTPUTS)
     try:
         sources = _sources(model, pose, drive, rates)
         if pose.bridge is not None:
             sources.append(_of_bridge(model, pose, drive, rates))
         for source in sources:
             values, first, second = _moved(model, pose, drive, rates, source)
-            there = model.motion(values, ud, udd, first, second)
-            for order in range(3):
-                row = slice(order * n, order * n + n)
-                squares[order] += _largest(model, there[row], here[row]) ** 2
+            q, qd, qdd = _differences(model, model.motion(values, ud, udd, first, second), here)
+            squares[0] += q * q
+            squares[1] += qd * qd
+            squares[2] += qdd * qdd
     except (ArithmeticError, ValueError):  # exactly singular, or the sine of an overflow
         return NOTHING_KNOWN
     if not sum(squares) < inf:
@@ -108,18 +104,16 @@ def with_drive_errors(
     """The errors with what drivers add whose speeds and accelerations are off by as much as `off` says, each >= 0."""
     of_q, of_qd, of_qdd = errors
     here = _motion(model, pose, ud, udd)
-    n = len(model.OUTPUTS)
     for k, (speed, acceleration) in enumerate(zip(*off)):  # noqa: B905  one a driver, both
         if speed == inf:
             return of_q, inf, inf
-        there = _motion(model, pose, _shifted(ud, k, speed), udd)
-        of_qd += _largest(model, there[n : 2 * n], here[n : 2 * n])
-        of_qdd += _largest(model, there[2 * n :], here[2 * n :])
+        _, by_speed, by_speed_too = _differences(model, _motion(model, pose, _shifted(ud, k, speed), udd), here)
+        of_qd += by_speed
+        of_qdd += by_speed_too
         if acceleration == inf:
             of_qdd = inf
         else:
-            there = _motion(model, pose, ud, _shifted(udd, k, acceleration))
-            of_qdd += _largest(model, there[2 * n :], here[2 * n :])
+            of_qdd += _differences(model, _motion(model, pose, ud, _shifted(udd, k, acceleration)), here)[2]
     return of_q, of_qd, of_qdd
 
 
@@ -131,6 +125,15 @@ def _motion(model: Model, pose: Pose, ud: Vector, udd: Vector) -> Vector:
     """Positions, rates and accelerations of the outputs."""
     rates = _rates(model, pose, _drive(pose, ud, udd))
     return model.motion(pose.values, ud, udd, rates.first, rates.second)  # type: ignore[no-any-return]
+
+
+def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, float, float]:
+    """The largest differences of two rows of motion, of each order, in radians and sizes; inf for what is no number."""
+    if -inf < sum(there) + sum(here) < inf:
+        return model.differences(there, here)  # type: ignore[no-any-return]  # generated code has no types
+    n = len(model.OUTPUTS)
+    q, qd, qdd = [_largest(model, there[k : k + n], here[k : k + n]) for k in range(0, 3 * n, n)]
+    return q, qd, qdd
 
 
 def _largest(model: Model, there: Vector, here: Vector) -> float:
@@ -150,68 +153,67 @@ def _drive(pose: Pose, ud: Vector, udd: Vector) -> Drive:
 
 
 def _rates(model: Model, pose: Pose, drive: Drive) -> Rates:
+    speed = curve = 0.0
     if len(drive.ud) == 1:
         first, second = tangent_of(model, pose)
     else:
         first = tuple(model.velocity(pose.values, drive.ud))
         second = tuple(model.acceleration(pose.values, drive.ud, drive.udd, first))
-    scales = model.UNKNOWN_SCALES
-    driven = [abs(a) / r for a, r in zip(drive.ud, model.REACH)]  # noqa: B905  one a driver, both
-    speed = max([abs(a) / c for a, c in zip(first, scales)] + driven, default=0.0)  # noqa: B905  one an unknown, both
-    pushed = [abs(a) / r for a, r in zip(drive.udd, model.REACH)]  # noqa: B905
-    curve = max([abs(a) / c for a, c in zip(second, scales)] + pushed + [speed * speed])  # noqa: B905
-    return Rates(first, second, speed, curve)
+    for rate, bend, scale in zip(first, second, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all
+        speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
+    for rate, bend, scale in zip(drive.ud, drive.udd, model.REACH):  # noqa: B905  one a driver, all
+        speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
+    return Rates(first, second, speed, max(curve, speed * speed))
 
 
 def _sources(model: Model, pose: Pose, drive: Drive, rates: Rates) -> list[Source]:
     """What each block adds, the worst ones if there are many, and the bridge."""
     n = len(model.UNKNOWNS)
+    rounding = ROUNDINGS * EPS + pose.residual
+    matrices = model.jacobians(pose.values)
     found = []
-    for block, matrix in enumerate(model.jacobians(pose.values)):
+    for block, matrix in enumerate(matrices):
         if drive.held >> block & 1:
             continue
         low, high = model.BLOCKS[block]
         scales = model.UNKNOWN_SCALES[low:high]
         softness = _softest(matrix, model.ROW_SCALES[block], scales)
-        own = max([abs(a) / c for a, c in zip(pose.z[low:high], scales)])  # noqa: B905
-        moved = (ROUNDINGS * EPS + pose.residual + EPS * own) * max(
-            [abs(a) / c for a, c in zip(softness, scales)]  # noqa: B905
-        )
-        found.append((moved, block, softness, own))
+        own = farthest = 0.0
+        for z, soft, scale in zip(pose.z[low:high], softness, scales):  # noqa: B905  one an unknown, all
+            own, farthest = max(own, abs(z) / scale), max(farthest, abs(soft) / scale)
+        c = rounding + EPS * own
+        found.append((c * farthest, block, softness, c))
     count = len(found)
-    found.sort(key=lambda one: -one[0])
-    found = found[:MOST_SOURCES]
+    if count > 1:
+        found.sort(key=lambda one: -one[0])
+        found = found[:MOST_SOURCES]
     sources = []
     still = (0.0,) * len(drive.ud)
-    for _, block, softness, own in found:
+    for _, block, softness, c in found:
         low, high = model.BLOCKS[block]
-        given = (0.0,) * low + tuple(softness) + (0.0,) * (n - high)
+        given = (*((0.0,) * low), *softness, *((0.0,) * (n - high)))
         all_of = model.velocity(pose.values, still, given, drive.held | 1 << block)
-        c = ROUNDINGS * EPS + pose.residual + EPS * own
         weight = sqrt(count / len(found))
+        of_z, of_rates = weight * c, weight * ROUNDINGS * EPS
+        of_first, of_second = of_rates * rates.speed, of_rates * rates.curve
         sources.append(
             Source(
-                tuple([weight * c * a for a in all_of]),
-                tuple([weight * ROUNDINGS * EPS * rates.speed * a for a in all_of]),
-                tuple([weight * ROUNDINGS * EPS * rates.curve * a for a in all_of]),
+                tuple([of_z * a for a in all_of]),
+                tuple([of_first * a for a in all_of]),
+                tuple([of_second * a for a in all_of]),
             )
         )
     return sources
 
 
-def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> list[float]:
+def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[float]:
     """J^-1 (s R), signs s chosen so that the unknown that can be moved farthest is."""
     k = len(scales)
-    columns: list[Sequence[float]]
     if len(rows) == k == 1:
-        columns = [(rows[0] / matrix[0][0],)]
-    elif len(rows) == k == 2:
-        (a, b), (c, d) = matrix
-        det = a * d - b * c
-        p, q = rows[0] / det, rows[1] / det
-        columns = [(d * p, -c * p), (-b * q, a * q)]
-    else:
-        columns = _inverse(matrix, rows)
+        return (abs(rows[0] / matrix[0][0]),)
+    if len(rows) == k == 2:
+        return _softest_of_two(matrix, rows, scales)
+    columns = _inverse(matrix, rows)
     reach = [sum([abs(column[j]) for column in columns]) / scales[j] for j in range(k)]
     worst = reach.index(max(reach))
     total = [0.0] * k
@@ -219,6 +221,23 @@ def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> list[float]:
         sign = 1.0 if column[worst] >= 0.0 else -1.0
         total = [a + sign * b for a, b in zip(total, column)]  # noqa: B905  one an unknown, both
     return total
+
+
+def _softest_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
+    """The same for 2 x 2, where the inverse is at hand: its columns (d p, -c p) and (-b q, a q)."""
+    (a, b), (c, d) = matrix
+    det = a * d - b * c
+    p, q = rows[0] / det, rows[1] / det
+    dp, cp, bq, aq = d * p, -c * p, -b * q, a * q
+    if (abs(dp) + abs(bq)) / scales[0] >= (abs(cp) + abs(aq)) / scales[1]:
+        first, second = dp, bq
+    else:
+        first, second = cp, aq
+    if first < 0.0:
+        dp, cp = -dp, -cp
+    if second < 0.0:
+        bq, aq = -bq, -aq
+    return dp + bq, cp + aq
 
 
 def _inverse(matrix: Matrix, rows: Vector) -> list[Sequence[float]]:
@@ -275,5 +294,9 @@ def _moved(model: Model, pose: Pose, drive: Drive, rates: Rates, source: Source)
 
 def _added(there: Vector, here: Vector, more: Vector) -> Vector:
     """There and more, away from here: two errors that happen to cancel are no smaller for it."""
-    along = sum([(a - b) * c for a, b, c in zip(there, here, more)])  # noqa: B905
-    return tuple([a + c for a, c in zip(there, more)]) if along >= 0.0 else tuple([a - c for a, c in zip(there, more)])  # noqa: B905
+    along = 0.0
+    for a, b, c in zip(there, here, more):  # noqa: B905  one an unknown, all
+        along += (a - b) * c
+    if along >= 0.0:
+        return tuple([a + c for a, c in zip(there, more)])  # noqa: B905
+    return tuple([a - c for a, c in zip(there, more)])  # noqa: B905

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import ast
+import math
 
 import numpy as np
 import pytest
 
-from kinfmu import Body, Mechanism, load
+from kinfmu import Body, Mechanism, chains, load
 from kinfmu.backends.python import emit, load_model
 from kinfmu.equations import System
 from kinfmu.equations.reference import solve_reference
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.redundancy import find_redundancy
-from kinfmu.solver import Solver
+from kinfmu.solver import Solver, estimate
 from tests.mechanisms import bar_as_body, bar_linkage, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 MECHANISMS = [
@@ -57,6 +58,27 @@ def test_motion_is_outputs_rates_and_accelerations_in_a_row(plan: SolvePlan) -> 
     pose = solver.anchor
     row = (*solver.outputs(pose), *solver.rates(pose, ud), *solver.accelerations(pose, ud, udd))
     np.testing.assert_allclose(solver.motion(pose, ud, udd), row, rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("mechanism", [*MECHANISMS, chains.fourbar_chain(20)], ids=lambda mechanism: mechanism.name)
+def test_differences_are_those_of_angles_and_of_lengths_relative_to_the_size(mechanism: Mechanism) -> None:
+    plan = compile_plan(mechanism)
+    model = load_model(plan)
+    there, here = np.random.default_rng(3).standard_normal((2, 3, len(plan.outputs)))
+    sizes = [1.0 if name.endswith(".phi") else plan.size for name in plan.outputs]
+    expected = (np.abs(there - here) / sizes).max(axis=1)
+    found = model.differences(tuple(there.ravel().tolist()), tuple(here.ravel().tolist()))
+    assert found == tuple(expected.tolist())
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_infinitely_far_away(value: float) -> None:
+    model = load_model(compile_plan(reference_fourbar()))
+    n = len(model.OUTPUTS)
+    here = (1.0,) * (3 * n)
+    there = (*here[: n + 1], value, *here[n + 2 :])
+    assert estimate._differences(model, there, here) == (0.0, math.inf, 0.0)
+    assert estimate._differences(model, there, there)[0::2] == (0.0, 0.0)
 
 
 def test_rates_of_points_are_the_derivatives_of_their_positions() -> None:

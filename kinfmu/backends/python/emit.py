@@ -14,6 +14,7 @@ With parameters the functions stand inside `bound(parameters)`, which computes o
     rates(values, ud, first)                       -> their rates
     accelerations(values, ud, udd, first, second)  -> their accelerations
     motion(values, ud, udd, first, second)         -> the three in one row, with what they share computed once
+    differences(there, here)                       -> largest differences of two rows of motion, in radians and sizes
     watches(values)                                -> rows set aside, relative to the size
     jacobians(values)                              -> one matrix a block
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
 from kinfmu.backends.python.block_code import indented, tupled, unpacking
+from kinfmu.backends.python.differences import angle_places
 from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.curve import CurveData
@@ -48,6 +49,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"DRIVER_KINDS = {kinds!r}",
         f"REACH = {reach!r}  # what counts as a step of one, by driver",
         f"OUTPUTS = {plan.outputs!r}",
+        f"ANGLES = {angle_places(plan)!r}  # their places among the outputs",
         f"COORDINATE_COUNT = {plan.coordinate_count!r}",
         f"FIXED = {dict(plan.fixed)!r}",
         f"LAW_CONSTANTS = {tuple((constant.name, constant.value) for constant in plan.law_constants)!r}",

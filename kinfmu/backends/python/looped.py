@@ -12,6 +12,7 @@ from kinfmu.backends.alike import Run
 from kinfmu.backends.lists import LISTS, Lists
 from kinfmu.backends.python.binding import bound
 from kinfmu.backends.python.block_code import indented, tupled
+from kinfmu.backends.python.differences import differences
 from kinfmu.backends.python.header import curve_names, drive, header
 from kinfmu.backends.python.loops import Loops
 from kinfmu.backends.writer import Names, Writer, identifier
@@ -53,6 +54,7 @@ class _Looped(Lists):
             *self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
             *self._watches(),
             *self._appended("jacobians", "Jacobian of each block.", "jacobian"),
+            *differences(self.plan),
         ]
         if with_parameters:
             functions += self._appended("residuals", "Residuals of each block, relative to the size.", "residual")

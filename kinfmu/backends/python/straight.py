@@ -18,6 +18,7 @@ from kinfmu.backends.python.block_code import (
     unpacking,
 )
 from kinfmu.backends.python.definitions import Definitions
+from kinfmu.backends.python.differences import differences
 from kinfmu.backends.python.header import curve_names, drive, header, places
 from kinfmu.backends.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
@@ -74,7 +75,7 @@ class _Straight:
         ]
         position = self._position()  # after the later stages, which say what it has to hand on
         unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
-        functions = [*drive(self.plan, self.curves), *position]
+        functions = [*drive(self.plan, self.curves), *position, *differences(self.plan)]
         for lines in later:
             functions += [unpacked if line is _VALUES else line for line in lines]
         if self.plan.parameters:
