@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from kinfmu.axis import TIME
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.naming import derivative_name
 from kinfmu.run import FloatArray, IntArray, Run
@@ -23,12 +24,17 @@ def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
     Names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'residual',
     'iterations', 'margin', 'error', 'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the topics
     of an MCAP file that viewers draw by themselves. A minus in front leaves out: ['-error', '-margin'] is all but
-    those. Time and status are always kept.
+    those. Time and status are always kept, and the inputs of a run over these.
     """
     groups = _groups(run)
     columns = [place.name for place in run.places()]
     kept = _kept(names, lambda name: _named(name, groups, columns))
-    return frozenset({*columns} - kept - {*ALWAYS}) | run.absent if names is not None else run.absent
+    return frozenset({*columns} - kept - {*ALWAYS, *_of_axis(run)}) | run.absent if names is not None else run.absent
+
+
+def _of_axis(run: Run) -> tuple[str, ...]:
+    """The inputs that the axis of a run and its rates are known by."""
+    return () if run.axis == TIME else run.input_names
 
 
 def is_drawn(names: Sequence[str] | None) -> bool:

@@ -13,9 +13,9 @@ def derivative_name(name: str, order: int) -> str:
     return f"{owner}.{_DERIVATIVES[coordinate][order]}"
 
 
-def quantity_of(name: str, order: int = 0) -> Quantity:
+def quantity_of(name: str, order: int = 0, per: str = "time") -> Quantity:
     """What a coordinate such as 'coupler.x' or 'coupler.phi' measures, or its derivative of the given order."""
-    return Quantity("angle" if name.endswith(".phi") else "length", order)
+    return Quantity("angle" if name.endswith(".phi") else "length", order, per)
 
 
 def is_coordinate(name: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.axis import TIME, axis_of, rates_per
 from kinfmu.errors import KinfmuError, MissingPackageError, suggestion
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.status import Status
@@ -78,6 +79,8 @@ class Run:
     as functions that compute them when they are first read.
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
     absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
+    axis: what pictures and reports show the samples over: 'time'; of driver values given instead of times the input
+    that changes, such as 'crank_angle', or 'sample' where more than one does. t then counts the samples.
     """
 
     t: FloatArray
@@ -102,6 +105,7 @@ class Run:
     info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
     events: tuple[Event, ...] = ()
     absent: frozenset[str] = frozenset()
+    axis: str = TIME
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -134,7 +138,7 @@ class Run:
 
     def __repr__(self) -> str:
         name = self.info.get("name", "run")
-        span = f", t = {self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else ""
+        span = f", {axis_of(self).range()}" if len(self.t) else ""
         bad = int((~self.good).sum())
         return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {', '.join(self.outputs)}>"
 
@@ -179,12 +183,13 @@ class Run:
                 yield place
 
     def _places(self) -> Iterator[Place]:
-        yield Place("time", "s", "t", None)
+        per = rates_per(self)
+        yield Place("time", "s" if self.axis == TIME else "1", "t", None)
         for k, name in enumerate(self.input_names):
             yield Place(name, self.input_unit(name), "inputs", k)
         for order, table in enumerate(("values", "rates", "accelerations")):
             for k, name in enumerate(self.outputs):
-                unit = unit_of(quantity_of(name, order), self.length_unit)
+                unit = unit_of(quantity_of(name, order, per), self.length_unit)
                 yield Place(derivative_name(name, order), unit, table, k)
         for name in ("status", "residual", "iterations", "margin"):
             yield Place(f"solver.{name}", "1", name, None)

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinfmu.axis import TIME, axis_for
 from kinfmu.backends.python import load_model, load_module
 from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
@@ -47,7 +48,8 @@ def solve(
 
     t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
     the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
-    and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples).
+    and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples, and the axis
+    of pictures is the driver's value).
     parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
     other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
     if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
@@ -77,17 +79,17 @@ def solve(
         t = run_times(plan.mechanism.run)
     if t is None:
         times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
-        driven = (u, ud, udd)
+        driven, axis = (u, ud, udd), axis_for(u, tuple(driver.inputs[0] for driver in plan.drivers))
     elif wrap:
         raise RequestError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
     elif inputs:
         raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     else:
-        times, driven = _column("t", t), None
+        times, driven, axis = _column("t", t), None, TIME
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
     if driven is None:
         driven = chosen.drive(times, tuple(constants.values()))
-    return _swept(plan, chosen, times, driven, out, constants)
+    return replace(_swept(plan, chosen, times, driven, out, constants), axis=axis)
 
 
 def run_times(run: RunSettings) -> FloatArray:

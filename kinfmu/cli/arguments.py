@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,7 +13,10 @@ from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.suffix import suffix_of
-from kinfmu.units import Quantity, factors
+from kinfmu.units import Quantity, factors, in_turns, like_degrees
+
+if TYPE_CHECKING:
+    from kinfmu.run import Run
 
 
 class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
@@ -112,6 +115,31 @@ class Time(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
             return _number(str(value), Quantity("time"))
         except ValueError as error:
             return self.fail(str(error), param, ctx)
+
+
+def along(text: str | None, option: str, run: Run) -> float | None:
+    """A place on the axis of a run [s, rad or the run's unit of length]; a UsageError for a text that is none."""
+    if text is None:
+        return None
+    from kinfmu.axis import axis_of
+
+    axis = axis_of(run)
+    kind = "time" if axis.is_time else "angle" if axis.unit in ("deg", "rad") else "length" if axis.unit else "number"
+    try:
+        value = _number(text, Quantity(kind), run.length_unit)
+    except ValueError as error:
+        raise click.UsageError(f"{option} {text}: {error}; the run is over {axis.label}, {axis.range()}") from None
+    if kind == "angle" and like_degrees(value) and is_bare(text):
+        note(f"{option} {text}: {text} rad, {in_turns(value)}; write {text}deg for degrees")
+    return value
+
+
+def is_bare(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def names_in(text: str | None) -> list[str] | None:

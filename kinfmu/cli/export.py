@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import TIME, names_in
+from kinfmu.cli.arguments import along, names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import RequestError, listed
@@ -48,16 +48,29 @@ FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
 WITH_COLUMNS = [suffix for suffix, write in FORMATS.items() if write is not _animation]
 
 
-def _between(run: Run, start: float | None, stop: float | None) -> Run:
-    """The samples from start to stop [s], both included; all where nothing is said."""
+def _between(run: Run, start: str | None, stop: str | None) -> Run:
+    """The samples from start to stop on the axis of the run, both included; all where neither is given."""
     if start is None and stop is None:
         return run
-    first, last = -math.inf if start is None else start, math.inf if stop is None else stop
-    rows = (run.t >= first) & (run.t <= last)
+    import numpy as np
+
+    from kinfmu.axis import axis_of
+
+    axis, ends = axis_of(run), (along(start, "--start", run), along(stop, "--stop", run))
+    first, last = (
+        free if end is None else end / axis.factor for free, end in zip((-math.inf, math.inf), ends, strict=True)
+    )
+    edge = 0.0 if axis.is_time else 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1])) if len(run) else 0.0
+    rows = (axis.values >= first - edge) & (axis.values <= last + edge)
     if not rows.any():
-        told = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run) else "none"
-        raise RequestError(f"--start, --stop: the run has no samples from {first:g} to {last:g} s; its samples: {told}")
-    return run.part(rows, events=tuple(event for event in run.events if first <= event.t <= last))
+        told = axis.range() or "none"
+        raise RequestError(
+            f"--start, --stop: the run has no samples from {first:g} to {last:g}"
+            f"{' ' * bool(axis.unit)}{axis.unit}; its samples: {told}"
+        )
+    kept = run.t[rows]
+    low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
+    return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
 
 
 @main.command(epilog="Example: kinfmu export logs/fourbar.mcap -o fourbar.svg --columns coupler.x,rocker.phi")
@@ -75,14 +88,16 @@ def _between(run: Run, start: float | None, stop: float | None) -> Run:
     help="Columns of a table, named as simulate --channels names them: coupler.x, coupler.*, q, -error; else all. Time "
     "and status are always there. Plots take the same names, for coordinates; else those of q.",
 )
-@click.option("--start", type=TIME, help="Only samples from then on [s].")
-@click.option("--stop", type=TIME, help="Only samples until then [s].")
-def export(run: Path, output: Path, columns: str | None, start: float | None, stop: float | None) -> None:
+@click.option(
+    "--start", metavar="VALUE", help="Only samples from then on [s]; of solve --angle from that value, 30deg."
+)
+@click.option("--stop", metavar="VALUE", help="Only samples until then [s]; of solve --angle to that value, 90deg.")
+def export(run: Path, output: Path, columns: str | None, start: str | None, stop: str | None) -> None:
     """Write a run as a table, as plots, or as a moving picture.
 
     RUN is a record (.mcap) of simulate or solve. A table holds all columns, or those named; Parquet and npz
-    the units, too. Plots (.svg, .png) show coordinates against time, with velocity and acceleration; a .gif shows the
-    linkage move.
+    the units, too. Plots (.svg, .png) show coordinates, velocities and accelerations against time, or against the
+    driver of a solve --angle; a .gif shows the linkage move.
     """
     from kinfmu.log import read
 

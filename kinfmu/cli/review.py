@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from kinfmu.cli.arguments import TIME
+from kinfmu.cli.arguments import TIME, along
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed
+from kinfmu.suffix import suffix_of
 
 
 @main.command(epilog="Example: kinfmu review logs/fourbar.mcap --screenshot fourbar.png --at 45")
@@ -18,16 +19,28 @@ from kinfmu.errors import listed
 @click.argument("other", required=False, type=InputFile(".mcap"))
 @click.option("--save", type=OutputFile(".rrd"), help="Write the recording (.rrd) and open no viewer.")
 @click.option("--screenshot", type=OutputFile(".png"), help="Take a picture (.png) with a viewer that needs no screen.")
-@click.option("--at", type=TIME, help="Time of the picture [s]; a third of the run if nothing is said.")
-def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: float | None) -> None:
+@click.option(
+    "--at",
+    metavar="VALUE",
+    help="Time of the picture [s], or of a solve --angle the driver's value, such as 45deg; default: a third of the "
+    "run.",
+)
+def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | None, at: str | None) -> None:
     """Look at a run in the Rerun viewer, or at two compared.
 
     RUN and OTHER are records (.mcap) of simulate or solve; RUN may be a recording (.rrd).
     """
+    from kinfmu.log import read
     from kinfmu.log import review as reviewed
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at is the time of --screenshot, which is not given")
-    recording = reviewed(run, other, save=save, screenshot=screenshot, at=at, tell=note)
+    moment = None
+    if at is not None:
+        if suffix_of(run) == ".rrd":
+            moment = TIME.convert(at, None, None)
+        else:
+            moment = along(at, "--at", read(run))
+    recording = reviewed(run, other, save=save, screenshot=screenshot, at=moment, tell=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"made {listed(made)}")

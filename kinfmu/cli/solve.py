@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, names_in, set_option
+from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, is_bare, names_in, set_option
 from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import about, main, stopped
 from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
@@ -48,7 +48,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn t
     "angle",
     metavar="A:B:N",
     help="N values of the driver from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101; bare numbers "
-    "are rad, or the file's unit of length. Rates are those at a driver's speed of 1; time counts the samples.",
+    "are rad, or the file's unit of length. Rates are derivatives by the driver; time counts the samples.",
 )
 @click.option("--wrap", is_flag=True, help="Follow --angle the short way: no step is more than half a turn.")
 @click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; what they do not need is not solved.")
@@ -139,20 +139,12 @@ def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> d
 def _tell_of_angles(text: str, first: float, last: float, n: int, wrap: bool) -> None:
     """Say what bare numbers that look like degrees mean; warn of steps of more than half a turn."""
     a, b, _ = text.split(":")
-    if _is_bare(a) and _is_bare(b) and (like_degrees(first) or like_degrees(last)):
+    if is_bare(a) and is_bare(b) and (like_degrees(first) or like_degrees(last)):
         turns = in_turns(last - first)
         note(f"--angle {text}: {first:g} to {last:g} rad, {turns}; write {a}deg:{b}deg:{n} for degrees")
     elif n > 1 and not wrap and abs(last - first) / (n - 1) > HALF_TURN * (1.0 + 1e-9):
         step = abs(last - first) / (n - 1)
         warn(f"--angle {text}: steps of {in_turns(step)} between samples; --wrap takes each the short way")
-
-
-def _is_bare(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _warn_of_external(drivers: tuple[Driver, ...]) -> None:

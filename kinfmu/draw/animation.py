@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.axis import axis_of
 from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
 from kinfmu.draw.links import links, shortest
@@ -59,9 +60,9 @@ class _Film(NamedTuple):
 def animate(run: Run, path: str | Path) -> None:
     """Draw the linkage of `run` moving into a .gif file: bodies, joints, cams, wheels, cylinders, paths and trails.
 
-    The run plays in its own time if that is between SHORTEST and LONGEST, else in the nearer of them; a motion that
-    ends where it began repeats without a stop. Samples without numbers show the last pose that closed, and say so. The
-    same run gives the same bytes with the same matplotlib and Pillow.
+    The run plays in its own time if that is between SHORTEST and LONGEST, else in the nearer of them, and for LONGEST
+    if it has no time; a motion that ends where it began repeats without a stop. Samples without numbers show the last
+    pose that closed, and say so. The same run gives the same bytes with the same matplotlib and Pillow.
 
     Raises FigureError if the run does not hold its mechanism or coordinates of it, has fewer than two samples with
     numbers or too many turns for its pictures, and for files that cannot be written; MissingPackageError without
@@ -98,9 +99,10 @@ def _film(run: Run, poses: dict[str, FloatArray], path: Path) -> _Film:
     good = np.flatnonzero(run.good)
     if len(good) < 2:
         raise FigureError(f"{path}: a moving picture needs two samples with numbers; the run has {len(good)}")
-    t = run.t[good[0] :]
-    seconds = float(np.clip(t[-1] - t[0], SHORTEST, LONGEST))
-    times = np.linspace(t[0], t[-1], min(round(PER_SECOND * seconds), MOST) + 1)
+    axis = axis_of(run)
+    t = np.abs(axis.values[good[0] :] - axis.values[good[0]])
+    seconds = float(np.clip(t[-1], SHORTEST, LONGEST)) if axis.is_time else LONGEST
+    times = np.linspace(0.0, t[-1], min(round(PER_SECOND * seconds), MOST) + 1)
     rows = good[0] + np.unique(np.searchsorted(t, times, side="right") - 1)
     if len(rows) < len(t):
         _check_seen(run, poses, rows, path)
@@ -113,10 +115,12 @@ def _check_seen(run: Run, poses: dict[str, FloatArray], rows: NDArray[np.int64],
     steps = {body: float(np.abs(np.diff(pose[rows, 2])).max()) for body, pose in poses.items()}
     body = max(steps, key=lambda name: steps[name])
     if steps[body] > _FARTHEST:
-        part = float(run.t[rows[-1]] - run.t[rows[0]]) * _FARTHEST / steps[body]
+        axis = axis_of(run)
+        part = float(np.ptp(axis.values[rows])) * _FARTHEST / steps[body]
         raise FigureError(
             f"{path}: '{body}' turns by {math.degrees(steps[body]):.0f} deg from one of {len(rows)} pictures to the "
-            f"next, so that its motion would not be seen; choose a part of the run, no longer than {part:.3g} s"
+            f"next, so that its motion would not be seen; choose a part of the run, no longer than {part:.3g} "
+            f"{axis.unit or 'samples'}"
         )
 
 
@@ -185,8 +189,10 @@ def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, Float
 
 def _clock(sheet: Sheet, run: Run, row: int) -> None:
     """The time, and whether the run has numbers then."""
-    digits = max(2 - math.floor(math.log10(float(np.ptp(run.t)))), 0)
-    text, colour = f"{run.t[row]:.{digits}f} s", GREY
+    axis = axis_of(run)
+    digits = max(2 - math.floor(math.log10(float(np.ptp(axis.values)))), 0)
+    name = "" if axis.is_time else f"{axis.name}{' =' if axis.unit else ''} "
+    text, colour = f"{name}{axis.values[row]:.{digits}f} {axis.unit}".rstrip(), GREY
     if not run.good[row]:
         text, colour = f"no pose at {text}: the last one that closed", _LOST
     sheet.axes.text(

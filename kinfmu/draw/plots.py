@@ -1,4 +1,4 @@
-"""plot(): coordinates of a run against time, each with its velocity and acceleration below it, for a report."""
+"""plot(): coordinates of a run against time or driver values, each with velocity and acceleration, for a report."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.axis import Axis, axis_of
 from kinfmu.channels import coordinates
 from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, ink
@@ -38,7 +39,7 @@ _LOST: palette.Colour = (246, 222, 222)
 
 
 def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
-    """Draw coordinates of `run` against time into a .svg or .png file, as a report prints them.
+    """Draw coordinates of `run` against its axis, usually time, into a .svg or .png file, as a report prints them.
 
     columns: names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as those of tables; all generalized
     coordinates if there are none. Each coordinate is a column of three panels: position, velocity and acceleration, in
@@ -70,6 +71,7 @@ def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[str, ...]:
 def _sheet(run: Run, names: Sequence[str]) -> Figure:
     from matplotlib.figure import Figure
 
+    axis = axis_of(run)
     abreast = min(len(names), _ABREAST)
     blocks = -(-len(names) // _ABREAST)
     block = 3.0 * _HEIGHT + _BLOCK_GAP
@@ -89,17 +91,17 @@ def _sheet(run: Run, names: Sequence[str]) -> Figure:
             size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
             axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
             panels.append(axes)
-            _panel(axes, run, name, order)
+            _panel(axes, run, axis, name, order)
         for axes in panels[:2]:
             axes.tick_params(labelbottom=False)
         panels[0].set_title(name, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
-        panels[2].set_xlabel("t [s]", fontsize=SMALL, color=ink(GREY), labelpad=1.0)
+        panels[2].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
         for axes in panels:
             axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)
     return made
 
 
-def _panel(axes: Axes, run: Run, name: str, order: int) -> None:
+def _panel(axes: Axes, run: Run, axis: Axis, name: str, order: int) -> None:
     """One curve over the whole run."""
     column = derivative_name(name, order)
     is_kept = column not in run.absent
@@ -110,23 +112,23 @@ def _panel(axes: Axes, run: Run, name: str, order: int) -> None:
     look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
     if len(known) < 2:
         look |= {"marker": "o", "markersize": 3.0}
-    axes.plot(run.t[rows], values[rows], **look)
+    axes.plot(axis.values[rows], values[rows], **look)
     dress(axes, "")
-    axes.set_xlim(*_span(run.t))
-    shown = _shown(run, name, order, known)
+    axes.set_xlim(*_span(axis.values))
+    shown = _shown(run, axis, name, order, known)
     if shown:
         axes.set_ylim(*shown)
     axes.locator_params(axis="y", nbins=4)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
-    unit = unit_of(quantity_of(name, order), run.length_unit).replace("s2", "s\N{SUPERSCRIPT TWO}")
+    unit = unit_of(quantity_of(name, order, axis.per), run.length_unit).replace("2", "\N{SUPERSCRIPT TWO}")
     axes.set_ylabel(f"{column.rpartition('.')[2]} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
     if not is_kept:
         axes.text(0.5, 0.5, "not kept", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
-    for first, last in _gaps(run):
+    for first, last in _gaps(run, axis.values):
         axes.axvspan(first, last, color=ink(_LOST), linewidth=0.0, zorder=0.0)
 
 
-def _shown(run: Run, name: str, order: int, known: FloatArray) -> tuple[float, float] | None:
+def _shown(run: Run, axis: Axis, name: str, order: int, known: FloatArray) -> tuple[float, float] | None:
     """Range of the axis: noise about a constant is a straight line; None where matplotlib's own choice is right."""
     if not len(known):
         return -1.0, 1.0
@@ -134,7 +136,7 @@ def _shown(run: Run, name: str, order: int, known: FloatArray) -> tuple[float, f
     alike = [k for k, other in enumerate(run.outputs) if quantity_of(other).kind == kind]
     positions = run.values[run.good][:, alike]
     size = float(np.max(np.abs(positions), initial=0.0, where=np.isfinite(positions)))
-    usual = size / (float(np.ptp(run.t)) or 1.0) ** order
+    usual = size / (axis.span or 1.0) ** order
     if np.ptp(known) <= ROUND_OFF * np.abs(known).max():
         middle = float(known.mean())
         half = 0.5 * abs(middle) or usual or 1.0
@@ -162,11 +164,11 @@ def _span(t: FloatArray) -> tuple[float, float]:
     return first - edge, last + edge
 
 
-def _gaps(run: Run) -> list[tuple[float, float]]:
+def _gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
     """From the last sample with numbers before each gap to the first one after it."""
     turns = np.flatnonzero(np.diff(np.r_[True, run.good, True].astype(int)))  # first of a gap, first after it, ...
     last = len(run) - 1
     return [
-        (float(run.t[max(begin - 1, 0)]), float(run.t[min(end, last)]))
+        (float(values[max(begin - 1, 0)]), float(values[min(end, last)]))
         for begin, end in zip(turns[::2], turns[1::2], strict=True)
     ]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kinfmu.log.blocks import TIMELINE
 from kinfmu.log.linkage import trail_path, trail_time, view_box
 from kinfmu.log.scene import Scene
 from kinfmu.log.series import KINDS, ORDERS, Group
+from kinfmu.log.timeline import Timeline
 from kinfmu.log.verdict import happenings
 from kinfmu.run import Run
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
 SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
+SWEEP_SHOW = 10.0  # [s] that it takes where there is no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
@@ -23,6 +24,7 @@ LEAST_ROOM, MOST_ROOM = 0.15, 0.6  # of the run's time, left free behind the cur
 
 
 def single(
+    timeline: Timeline,
     run: Run,
     scene: Scene | None,
     curves: Mapping[tuple[str, str], Group],
@@ -37,18 +39,19 @@ def single(
     for order in ORDERS:
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
-            rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run]) for group in found]))
+            rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
     shares = [2.0] * len(rows)
     if solver:
-        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], [run], NARROW) for group in solver]))
+        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
         shares.append(1.5)
-    rows.append(status_view([""], [run]))
-    left = _left(linkage_view(["/linkage"], [run], [scene]), [""], [run])
+    rows.append(status_view([""], timeline, [run]))
+    left = _left(linkage_view(["/linkage"], timeline, [run], [scene]), [""], [run])
     right = rrb.Vertical(*rows, row_shares=[*shares, 1.0])
-    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), [run])
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
 
 
 def compared(
+    timeline: Timeline,
     runs: tuple[Run, Run],
     scenes: Sequence[Scene | None],
     curves: Sequence[Mapping[tuple[str, str], Group]],
@@ -57,20 +60,22 @@ def compared(
     """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
     import rerun.blueprint as rrb
 
-    overlaid = [row for order in ORDERS if (row := _overlaid(order, runs, curves))]
+    overlaid = [row for order in ORDERS if (row := _overlaid(order, timeline, runs, curves))]
     rows: list[rrb.Container | rrb.View] = [*overlaid[:1]]
     for order in ORDERS:
         found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
         if found:
             rows.append(
-                rrb.Horizontal(*[plot(f"B - A: {group.title}", [("/difference", group)], runs) for group in found])
+                rrb.Horizontal(
+                    *[plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs) for group in found]
+                )
             )
-    rows.append(status_view(["/a", "/b"], runs))
-    left = _left(linkage_view(["/a/linkage", "/b/linkage"], runs, scenes), ["/a", "/b"], runs)
+    rows.append(status_view(["/a", "/b"], timeline, runs))
+    left = _left(linkage_view(["/a/linkage", "/b/linkage"], timeline, runs, scenes), ["/a", "/b"], runs)
     apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
     both = rrb.Vertical(*overlaid, name="A and B")
     right = rrb.Tabs(apart, both)
-    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), runs)
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
 
 
 def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
@@ -86,7 +91,7 @@ def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.C
 
 
 def _overlaid(
-    order: str, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
+    order: str, timeline: Timeline, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
 ) -> rrb.Container | None:
     """The curves of both runs in the same plots, one for each unit; None if they have none of that order."""
     import rerun.blueprint as rrb
@@ -95,24 +100,26 @@ def _overlaid(
     for kind in KINDS:
         pair = [(root, of[order, kind]) for root, of in zip(("/a", "/b"), curves, strict=True) if (order, kind) in of]
         if pair:
-            plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, runs))
+            plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, timeline, runs))
     return rrb.Horizontal(*plots) if plots else None
 
 
-def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
+def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
     """The content with Rerun's own panels out of the way, ready to play."""
     import rerun.blueprint as rrb
 
     length = max((float(run.t.max() - run.t.min()) for run in runs if len(run)), default=0.0)
-    show = min(max(length, SHORTEST_SHOW), LONGEST_SHOW)
+    show = min(max(length, SHORTEST_SHOW), LONGEST_SHOW) if timeline.parts is None else SWEEP_SHOW
+    speed = float(f"{length / show:.2g}") or 1.0
     return rrb.Blueprint(
         content,
         rrb.TimePanel(
-            timeline=TIMELINE,
+            timeline=timeline.name,
             state="collapsed",
             play_state="paused",
             loop_mode="all",
-            playback_speed=float(f"{length / show:.2g}") or 1.0,
+            playback_speed=speed if timeline.parts is None else None,
+            fps=speed if timeline.parts else None,
         ),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -121,7 +128,7 @@ def arranged(content: rrb.Container, runs: Sequence[Run]) -> rrb.Blueprint:
     )
 
 
-def time_axis(runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
+def time_axis(timeline: Timeline, runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
     """The time of the whole runs, not the half minute around the cursor that is Rerun's default."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -130,12 +137,17 @@ def time_axis(runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
     stop = max((float(run.t.max()) for run in runs if len(run)), default=0.0)
     length = stop - start or 1.0
     boundary = rr.encodings.TimeRangeBoundary.absolute
-    shown = rr.TimeRange(start=boundary(seconds=start - EDGE * length), end=boundary(seconds=stop + room * length))
+    first, last = timeline.number(start - EDGE * length), timeline.number(stop + room * length)
+    shown = rr.TimeRange(start=boundary(**first), end=boundary(**last))
     return rrb.TimeAxis(view_range=shown)
 
 
 def plot(
-    title: str, groups: Sequence[tuple[str, Group]], runs: Sequence[Run], width: float = PLOT
+    title: str,
+    groups: Sequence[tuple[str, Group]],
+    timeline: Timeline,
+    runs: Sequence[Run],
+    width: float = PLOT,
 ) -> rrb.TimeSeriesView:
     """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group); width: of
     the plot [points].
@@ -150,7 +162,7 @@ def plot(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(runs, _legend_room(names, width) if has_legend else EDGE),
+        axis_x=time_axis(timeline, runs, _legend_room(names, width) if has_legend else EDGE),
         axis_y=axis_y,
         plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )
@@ -162,7 +174,9 @@ def _legend_room(names: Sequence[str], width: float) -> float:
     return min(max(legend / max(width - legend, 1.0), LEAST_ROOM), MOST_ROOM)
 
 
-def linkage_view(roots: Sequence[str], runs: Sequence[Run], scenes: Sequence[Scene | None]) -> rrb.Spatial2DView:
+def linkage_view(
+    roots: Sequence[str], timeline: Timeline, runs: Sequence[Run], scenes: Sequence[Scene | None]
+) -> rrb.Spatial2DView:
     """The linkages, framed, with trails; the view stands at the root so that the flip of the plane takes effect."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -178,8 +192,8 @@ def linkage_view(roots: Sequence[str], runs: Sequence[Run], scenes: Sequence[Sce
     trails: dict[Any, Any] = {}
     for root, run, scene in drawn:
         for point in scene.paths:
-            back = relative(seconds=-trail_time(run, scene, point))
-            ranges = rrb.VisibleTimeRange(TIMELINE, start=back, end=relative(seconds=0.0))
+            back = relative(**timeline.number(-trail_time(run, scene, point)))
+            ranges = rrb.VisibleTimeRange(timeline.name, start=back, end=relative(**timeline.number(0.0)))
             trails[trail_path(root, point)] = rrb.VisibleTimeRanges([ranges])
     contents = [f"{root}/**" for root in roots]
     return rrb.Spatial2DView(name="linkage", origin="/", contents=contents, visual_bounds=bounds, overrides=trails)
@@ -192,12 +206,13 @@ def card_view() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(name="run", origin="/card")
 
 
-def status_view(roots: Sequence[str], runs: Sequence[Run]) -> rrb.StateTimelineView:
+def status_view(roots: Sequence[str], timeline: Timeline, runs: Sequence[Run]) -> rrb.StateTimelineView:
     """A lane of solver states for every run."""
     import rerun.blueprint as rrb
 
     contents = [f"{root}/solver/status" for root in roots]
-    return rrb.StateTimelineView(name="solver status", origin="/", contents=contents, time_view=time_axis(runs))
+    name = "solver status" if timeline.parts is None else f"solver status over {timeline.name}"
+    return rrb.StateTimelineView(name=name, origin="/", contents=contents, time_view=time_axis(timeline, runs))
 
 
 def log_view(roots: Sequence[str]) -> rrb.TextLogView:

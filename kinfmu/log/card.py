@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from kinfmu.axis import axis_of
 from kinfmu.log.verdict import MEANINGS, counts, happenings, worst_residual
 from kinfmu.run import Run
 
@@ -13,18 +14,19 @@ MOST_EVENTS = 12  # the log holds them all
 
 def card(run: Run, note: str = "") -> str:
     """Markdown; `note` is one more sentence, such as what could not be drawn."""
+    axis = axis_of(run)
     title = run.info.get("title") or run.info.get("name") or "Run"
     lines = [f"### {plain(title)}", "", _period(run), ""]
     if note:
         lines += [plain(note), ""]
     worst = worst_residual(run)
     if worst:
-        lines += [f"Worst residual {worst.residual:.2g} of the mechanism's size, at {worst.t:g} s.", ""]
+        lines += [f"Worst residual {worst.residual:.2g} of the mechanism's size, at {axis.place(worst.t)}.", ""]
     lines += [f"* {number} {MEANINGS[status]}" for status, number in counts(run).items()]
     events = happenings(run)
     if events:
         lines += ["", "What happened:", ""]
-        lines += [f"* **{event.t:g} s:** {plain(event.text)}" for event in events[:MOST_EVENTS]]
+        lines += [f"* **{plain(axis.place(event.t))}:** {plain(event.text)}" for event in events[:MOST_EVENTS]]
         if len(events) > MOST_EVENTS:
             lines.append(f"* and {len(events) - MOST_EVENTS} more, in the log")
     if run.watch_names:
@@ -41,9 +43,11 @@ def card(run: Run, note: str = "") -> str:
 def _period(run: Run) -> str:
     if not len(run):
         return "No samples."
+    axis = axis_of(run)
+    units = f"Lengths in {run.length_unit}, angles in rad. {axis.rates}".strip()
     if len(run) == 1:
-        return f"One sample, at {run.t[0]:g} s. Lengths in {run.length_unit}, angles in rad."
-    return f"{len(run)} samples, {run.t[0]:g} s to {run.t[-1]:g} s. Lengths in {run.length_unit}, angles in rad."
+        return f"One sample, at {axis.place(float(run.t[0]))}. {units}"
+    return f"{len(run)} samples, {axis.range()}. {units}"
 
 
 def _table(heading: str, entries: Mapping[str, str]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.axis import axis_of
 from kinfmu.errors import LogError, listed
 from kinfmu.log.blueprint import compared
 from kinfmu.log.card import plain
@@ -17,6 +18,7 @@ from kinfmu.log.rerun_file import application, left_out, log_card, log_group, lo
 from kinfmu.log.scene import drawable
 from kinfmu.log.series import Group, groups
 from kinfmu.log.thinned import thinned
+from kinfmu.log.timeline import Timeline, timeline_of
 from kinfmu.log.verdict import sentence
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
@@ -49,29 +51,38 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
         )
     for run in (a, b):
         nanoseconds(run.t)
+    timeline = _in_common(a, b, path)
     difference = _difference(a, b)
-    shown = [thinned(run) for run in (a, b)]
+    shown = [timeline.placed(thinned(run)) for run in (a, b)]
     scenes, notes = zip(*(drawable(run) for run in shown), strict=True)
-    apart = thinned(difference) if difference else None
+    apart = timeline.placed(thinned(difference)) if difference else None
     differences = groups(apart) if apart else {}
     curves = [groups(run) for run in shown]
-    layout = compared((shown[0], shown[1]), scenes, curves, differences)
+    layout = compared(timeline, (shown[0], shown[1]), scenes, curves, differences)
     own_name = application(shown, [group for found in (*curves, differences) for group in found.values()])
     with recording(path, f"{names[0]} and {names[1]}", layout, own_name) as rec:
         for run, drawn, scene, own, look in zip((a, b), shown, scenes, curves, _LOOKS, strict=True):
             if scene:
-                log_linkage(rec, f"{look.root}/linkage", drawn, scene, look.colour, look.bars, look.layer)
+                log_linkage(rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer)
             for group in own.values():
-                log_group(rec, look.root, drawn, _named(group, look), look.curves)
-            log_status(rec, look.root, run)
+                log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
+            log_status(rec, look.root, timeline, timeline.placed(run))
         for group in differences.values():
-            log_group(rec, "/difference", apart or a, group)
+            log_group(rec, "/difference", timeline, apart or a, group)
         told = [
             f"{look.name}: {text}"
             for run, drawn, look in zip((a, b), shown, _LOOKS, strict=True)
             for text in left_out(run, drawn)
         ]
         log_card(rec, _card(a, b, difference, names, [*told, *(note for note in notes if note)]))
+
+
+def _in_common(a: Run, b: Run, path: str | Path) -> Timeline:
+    """The timeline of two runs."""
+    try:
+        return timeline_of((a, b))
+    except LogError as error:
+        raise LogError(f"{path}: {error}") from None
 
 
 def in_common(a: Run, b: Run, names: tuple[str, str] = ("A", "B")) -> str:
@@ -93,16 +104,19 @@ def _common(a: Run, b: Run) -> list[str]:
 
 
 def _difference(a: Run, b: Run) -> Run | None:
-    """B - A at the times of A for the coordinates of A that B has too; B is interpolated where its times differ.
+    """B - A at the times of A, or at its driver values, for the coordinates of A that B has too.
+
+    B is interpolated where its times differ.
 
     Linear interpolation is off by up to h^2 / 8 times the second derivative; equal times are compared as they are.
     """
     common = _common(a, b)
     if not common or not len(a) or not len(b):
         return None
+    at = axis_of(a).values
     of_a, of_b = ([run.outputs.index(name) for name in common] for run in (a, b))
     tables = {
-        key: _at(a.t, b.t, getattr(b, key)[:, of_b]) - getattr(a, key)[:, of_a]
+        key: _at(at, axis_of(b).values, getattr(b, key)[:, of_b]) - getattr(a, key)[:, of_a]
         for key in ("values", "rates", "accelerations")
     }
     absent = a.absent | b.absent
@@ -113,6 +127,8 @@ def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
     """Columns of table (n, k), given at t, at other times; NaN outside them."""
     if np.array_equal(times, t):
         return table
+    if len(t) > 1 and np.all(np.diff(t) < 0.0):
+        t, table = t[::-1], table[::-1]
     if np.any(np.diff(t) <= 0.0):
         raise LogError(
             "the runs have different times, and those of B do not increase, so that it cannot be interpolated"
@@ -140,8 +156,8 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         lines += ["", f"{plain(told)}.", ""]
     if difference is None:
         return "\n".join(lines)
-    if not np.array_equal(a.t, b.t):
-        lines += ["The times differ: B is interpolated linearly at those of A.", ""]
+    if not np.array_equal(axis_of(a).values, axis_of(b).values):
+        lines += [f"{_differ(a)}: B is interpolated linearly at those of A.", ""]
     apart, equal = [], []
     for k, name in enumerate(difference.outputs):
         tables = (difference.values, difference.rates, difference.accelerations)
@@ -155,6 +171,11 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
     if equal:
         lines += [f"Equal in both: {', '.join(equal)}.", ""]
     return "\n".join(lines)
+
+
+def _differ(run: Run) -> str:
+    axis = axis_of(run)
+    return "The times differ" if axis.is_time else f"The values of {axis.name} differ"
 
 
 def _largest(column: FloatArray) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.log.blocks import send
+from kinfmu.log.timeline import Timeline
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
 
@@ -16,10 +17,13 @@ if TYPE_CHECKING:
 
 
 class Frames:
-    """The frames of one run. size: of which radii are parts [length]; layer: added to the order of drawing."""
+    """The frames of one run, placed on a timeline.
 
-    def __init__(self, rec: rr.RecordingStream, run: Run, size: float, layer: float) -> None:
-        self._rec, self._run, self._size, self._layer = rec, run, size, layer
+    size: of which radii are parts [length]; layer: added to the order of drawing.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, timeline: Timeline, run: Run, size: float, layer: float) -> None:
+        self._rec, self._timeline, self._run, self._size, self._layer = rec, timeline, run, size, layer
         self._good = np.flatnonzero(run.good)
         self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
@@ -35,6 +39,7 @@ class Frames:
         send(
             self._rec,
             path,
+            self._timeline,
             self._run.t[self._good],
             lambda rows: rr.Transform3D.columns(translation=shift[rows], quaternion=turn[rows]),
         )
@@ -64,7 +69,8 @@ class Frames:
             self._with_first_pose(path, rr.LineStrips2D.columns(strips=strip))
             turns = self.turns()
             colours = np.array([colour if good else palette.OUT_OF_REACH for good in self._run.good[turns]], np.uint8)
-            send(self._rec, path, self._run.t[turns], lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
+            at = self._run.t[turns]
+            send(self._rec, path, self._timeline, at, lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
 
     def points(
         self,
@@ -92,7 +98,7 @@ class Frames:
         return np.flatnonzero(np.diff(self._run.good.astype(int), prepend=-1))
 
     def _with_first_pose(self, path: str, columns: Any) -> None:
-        send(self._rec, path, self._run.t[self._good[:1]], lambda _: columns)
+        send(self._rec, path, self._timeline, self._run.t[self._good[:1]], lambda _: columns)
 
     def _look(self, radius: float, order: float, names: list[str], shown: bool) -> dict[str, Any]:
         """What lines and points are told alike."""

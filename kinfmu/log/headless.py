@@ -12,13 +12,14 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from kinfmu.errors import LogError
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
+Cursor = dict[str, Any]  # {"duration": seconds}, or {"sequence": number} of recordings without time
 START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
     "no graphics driver for a picture without a display; on Debian: apt-get install mesa-vulkan-drivers libvulkan1"
@@ -38,8 +39,8 @@ class Shot:
     reports: tuple[str, ...]
 
 
-def shoot(path: str | Path, at: float | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
-    """Show a recording in an invisible viewer, at time `at` [s] if given, and take a picture once it stands still.
+def shoot(path: str | Path, at: Cursor | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
+    """Show a recording in an invisible viewer, at time `at` if given, and take a picture once it stands still.
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
     """
@@ -54,8 +55,8 @@ class Viewer:
     def __init__(self, client: ViewerClient) -> None:
         self._client = client
 
-    def show(self, path: str | Path, at: float | None = None) -> None:
-        """Show a recording in the place of the one before, at time `at` [s] if given."""
+    def show(self, path: str | Path, at: Cursor | None = None) -> None:
+        """Show a recording in the place of the one before, at time `at` if given."""
         client, deadline = self._client, time.monotonic() + SETTLE_TIME
         if client.get_state().recordings:
             client.close("all")
@@ -64,10 +65,7 @@ class Viewer:
             if time.monotonic() > deadline:
                 raise LogError(f"{path}: the viewer shows nothing of it after {SETTLE_TIME:.0f} s")
             time.sleep(_POLL)
-        if at is None:
-            client.set_time(play_state="paused")
-        else:
-            client.set_time(play_state="paused", duration=at)
+        client.set_time(play_state="paused", **(at or {}))
 
     def shot(self) -> Shot:
         """A picture once it stands still."""

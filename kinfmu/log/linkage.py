@@ -11,6 +11,7 @@ from kinfmu.log.frames import Frames
 from kinfmu.log.ground import MOST_NAMES, log_ground
 from kinfmu.log.scene import DrawnBody, Scene
 from kinfmu.log.strokes import BROAD, LINK, Stroke
+from kinfmu.log.timeline import Timeline
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
 
@@ -39,7 +40,7 @@ def trail_path(root: str, point: str) -> str:
 
 
 def trail_time(run: Run, scene: Scene, point: str) -> float:
-    """How long [s] the trail behind a point reaches back: the usual time for TRAIL of the linkage's size."""
+    """How long the trail behind a point reaches back, on the timeline: usually for TRAIL of the linkage's size."""
     steps = np.hypot(*np.diff(scene.paths[point], axis=0).T)
     way, span = float(np.nansum(steps)), float(np.ptp(run.t)) if len(run) else 0.0
     return span * min(TRAIL * scene.size / way, LONGEST_TRAIL) if way > 0.0 else 0.0
@@ -48,19 +49,20 @@ def trail_time(run: Run, scene: Scene, point: str) -> float:
 def log_linkage(
     rec: rr.RecordingStream,
     root: str,
+    timeline: Timeline,
     run: Run,
     scene: Scene,
     colour: palette.Colour | None = None,
     width: float = 1.0,
     layer: float = 0.0,
 ) -> None:
-    """The linkage under the entity `root`: all in `colour`, or each body in its own. `width` scales the lines, and what
-    has a higher `layer` covers what has a lower one.
+    """The linkage of a placed run under the entity `root`: all in `colour`, or each body in its own.
 
+    `width` scales the lines, and what has a higher `layer` covers what has a lower one.
     Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
     nothing to draw.
     """
-    _Linkage(rec, root, run, scene, colour, width, layer).log()
+    _Linkage(rec, root, timeline, run, scene, colour, width, layer).log()
 
 
 class _Linkage:
@@ -70,17 +72,18 @@ class _Linkage:
         self,
         rec: rr.RecordingStream,
         root: str,
+        timeline: Timeline,
         run: Run,
         scene: Scene,
         colour: palette.Colour | None,
         width: float,
         layer: float,
     ) -> None:
-        self.rec, self.root, self.run, self.scene = rec, root, run, scene
+        self.rec, self.root, self.timeline, self.run, self.scene = rec, root, timeline, run, scene
         self.colour, self.layer = colour, layer
         self.size = width * scene.stroke
         self.width = width
-        self.frames = Frames(rec, run, self.size, layer)
+        self.frames = Frames(rec, timeline, run, self.size, layer)
         self.named = colour is None and len(scene.bodies) <= MOST_NAMES
 
     def log(self) -> None:
@@ -187,7 +190,8 @@ class _Linkage:
         """One polyline a sample: strips (n, k, 2)."""
         import rerun as rr
 
-        send(self.rec, path, t, lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32)))
+        columns = lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32))  # noqa: E731  short
+        send(self.rec, path, self.timeline, t, columns)
 
     def _notice(self) -> None:
         """Above the linkage, while the run has no numbers."""
@@ -215,7 +219,7 @@ class _Linkage:
             positions = np.tile(np.array(place, np.float32), (len(labels), 1))
             return [*rr.Points2D.columns(positions=positions, labels=labels).partition(counts)]
 
-        send(self.rec, path, run.t[turns], columns)
+        send(self.rec, path, self.timeline, run.t[turns], columns)
 
 
 def stretches(points: FloatArray) -> list[FloatArray]:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu import VERSION
+from kinfmu.axis import axis_of
 from kinfmu.channels import is_drawn, select
 from kinfmu.errors import MechanismError
 from kinfmu.log import ros2
@@ -87,7 +88,9 @@ class Content:
         for (name, text), kind in zip(attachments.items(), ("toml", "xml"), strict=True):
             if text:
                 writer.attachment(name, f"application/{kind}", text.encode())
-        about = {"time_base": "simulation", "time_zero_s": str(zero), **_versions()}
+        axis = axis_of(run)
+        base = "simulation" if axis.is_time else "number of the sample, one a second"
+        about = {"time_base": base, "axis": axis.label, "time_zero_s": str(zero), **_versions()}
         self.until = 0.0  # time of the last sample [s]
         self._sample = _SampleTopic(writer, run)
         self._topics: list[JointTopic | LinkTopic] = []

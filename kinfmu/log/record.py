@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.axis import TIME
 from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
 from kinfmu.mechanism.quoted import quoted
@@ -38,6 +39,7 @@ def description(run: Run) -> dict[str, str]:
         "input_names": run.input_names,
         "watch_names": run.watch_names,
         "length_unit": run.length_unit,
+        "axis": run.axis,
     }
     return {"format": FORMAT} | {key: json.dumps(value, ensure_ascii=False) for key, value in lists.items()}
 
@@ -125,6 +127,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
     blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
+    blank["inputs"] = np.zeros((n, len(inputs)))  # numbers, for they are looked at before they are filled
     blank |= {name: np.empty(n) for name in ("residual", "margin")}
     blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
     empty = Run(
@@ -136,6 +139,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         watch_names=watches,
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
+        axis=about.get("axis", TIME),  # records of before do not name it
         **blank,
     )
     for place in empty.places(kept=False):

@@ -36,6 +36,7 @@ from kinfmu.log.scene import drawable
 from kinfmu.log.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.target import replacing
 from kinfmu.log.thinned import thinned
+from kinfmu.log.timeline import Timeline, timeline_of
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.run import Run
 from kinfmu.shapes import palette
@@ -56,18 +57,20 @@ def write_rrd(run: Run, path: str | Path) -> None:
     an older one as it was, and for times that a log cannot hold.
     """
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
-    shown = thinned(run)
+    timeline = timeline_of([run])
+    shown = timeline.placed(thinned(run))
     scene, note = drawable(shown)
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    with recording(path, name, single(shown, scene, curves, solver), application([shown], curves.values())) as rec:
+    layout = single(timeline, shown, scene, curves, solver)
+    with recording(path, name, layout, application([shown], curves.values())) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
-            log_linkage(rec, "/linkage", shown, scene)
+            log_linkage(rec, "/linkage", timeline, shown, scene)
         for group in (*curves.values(), *solver):
-            log_group(rec, "", shown, group)
-        log_status(rec, "", run)
+            log_group(rec, "", timeline, shown, group)
+        log_status(rec, "", timeline, timeline.placed(run))
         log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
 
 
@@ -82,7 +85,7 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
     """Name of the application that recordings of such runs and curves belong to, such as 'kinfmu_fourbar_12ab34cd'."""
     ranges = [(group.path, group.shown) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
-    facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, bool(happenings(run))) for run in runs]))
+    facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(happenings(run))) for run in runs]))
     names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
     return "_".join([APPLICATION, *dict.fromkeys(names), f"{crc32(facts.encode()):08x}"])
 
@@ -106,7 +109,9 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
         _check_whole(temporary, path)
 
 
-def log_group(rec: rr.RecordingStream, root: str, run: Run, group: Group, width: float = 1.5) -> None:
+def log_group(
+    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float = 1.5
+) -> None:
     """The curves of a group, a gap where they are NaN; as points where lines would not show, between gaps."""
     import rerun as rr
 
@@ -123,7 +128,8 @@ def log_group(rec: rr.RecordingStream, root: str, run: Run, group: Group, width:
             interpolation_mode="StepAfter" if group.is_stepped else "Linear",
         )
     rec.log(path, look, static=True)
-    send(rec, path, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(group.values[rows])))
+    values = group.values
+    send(rec, path, timeline, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(values[rows])))
 
 
 def log_card(rec: rr.RecordingStream, markdown: str) -> None:
@@ -133,7 +139,7 @@ def log_card(rec: rr.RecordingStream, markdown: str) -> None:
     rec.log("/card", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
 
 
-def log_status(rec: rr.RecordingStream, root: str, run: Run) -> None:
+def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run) -> None:
     """The lane of states and the log of what happened."""
     import rerun as rr
 
@@ -143,11 +149,13 @@ def log_status(rec: rr.RecordingStream, root: str, run: Run) -> None:
     rec.log(path, rr.StateConfiguration(values=labels, colors=colours), static=True)
     turns = list(changes(run))
     times = np.array([turn.t for turn in turns])
-    send(rec, path, times, lambda rows: rr.StateChange.columns(state=[label(turn.status) for turn in turns[rows]]))
+    states = [label(turn.status) for turn in turns]
+    send(rec, path, timeline, times, lambda rows: rr.StateChange.columns(state=states[rows]))
     events = happenings(run)
     send(
         rec,
         f"{root}/log",
+        timeline,
         np.array([event.t for event in events]),
         lambda rows: rr.TextLog.columns(
             text=[event.text for event in events[rows]],

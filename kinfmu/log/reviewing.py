@@ -9,11 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 
+from kinfmu.axis import axis_of
 from kinfmu.errors import LogError, RequestError
-from kinfmu.log.headless import executable, last_words, shoot
+from kinfmu.log.headless import Cursor, executable, last_words, shoot
 from kinfmu.log.reading import read
 from kinfmu.log.rerun_file import write_rrd
 from kinfmu.log.target import replacing
+from kinfmu.log.timeline import timeline_of
 from kinfmu.suffix import suffix_of
 
 FAILS_WITHIN = 1.5  # [s]; a viewer that cannot open a window ends sooner
@@ -32,7 +34,8 @@ def review(
 ) -> Path | None:
     """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
 
-    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s];
+    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s],
+    of a run over driver values the value [rad or the unit of length] or the number of the sample;
     tell: called with a line on which coordinates two runs have in common if they are not the same.
     Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
     recording is, None if there was only a picture.
@@ -46,14 +49,14 @@ def review(
         _need_display(run)
     if screenshot and not save:
         with TemporaryDirectory() as folder:
-            recording = run
+            recording, moment = run, _seconds(at)
             if suffix_of(run) == ".mcap":
                 recording = Path(folder) / f"{run.stem}.rrd"
-                at = _record(run, other, recording, at, tell)
-            _shoot(recording, screenshot, at)
+                moment = _record(run, other, recording, at, tell)
+            _shoot(recording, screenshot, moment)
         return None
     if suffix_of(run) == ".rrd":
-        recording, moment = run, at
+        recording, moment = run, _seconds(at)
     else:
         recording = Path(save) if save else run.with_name(_beside(run, other))
         moment = _record(run, other, recording, at, tell)
@@ -69,7 +72,7 @@ def _check(
 ) -> None:
     """Raise a RequestError for files that cannot be reviewed or written, or that do not go together."""
     if at is not None and not screenshot:
-        raise RequestError(f"at = {at:g} s is the time of a screenshot, and none is asked for")
+        raise RequestError(f"at = {at:g} is the time of a screenshot, and none is asked for")
     for path in (run, *([Path(other)] if other else [])):
         if suffix_of(path) not in (".mcap", ".rrd"):
             raise RequestError(f"{path}: a run to review is an .mcap or .rrd file")
@@ -95,11 +98,15 @@ def _record(
     recording: Path,
     at: float | None,
     tell: Callable[[str], None] | None,
-) -> float | None:
-    """Write the recording; returns the time [s] at which a picture of it shows something."""
+) -> Cursor | None:
+    """Write the recording; returns where a picture of it shows something."""
     first = read(run)
-    if at is not None and other is None and len(first) and not first.t[0] <= at <= first.t[-1]:
-        raise RequestError(f"at = {at:g} s lies outside the run, {first.t[0]:g} to {first.t[-1]:g} s")
+    axis = axis_of(first)
+    if at is not None and other is None and len(first):
+        value = at / axis.factor
+        if not min(axis.values[[0, -1]]) <= value <= max(axis.values[[0, -1]]):
+            asked = f"at = {at:g} s" if axis.is_time else f"at {axis.name} = {value:.6g} {axis.unit}".rstrip()
+            raise RequestError(f"{asked} is outside the run, {axis.range()}")
     if other is None:
         write_rrd(first, recording)
     else:
@@ -109,13 +116,20 @@ def _record(
         write_comparison(first, second, recording, names)
         if tell and (line := in_common(first, second, names)):
             tell(line)
-    times = first.t[first.good] if first.good.any() else first.t
-    if at is not None or not len(times):
-        return at
-    return float(times[int(POSTER * (len(times) - 1))])
+    timeline = timeline_of([first] if other is None else [first, second])
+    placed = timeline.placed(first)
+    times = placed.t[first.good] if first.good.any() else placed.t
+    if at is not None:
+        return timeline.cursor(at / axis.factor * (timeline.parts or 1))
+    return timeline.cursor(float(times[int(POSTER * (len(times) - 1))])) if len(times) else None
 
 
-def _shoot(recording: Path, screenshot: str | Path, at: float | None) -> None:
+def _seconds(at: float | None) -> Cursor | None:
+    """Where a picture of a recording over time is taken."""
+    return None if at is None else {"duration": at}
+
+
+def _shoot(recording: Path, screenshot: str | Path, at: Cursor | None) -> None:
     """A picture of the recording; a view that cannot show its data is an error."""
     shot = shoot(recording, at)
     with replacing(screenshot) as temporary:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinfmu.axis import axis_of
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
@@ -40,7 +41,7 @@ class Group:
 def groups(run: Run) -> dict[tuple[str, str], Group]:
     """Coordinates and points of interest by (order, kind), such as ('velocity', 'angle'); kinds that occur."""
     colours = _colours(run)
-    duration = float(np.ptp(run.t)) if len(run) else 0.0
+    axis = axis_of(run)
     found = {}
     for kind in KINDS:
         columns = [k for k, name in enumerate(run.outputs) if quantity_of(name).kind == kind]
@@ -56,19 +57,19 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
             found[ORDERS[order], kind] = Group(
                 path=f"{ORDERS[order]}/{kind}",
-                title=_title(kind, order, run.length_unit),
+                title=_title(Quantity(kind, order, axis.per), run.length_unit),
                 names=tuple(derivative_name(run.outputs[k], order) for k in kept),
                 colours=tuple(colours[run.outputs[k]] for k in kept),
                 values=values,
-                shown=shown_range(values, size / (duration or 1.0) ** order),
+                shown=shown_range(values, size / (axis.span or 1.0) ** order),
             )
     return found
 
 
-def _title(kind: str, order: int, length_unit: str) -> str:
+def _title(quantity: Quantity, length_unit: str) -> str:
     """Such as 'angular velocity [rad/s]'."""
-    words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[kind]
-    return f"{words[order]} [{unit_of(Quantity(kind, order), length_unit)}]"
+    words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]
+    return f"{words[quantity.order]} [{unit_of(quantity, length_unit)}]"
 
 
 def accuracy(run: Run) -> Group | None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.axis import axis_of
 from kinfmu.log.clock import nanoseconds
 from kinfmu.run import Event, Run
 from kinfmu.solver.status import Status
@@ -99,4 +100,4 @@ def sentence(run: Run) -> str:
     parts = ", ".join(f"{number} {label(status)}" for status, number in counts(run).items())
     text = f"{len(run)} sample{'' if len(run) == 1 else 's'}" + (f": {parts}" if parts else "")
     worst = worst_residual(run)
-    return f"{text}; worst residual {worst.residual:.2g} at {worst.t:g} s" if worst else text
+    return f"{text}; worst residual {worst.residual:.2g} at {axis_of(run).place(worst.t)}" if worst else text

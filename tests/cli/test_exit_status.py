@@ -80,7 +80,7 @@ WRONG_USAGE = [
     ("review picture.rrd --save run.rrd", "picture.rrd: a recording cannot be saved as another; give the run's .mcap"),
     ("review picture.rrd damaged.mcap", "picture.rrd: a recording cannot be compared"),
     ("review damaged.mcap --at 3", "--at is the time of --screenshot"),
-    ("review whole.mcap --screenshot run.png --at 5", "at = 5 s lies outside the run, 0 to 2 s"),
+    ("review whole.mcap --screenshot run.png --at 5", "at = 5 s is outside the run, t = 0 to 2 s"),
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
     ("export none.mcap -o run.csv", "none.mcap: there is no such file"),

@@ -118,4 +118,4 @@ def test_a_part_of_a_run_is_exported(
     assert command("export", record, "-o", "run.csv", "--start", "175").exit_code == 0
     assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(175, 181))
     told = refuses("export", record, "-o", "run.csv", "--start", "181")
-    assert "the run has no samples from 181 to inf s; its samples: 0 to 180 s" in told
+    assert "the run has no samples from 181 to inf s; its samples: t = 0 to 180 s" in told

@@ -29,7 +29,7 @@ def test_a_cut_record_is_made_whole_beside_it(cut: Path, command: Command, tmp_p
     first, last = result.stdout.splitlines()
     found = read(tmp_path / "run-recovered.mcap")
     assert len(found) > 8000
-    assert first.startswith(f"at t = {found.t[-1]:g} s: the record ends here: the record at byte ")
+    assert first.startswith(f"at {found.t[-1]:g} s: the record ends here: the record at byte ")
     assert last.startswith(f"{len(found)} samples: ")
     assert last.endswith("; written to run-recovered.mcap")
     assert cut.read_bytes() == left

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinfmu.axis import axis_of
 from kinfmu.channels import select
 from kinfmu.draw import plot
 from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
@@ -52,10 +53,10 @@ def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
 
 def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
     gap = with_gap(run, 100, 120)
-    assert _gaps(gap) == [(99.0, 121.0)]
-    assert _gaps(with_gap(run, 0, 180)) == [(0.0, 180.0)]
-    assert _gaps(with_gap(with_gap(run, 0, 3), 170, 180)) == [(0.0, 4.0), (169.0, 180.0)]
-    assert _gaps(run) == []
+    assert _gaps(gap, gap.t) == [(99.0, 121.0)]
+    assert _gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
+    assert _gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
+    assert _gaps(run, run.t) == []
     panel = _sheet(gap, ("coupler.x",)).axes[0]
     assert len(panel.patches) == 1
     assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
@@ -65,12 +66,12 @@ def test_noise_about_a_constant_is_a_straight_line(run: Run) -> None:
     noise = 1e-16 * np.random.default_rng(3).normal(size=len(run))
     values = run.values + noise[:, None] * (np.array(run.outputs) == "coupler.phi")
     noisy = dataclasses.replace(run, values=values)
-    shown = _shown(noisy, "coupler.phi", 0, noisy["coupler.phi"])
+    shown = _shown(noisy, axis_of(noisy), "coupler.phi", 0, noisy["coupler.phi"])
     assert shown
     assert shown[1] - shown[0] > 1.0
-    low, high = _shown(run, "crank.phi", 1, run["crank.omega"]) or (0.0, 0.0)
+    low, high = _shown(run, axis_of(run), "crank.phi", 1, run["crank.omega"]) or (0.0, 0.0)
     assert low < run["crank.omega"][0] < high
-    assert _shown(run, "coupler.x", 0, run["coupler.x"]) is None
+    assert _shown(run, axis_of(run), "coupler.x", 0, run["coupler.x"]) is None
 
 
 def test_a_long_run_is_drawn_by_its_extremes() -> None:

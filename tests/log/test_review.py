@@ -82,7 +82,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
     review(mcap, save=tmp_path / "run.rrd")
     with pytest.raises(RequestError, match=r"a recording cannot be compared; give the run's \.mcap file"):
         review(tmp_path / "run.rrd", mcap)
-    with pytest.raises(RequestError, match=r"at = 4 s is the time of a screenshot, and none is asked for"):
+    with pytest.raises(RequestError, match=r"at = 4 is the time of a screenshot, and none is asked for"):
         review(mcap, save=tmp_path / "run.rrd", at=4.0)
 
 

@@ -10,6 +10,7 @@ import pytest
 import kinfmu
 from kinfmu.log.blueprint import plot
 from kinfmu.log.series import SMALLEST, accuracy, error_estimates, groups, margin
+from kinfmu.log.timeline import timeline_of
 from kinfmu.run import Run
 from kinfmu.shapes import palette
 from tests.log.runs import fourbar, with_gap
@@ -46,12 +47,18 @@ def test_every_one_of_many_curves_has_a_name_in_the_legend_and_a_colour_of_its_o
     for group in groups(run).values():
         assert len(group.names) > 14
         assert len({*group.names}) == len({*group.colours}) == len(group.names)
-        (is_shown,) = plot(group.title, [("", group)], [run]).properties["PlotLegend"].visible.as_arrow_array()
+        (is_shown,) = (
+            plot(group.title, [("", group)], timeline_of([run]), [run])
+            .properties["PlotLegend"]
+            .visible.as_arrow_array()
+        )
         assert is_shown.as_py()
 
 
 def test_a_single_curve_is_named_by_its_plot(run: Run) -> None:
-    (is_shown,) = plot("margin", [("", margin(run))], [run]).properties["PlotLegend"].visible.as_arrow_array()
+    (is_shown,) = (
+        plot("margin", [("", margin(run))], timeline_of([run]), [run]).properties["PlotLegend"].visible.as_arrow_array()
+    )
     assert not is_shown.as_py()
 
 

@@ -47,7 +47,7 @@ def test_the_card_tells_mechanism_run_verdict_and_events(run_with_gap: Run) -> N
     text = card(run_with_gap, "Not drawn: coupler.")
     for part in (
         "### Four-bar crank with a redundant constraint",
-        "181 samples, 0 s to 180 s",
+        "181 samples, t = 0 to 180 s",
         "* 21 outside: ",
         "Worst residual 1.1e-16",
         "* **100 s:** crank\\_angle = 1.9 rad: the limit is 1.75 rad\n",

@@ -64,7 +64,7 @@ def test_no_view_of_the_gallery_complains(name: str, tmp_path: Path, viewer: hea
     path = tmp_path / f"{name}.rrd"
     write_rrd(run, path)
     assert verified(path)
-    viewer.show(path, float(run.t[len(run) // 3]))
+    viewer.show(path, {"duration": float(run.t[len(run) // 3])})
     shot = viewer.glance()
     assert shot.reports == ()
     assert {"linkage", "run", "solver status", "log10 margin", "Newton iterations"} <= set(shot.views)

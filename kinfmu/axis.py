@@ -1,0 +1,139 @@
+"""The axis of a run: time, or what takes its place where driver values were given instead of times."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinfmu.errors import listed
+from kinfmu.units import ANGLES
+
+if TYPE_CHECKING:
+    from kinfmu.run import FloatArray, Run
+
+TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
+DEGREE = ANGLES["deg"]
+_LARGE = 1e9  # [rad]; larger angles stay in radians
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """What pictures and reports of a run have in the place of time.
+
+    name: 't', the name of a driver, or 'sample'; unit: 's', 'deg', the unit of length, or ''; factor: of the unit into
+    the one used inside; values: (n,) in the unit, in ascending or descending order; span: their range in the unit used
+    inside, which is that of the rates; per: what rates are derivatives by, 'time', or 'angle' or 'length' of the
+    driver; rates: a sentence on them, empty where they are derivatives by the axis of a run over time.
+    """
+
+    name: str
+    unit: str
+    factor: float
+    values: FloatArray
+    span: float
+    per: str
+    rates: str
+    t: FloatArray
+
+    @property
+    def label(self) -> str:
+        """'t [s]', 'crank [deg]' or 'sample'."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
+    def is_time(self) -> bool:
+        """True for a run over time."""
+        return self.unit == "s"
+
+    def at(self, t: FloatArray) -> FloatArray:
+        """Values of the axis, in its unit, at times of the run."""
+        return np.interp(t, self.t, self.values) if len(self.t) and not self.is_time else t
+
+    def place(self, t: float) -> str:
+        """'37 s', 'crank = 45 deg' or 'sample 45': a time of the run, for people."""
+        value = f"{float(self.at(np.array([t]))[0]):.6g}"
+        if self.is_time:
+            return f"{value} s"
+        return f"{self.name} = {value} {self.unit}" if self.unit else f"{self.name} {value}"
+
+    def range(self) -> str:
+        """'t = 0 to 180 s', 'crank = 0 to 360 deg' or 'sample 0 to 360'; '' without samples."""
+        if not len(self.values):
+            return ""
+        first, last = (f"{value:.6g}" for value in (self.values[0], self.values[-1]))
+        return f"{self.name} = {first} to {last} {self.unit}" if self.unit else f"{self.name} {first} to {last}"
+
+
+def axis_of(run: Run) -> Axis:
+    """Return the axis of a run, as its field `axis` names it."""
+    if run.axis == TIME or run.axis not in (SAMPLE, *run.input_names):
+        return Axis("t", "s", 1.0, run.t, _span(run.t), "time", "", run.t)
+    if run.axis == SAMPLE:
+        return Axis(SAMPLE, "", 1.0, run.t, _span(run.t), "time", _at_speeds(run), run.t)
+    column = run.input_names.index(run.axis)
+    driver, kind = _driver(run.axis)
+    inside = run.inputs[:, column]
+    values, unit, factor = inside, "rad" if kind == "angle" else run.length_unit, 1.0
+    if kind == "angle" and np.max(np.abs(inside), initial=0.0) < _LARGE:
+        values, unit, factor = np.round(inside / DEGREE, 9), "deg", DEGREE  # 45, not 45.00000000000001
+    per = rates_per(run)
+    if per == "time":
+        fastest = float(np.max(np.abs(run.inputs[:, column + 1]), initial=0.0))
+        span, rates = _span(inside) / (fastest or 1.0), _at_speeds(run)
+    else:
+        span, rates = _span(inside), f"Rates are derivatives by {driver}, per {'rad' if kind == 'angle' else unit}."
+    return Axis(driver, unit, factor, values, span, per, rates, run.t)
+
+
+def rates_per(run: Run) -> str:
+    """Return what the rates of a run are derivatives by: 'time', or 'angle' or 'length' of the driver on its axis.
+
+    They are derivatives by the driver where it has speed 1 and acceleration 0, and the others stand still.
+    """
+    if run.axis not in run.input_names:
+        return "time"
+    column = run.input_names.index(run.axis)
+    moved = np.delete(run.inputs, (column, column + 1), axis=1)
+    is_rate = np.delete(np.arange(len(run.input_names)) % 3 > 0, (column, column + 1))
+    is_per_unit = bool(np.all(run.inputs[:, column + 1] == 1.0)) and not moved[:, is_rate].any()
+    return _driver(run.axis)[1] if is_per_unit else "time"
+
+
+def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
+    """Return the axis of a run by inputs: the one value that changes, if it always goes one way, else the samples.
+
+    u: (n, d) values of the drivers; names: of these inputs, (d,).
+    """
+    if len(u) == len(names) == 1:
+        return names[0]
+    moved = np.flatnonzero(np.ptp(u, axis=0) > 0.0)
+    steps = np.diff(u[:, moved], axis=0)
+    goes_one_way = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+    return names[moved[0]] if len(moved) == 1 and goes_one_way else SAMPLE
+
+
+def _driver(name: str) -> tuple[str, str]:
+    """Name of the driver of an input such as 'crank_angle', and 'angle' or 'length'."""
+    driver, _, kind = name.rpartition("_")
+    return driver, "angle" if kind == "angle" else "length"
+
+
+def _span(values: FloatArray) -> float:
+    return float(np.ptp(values)) if len(values) else 0.0
+
+
+def _at_speeds(run: Run) -> str:
+    """'Rates are at the speed crank = 3 rad/s.': where each driver has one speed, else that they are at those given."""
+    told = []
+    for name in run.input_names[::3]:
+        driver, kind = _driver(name)
+        column = run.input_names.index(name) + 1
+        speeds = run.inputs[:, column]
+        if len(speeds) and math.isfinite(speeds[0]) and np.all(speeds == speeds[0]):
+            told.append(f"{driver} = {speeds[0]:.6g} {'rad' if kind == 'angle' else run.length_unit}/s")
+    if len(told) < len(run.input_names) // 3:
+        return f"Rates are at the speeds given for {listed(_driver(name)[0] for name in run.input_names[::3])}."
+    return f"Rates are at the speed{'s' if len(told) > 1 else ''} {listed(told)}."

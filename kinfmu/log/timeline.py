@@ -1,0 +1,89 @@
+"""The timeline of a recording: time, or whole numbers of a part of the driver's unit for runs that have no time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.axis import axis_of
+from kinfmu.errors import LogError
+from kinfmu.log.clock import nanoseconds
+from kinfmu.run import FloatArray, Run
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+FINEST = 9  # decimals of a value
+_LOST = 0.01  # part of the smallest step between samples that rounding may move one
+_MOST = 2.0**31  # the largest of the whole numbers
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """How a recording counts.
+
+    name: 'sim_time', 'crank [deg]', 'crank [0.1 deg]' or 'sample'; parts: whole numbers to one unit of the axis, None
+    for times, which are seconds.
+    """
+
+    name: str
+    parts: int | None = None
+
+    def placed(self, run: Run) -> Run:
+        """The run with its values on this timeline in the place of its times, those of its events too."""
+        if self.parts is None:
+            return run
+        axis, parts = axis_of(run), self.parts
+        at = np.rint(axis.at(np.array([event.t for event in run.events])) * parts)
+        events = tuple(event._replace(t=float(t)) for event, t in zip(run.events, at, strict=True))
+        return replace(run, t=np.rint(axis.values * parts), events=events)
+
+    def column(self, t: FloatArray) -> rr.TimeColumn:
+        """Times of placed runs (n,) for Rerun, which truncates float durations to nanoseconds: give it whole ones."""
+        import rerun as rr
+
+        if self.parts is None:
+            return rr.TimeColumn(self.name, duration=nanoseconds(t).astype("timedelta64[ns]"))
+        return rr.TimeColumn(self.name, sequence=np.rint(t).astype(np.int64))
+
+    def cursor(self, t: float) -> dict[str, Any]:
+        """A time of placed runs as where a viewer's cursor is put."""
+        return {"duration": t} if self.parts is None else {"sequence": round(t)}
+
+    def number(self, t: float) -> dict[str, Any]:
+        """A time of placed runs, or a span of them, as the argument of a boundary of Rerun's."""
+        return {"seconds": t} if self.parts is None else {"seq": round(t)}
+
+
+def timeline_of(runs: Sequence[Run]) -> Timeline:
+    """The timeline that runs have in common; a LogError if they have none."""
+    axes = [axis_of(run) for run in runs]
+    if len({(axis.name, axis.unit) for axis in axes}) > 1:
+        raise LogError(
+            f"the runs are over {' and '.join(axis.label for axis in axes)}: they can be compared over the same alone"
+        )
+    first = axes[0]
+    if first.is_time:
+        return Timeline("sim_time")
+    for axis in axes:
+        if float(np.max(np.abs(axis.values), initial=0.0)) > _MOST:
+            raise LogError(f"values of {axis.label} beyond {_MOST:.3g} cannot be placed in a recording")
+    decimals = max(_decimals(axis.values) for axis in axes) if first.unit else 0
+    part = f"{10.0**-decimals:.{decimals}f}"
+    return Timeline(first.label.replace("[", f"[{part} ") if decimals else first.label, 10**decimals)
+
+
+def _decimals(values: FloatArray) -> int:
+    """How many decimals tell values apart."""
+    steps = np.abs(np.diff(values))
+    least = float(steps[steps > 0.0].min(initial=math.inf))
+    largest = float(np.max(np.abs(values), initial=0.0))
+    for decimals in range(FINEST):
+        lost = float(np.max(np.abs(np.rint(values * 10**decimals) / 10**decimals - values), initial=0.0))
+        if lost <= _LOST * least or largest * 10 ** (decimals + 1) > _MOST:
+            return decimals
+    return FINEST
