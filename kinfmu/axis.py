@@ -69,7 +69,7 @@ class Axis:
 
 def axis_of(run: Run) -> Axis:
     """Return the axis of a run, as its field `axis` names it."""
-    if run.axis == TIME or run.axis not in (SAMPLE, *run.input_names):
+    if run.axis == TIME or run.axis not in (SAMPLE, *run.input_names[::3]):
         return Axis("t", "s", 1.0, run.t, _span(run.t), "time", "", run.t)
     if run.axis == SAMPLE:
         return Axis(SAMPLE, "", 1.0, run.t, _span(run.t), "time", _at_speeds(run), run.t)
@@ -93,7 +93,7 @@ def rates_per(run: Run) -> str:
 
     They are derivatives by the driver where it has speed 1 and acceleration 0, and the others stand still.
     """
-    if run.axis not in run.input_names:
+    if run.axis not in run.input_names[::3]:
         return "time"
     column = run.input_names.index(run.axis)
     moved = np.delete(run.inputs, (column, column + 1), axis=1)

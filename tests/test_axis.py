@@ -147,7 +147,10 @@ def test_events_are_placed_on_the_axis() -> None:
 
 
 def test_an_unknown_axis_of_a_record_is_time(sweep: Run) -> None:
-    assert axis_of(dataclasses.replace(sweep, axis="future")).label == "t [s]"
+    for axis in ("future", "crank_speed", "crank_acceleration"):
+        other = dataclasses.replace(sweep, axis=axis)
+        assert axis_of(other).label == "t [s]"
+        assert {place.unit for place in other.places() if place.name == "coupler.vx"} == {"mm/s"}
 
 
 @pytest.mark.parametrize(

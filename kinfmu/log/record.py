@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.axis import TIME
 from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
 from kinfmu.mechanism.quoted import quoted
@@ -139,7 +138,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         watch_names=watches,
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
-        axis=about.get("axis", TIME),  # records of before do not name it
+        axis=about["axis"],
         **blank,
     )
     for place in empty.places(kept=False):

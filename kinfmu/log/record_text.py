@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from kinfmu.axis import SAMPLE, TIME
 from kinfmu.errors import LogError, listed
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import is_line
@@ -43,6 +44,9 @@ def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
             raise LogError(f"{key} of the record: {len(value)} entries; {MOST_COLUMNS} at most")
         if not is_valid(value):
             raise LogError(f"{key} of the record = {quoted(value)} must be {valid}")
+    found["axis"] = axis = _value(texts, "axis") if "axis" in texts else TIME  # which older records do not name
+    if not isinstance(axis, str):
+        raise LogError(f"axis of the record = {quoted(axis)} must be the name of an input, or {TIME} or {SAMPLE}")
     if found["coordinate_count"] > len(found["outputs"]):
         raise LogError(f"coordinate_count of the record = {found['coordinate_count']} is more than its outputs")
     if len(set(found["columns"])) < len(found["columns"]):
