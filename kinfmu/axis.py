@@ -4,19 +4,37 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.errors import listed
 from kinfmu.units import ANGLES
 
-if TYPE_CHECKING:
-    from kinfmu.run import FloatArray, Run
-
+FloatArray = NDArray[np.float64]
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
 DEGREE = ANGLES["deg"]
 _LARGE = 1e9  # [rad]; larger angles stay in radians
+
+
+class Samples(Protocol):
+    """What of a run its axis is known by; the fields as kinfmu.Run describes them."""
+
+    @property
+    def axis(self) -> str: ...
+
+    @property
+    def t(self) -> FloatArray: ...
+
+    @property
+    def input_names(self) -> tuple[str, ...]: ...
+
+    @property
+    def inputs(self) -> FloatArray: ...
+
+    @property
+    def length_unit(self) -> str: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +85,7 @@ class Axis:
         return f"{self.name} = {first} to {last} {self.unit}" if self.unit else f"{self.name} {first} to {last}"
 
 
-def axis_of(run: Run) -> Axis:
+def axis_of(run: Samples) -> Axis:
     """Return the axis of a run, as its field `axis` names it."""
     if run.axis == TIME or run.axis not in (SAMPLE, *run.input_names[::3]):
         return Axis("t", "s", 1.0, run.t, _span(run.t), "time", "", run.t)
@@ -88,7 +106,7 @@ def axis_of(run: Run) -> Axis:
     return Axis(driver, unit, factor, values, span, per, rates, run.t)
 
 
-def rates_per(run: Run) -> str:
+def rates_per(run: Samples) -> str:
     """Return what the rates of a run are derivatives by: 'time', or 'angle' or 'length' of the driver on its axis.
 
     They are derivatives by the driver where it has speed 1 and acceleration 0, and the others stand still.
@@ -125,7 +143,7 @@ def _span(values: FloatArray) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
 
 
-def _at_speeds(run: Run) -> str:
+def _at_speeds(run: Samples) -> str:
     """'Rates are at the speed crank = 3 rad/s.': where each driver has one speed, else that they are at those given."""
     told = []
     for name in run.input_names[::3]:
