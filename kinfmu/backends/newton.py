@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from kinfmu.plan import Block
 
-ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain
+ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain at regular poses
 SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
 ITERATIONS = 12
 

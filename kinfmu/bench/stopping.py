@@ -4,7 +4,7 @@ The loop that the Python backend writes for each block,
 
     for iteration in range(12):
         (residuals r0, r1, ..., `error` their square, entries of the Jacobian or its factors)
-        if error <= ROUND_OFF or held & 1 or (it does not fall any more):
+        if error <= enough or held & 1 or (it does not fall any more):
             break
         last = error
         (unknowns -= Jacobian^-1 r)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
 from .message import LOCATED, ROUGHLY, differs, place
-from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road
+from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road, position
 from .road import Road, Searched
 from .span import REGULAR
 from .status import Status
@@ -124,7 +124,7 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
     zd, zdd = pose.tangent or directed(model, pose, direction)
     try:
-        trial = Pose(u, model.position(u, pose.z, zd, zdd, s), pose.road)
+        trial = Pose(u, position(model, u, pose.z, zd, zdd, s), pose.road)
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
     needed = TRUST * trial.moved

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from .advance import FALL, TRUST
 from .linear import factor, lu_solve
-from .pose import Model, Pose, Vector, evaluated, failed
+from .pose import Model, Pose, Vector, evaluated, failed, position
 from .solver import TOLERANCE, Solver
 from .status import Status
 
@@ -70,7 +70,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
         p = values if there == 1.0 else tuple([a + there * (b - a) for a, b in zip(written, values, strict=True)])
         try:
             ahead = module.bound(p)
-            trial = Pose(u, ahead.position(u, pose.z, slope, at_rest, there - s))
+            trial = Pose(u, position(ahead, u, pose.z, slope, at_rest, there - s))
         except (ArithmeticError, ValueError) as error:  # diverged, or a root of something negative
             block = error.args[0] if len(error.args) == 2 else block
         else:

@@ -11,6 +11,7 @@ Model = Any  # a generated module: see kinfmu.backends.python.emit
 Found = tuple[Any, ...]  # what its `position` gives
 
 EPS = 2.220446049250313e-16
+POLISHED = 0.1  # determinant below which Newton goes on until the residual no longer falls
 UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
 STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
@@ -114,10 +115,25 @@ def on_road(pose: Pose, road: Any) -> Pose:
     return other
 
 
+def position(model: Model, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0) -> Found:
+    """What the model's `position` gives; near a singular pose Newton goes on until the residual no longer falls."""
+    found: Found = model.position(u, z, zd, zdd, s, held)
+    if found[2] >= POLISHED or held < 0:
+        return found
+    rest = (0.0,) * len(z)
+    try:
+        better: Found = model.position(u, found[0], rest, rest, -0.0, held, 0.0)
+    except (ArithmeticError, ValueError):
+        return found
+    if not better[3] <= found[3]:
+        return found
+    return (*better[:4], found[4] + better[4], found[5], *better[6:])
+
+
 def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> Found:
     """What `position` gives for unknowns that are known: held blocks (all, if nothing is said) are not solved for.
 
     s = -0.0 at rest leaves z as it is, to the bit.
     """
     rest = (0.0,) * len(z)
-    return model.position(u, z, rest, rest, -0.0, held)  # type: ignore[no-any-return]  # generated code has no types
+    return position(model, u, z, rest, rest, -0.0, held)

@@ -124,3 +124,23 @@ def test_an_anchor_near_a_change_point_is_bridged_and_stays_what_it_is() -> None
     again = solver.restore(solver.dump(first))
     assert again.z == first.z
     assert again.tangent == first.tangent
+
+
+# ----------------------------------------------------------------------------------------------- where Newton ends
+
+
+@pytest.mark.parametrize("gap", [3e-3, 1e-3, 1e-4, 1e-5])
+def test_near_a_singular_pose_newton_leaves_no_residual_that_another_step_would_take(gap: float) -> None:
+    """On average: what is left is rounding. At regular poses Newton ends at 4e-16."""
+    model = load_model(compile_plan(kinfmu.load("five_bar")))
+    solver = Solver(model)
+    pose, left_over = solver.anchor, []
+    for k in range(60):
+        left = STRETCHED - gap * (1.0 + 1e-3 * k)
+        pose = solver.solve(pose, (left, math.pi - left - 1e-4 * k * gap))
+        still = (0.0,) * len(pose.z)
+        _, _, margin, residual, *_ = model.position(pose.u, pose.z, still, still, -0.0, 0, 0.0)
+        assert margin < 0.1
+        left_over.append((pose.residual, residual))
+    before, after = np.mean(left_over, axis=0)
+    assert before <= 1.1 * after

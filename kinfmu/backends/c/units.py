@@ -18,7 +18,6 @@ from kinfmu.backends.c.text import FUNCTIONS, function, indented
 from kinfmu.backends.lists import LISTS
 from kinfmu.backends.newton import (
     ITERATIONS,
-    ROUND_OFF,
     SETTLED,
     determinant,
     is_small,
@@ -197,7 +196,7 @@ class Units:
             "last = INFINITY;",
             f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
             *indented(inside),
-            f"    if (error <= {ROUND_OFF**2!r} || held",
+            "    if (error <= newton->enough || held",
             f"        || (16.0 * error > last && error <= {SETTLED**2!r} * ({angles}))) {{",
             "        break;",
             "    }",

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 from kinfmu.backends.newton import (
     ITERATIONS,
-    ROUND_OFF,
     SETTLED,
     determinant,
     is_small,
@@ -37,6 +36,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
 
     label: ends the names that outlive the loop (det, factors); starts: names of the unknowns before the prediction;
     held: an expression that is true where the unknowns are not to be solved for; number: of the block, for the error.
+    The code reads `enough`, the squared residual that it may end at.
     """
     entries = [entry for row in block.jacobian for entry in row]
     unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
@@ -53,7 +53,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
     angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
     settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
-    done = f"error <= {ROUND_OFF**2} or {held} or ({settled})"
+    done = f"error <= enough or {held} or ({settled})"
     return [
         *before,
         "last = inf",

@@ -4,7 +4,7 @@ The module holds constants and these functions, each a stage; nothing is compute
 With parameters the functions stand inside `bound(parameters)`, which computes once what depends on parameters alone:
 
     drive(t, constants)                            -> u, ud, udd
-    position(u, z, zd, zdd, s, held)               -> z, determinants, margin, residual, iterations, moved, watch,
+    position(u, z, zd, zdd, s, held, enough)       -> z, determinants, margin, residual, iterations, moved, watch,
                                                       values
     tangent(values)                                -> z' and z'' (one driver only)
     first_motion(values, ud, udd)                  -> tangent and motion in one go (one driver only)
@@ -21,6 +21,7 @@ With parameters the functions stand inside `bound(parameters)`, which computes o
 z are the unknowns of all blocks. position predicts z + s zd + s^2 zdd / 2 and corrects by Newton; margin is the
 smallest |determinant|, residual the largest length of a block's residuals, moved the largest correction, watch the
 largest residual of the rows set aside. `held` is a bit a block: set, its z is taken as given instead of solved for.
+`enough` is the squared residual that Newton may end at; it ends too where the residual no longer falls.
 first and second are zd and zdd; with one driver they are the derivatives of z with respect to u, and the chain rule is
 part of the code.
 """

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from kinfmu.backends.alike import Run
 from kinfmu.backends.lists import LISTS, Lists
+from kinfmu.backends.newton import ROUND_OFF
 from kinfmu.backends.python.binding import bound
 from kinfmu.backends.python.block_code import indented, tupled
 from kinfmu.backends.python.differences import differences
@@ -89,7 +90,7 @@ class _Looped(Lists):
     def _position(self) -> list[str]:
         lines = [
             "",
-            "def position(u, z, zd, zdd, s, held=0):",
+            f"def position(u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}):",
             '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
             "    half = 0.5 * s",
             "    predicted = [a + s * (b + half * c) for a, b, c in zip(z, zd, zdd)]",
@@ -99,7 +100,7 @@ class _Looped(Lists):
         for k, run in self.numbered():
             label = run.kind.label
             if run.kind.solved:
-                arguments = f"RUN_{k}, x, z, held, {run.first}, determinants, largest, iterations"
+                arguments = f"RUN_{k}, x, z, held, enough, {run.first}, determinants, largest, iterations"
                 lines.append(f"    holds{k}, largest, iterations = position{label}({arguments})")
             else:
                 lines.append(f"    holds{k} = position{label}(RUN_{k}, x)")

@@ -1,6 +1,6 @@
 """The functions of a kind of units: each a loop over a run of them, on lists that hold all coordinates.
 
-    position(run, x, z, held, number, determinants, largest, iterations) -> holds, largest, iterations
+    position(run, x, z, held, enough, number, determinants, largest, iterations) -> holds, largest, iterations
     velocity(run, holds, x1, given, held, number)                        rates of the unit's coordinates, into x1
     acceleration(run, holds, x1, x2, given, held, number)                accelerations, into x2
     rates(run, holds, x1)                                                of the coordinates that are given outright
@@ -90,7 +90,7 @@ class Loops:
         arguments, results = ["run", "x"], ["holds"]
         about = "Coordinates that are given outright."
         if solved:
-            arguments += ["z", "held", "number", "determinants", "largest", "iterations"]
+            arguments += ["z", "held", "enough", "number", "determinants", "largest", "iterations"]
             results += ["largest", "iterations"]
             about = f"{len(solved.residuals)} x {len(solved.unknowns)} from rows {', '.join(solved.row_names)}."
         return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from kinfmu.backends.newton import ROUND_OFF
 from kinfmu.backends.parametric import parametric
 from kinfmu.backends.python.alone import Alone
 from kinfmu.backends.python.binding import bound
@@ -87,7 +88,7 @@ class _Straight:
         writer = Writer(self.names, self.prolog, keep)
         lines = [
             "",
-            "def position(u, z, zd, zdd, s, held=0):",
+            f"def position(u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}):",
             '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
             *unpacking(map(identifier, self.inputs[0]), "u"),
         ]

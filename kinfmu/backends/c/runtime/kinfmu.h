@@ -43,10 +43,10 @@ typedef struct {
 } kf_found;
 
 /* How Newton went in all blocks: their squared residuals, relative to the size, the largest, all together, and the one
- * of the block that failed; and how often it corrected.
+ * of the block that failed; the one that it may end at; and how often it corrected.
  */
 typedef struct {
-    double largest, total, failed;
+    double largest, total, failed, enough;
     int iterations;
 } kf_newton;
 

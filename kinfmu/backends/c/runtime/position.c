@@ -3,6 +3,9 @@
 
 #include "kinfmu.h"
 
+#define KF_ROUND_OFF 4e-16 /* residual relative to the size that Newton may end at: see kinfmu/backends/newton.py */
+#define KF_POLISHED 0.1    /* determinant below which it goes on: see kinfmu/solver/pose.py */
+
 /* The largest residual of the rows set aside. */
 static inline double watched(const kf_model *model, const kf_found *found)
 {
@@ -17,19 +20,12 @@ static inline double watched(const kf_model *model, const kf_found *found)
     return total < INFINITY ? largest : total;
 }
 
-inline int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd,
-                       double s, const bool *held, kf_found *found)
+/* Newton from a prediction, and its determinants, in a model's unit; -1, or the block that failed. */
+static inline int solved(const kf_model *model, const double *z, const bool *held, double enough, kf_found *found)
 {
-    kf_newton newton = {0.0, 0.0, 0.0, 0};
-    double predicted[KF_ROOM(KF_UNKNOWNS)];
-    double *const x = found->x;
+    kf_newton newton = {0.0, 0.0, 0.0, 0.0, 0};
     int k, failed;
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        predicted[k] = x[k] = z[k] + s * (zd[k] + 0.5 * s * zdd[k]);
-    }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        x[KF_COORDINATES - KF_DRIVERS + k] = u[k];
-    }
+    newton.enough = enough;
     failed = kf_solve_blocks(model, z, held, found, &newton);
     if (failed >= 0) {
         found->residual = sqrt(newton.failed);
@@ -44,10 +40,43 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     }
     found->residual = sqrt(newton.total < INFINITY ? newton.largest : newton.total);
     found->iterations = newton.iterations;
+    return -1;
+}
+
+/* Go on near a singular pose until the residual no longer falls; the pose stays as it is where that wins nothing. */
+static KF_RARE void polish(const kf_model *model, const bool *held, kf_found *found)
+{
+    const kf_found before = *found;
+    if (solved(model, before.x, held, 0.0, found) >= 0 || !(found->residual <= before.residual)) {
+        *found = before;
+        return;
+    }
+    found->iterations += before.iterations;
+}
+
+inline int kf_position(const kf_model *model, const double *u, const double *z, const double *zd, const double *zdd,
+                       double s, const bool *held, kf_found *found)
+{
+    double predicted[KF_ROOM(KF_UNKNOWNS)];
+    double *const x = found->x;
+    int k, failed;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        predicted[k] = x[k] = z[k] + s * (zd[k] + 0.5 * s * zdd[k]);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        x[KF_COORDINATES - KF_DRIVERS + k] = u[k];
+    }
+    failed = solved(model, z, held, KF_ROUND_OFF * KF_ROUND_OFF, found);
+    if (failed >= 0) {
+        return failed;
+    }
     found->moved = 0.0;
-    for (k = 0; newton.iterations && k < KF_UNKNOWNS; ++k) {
+    for (k = 0; found->iterations && k < KF_UNKNOWNS; ++k) {
         const double moved = fabs(x[k] - predicted[k]) / kf_unknown_scales[k];
         found->moved = moved > found->moved ? moved : found->moved;
+    }
+    if (found->margin < KF_POLISHED) {
+        polish(model, held, found);
     }
     found->watch = watched(model, found);
     return -1;
