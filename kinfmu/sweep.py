@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from kinfmu.axis import TIME, axis_for
 from kinfmu.backends.python import load_model, load_module
+from kinfmu.continued import anew, at_law_start, bound_values, continued, law_starts
 from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.mechanism import refuse_other
@@ -51,7 +52,8 @@ def solve(
     and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples, and the axis
     of pictures is the driver's value).
     parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
-    other geometry is reached by continuation from the pose of the geometry as written. outputs: names to solve for, all
+    other geometry is reached by continuation from the pose of the geometry as written; what cannot be reached is
+    assembled anew, with an event of level "info". outputs: names to solve for, all
     if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
     and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there.
     tolerance: residual relative to the size above which a sample is not ok; positive. wrap: angles given as inputs are
@@ -74,7 +76,8 @@ def solve(
         refuse_other(mechanism, "solve")
         plan = compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
-    plan, bound, solver = _with_geometry(plan, geometry, tolerance)
+    own = {name: value for name, value in (parameters or {}).items() if name not in geometry}
+    plan, bound, solver, anew_note = _set(plan, geometry, own, tolerance, by_law=not inputs)
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
@@ -89,7 +92,10 @@ def solve(
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
     if driven is None:
         driven = chosen.drive(times, tuple(constants.values()))
-    return replace(_swept(plan, chosen, times, driven, out, constants), axis=axis)
+    run = replace(_swept(plan, chosen, times, driven, out, constants), axis=axis)
+    if anew_note and len(times):
+        run = replace(run, events=(Event(float(times[0]), "info", anew_note), *run.events))
+    return run
 
 
 def run_times(run: RunSettings) -> FloatArray:
@@ -121,24 +127,35 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
     return constants, geometry
 
 
-def _with_geometry(
-    plan: SolvePlan, geometry: Mapping[str, float | str], tolerance: float
-) -> tuple[SolvePlan, Vector, Solver | None]:
-    """The plan with other values of parameters written, the values to be bound (none: those of the plan), and a solver
-    if there is one already, followed from the plan's anchor.
+def _set(
+    plan: SolvePlan,
+    geometry: Mapping[str, float | str],
+    constants: Mapping[str, float | str],
+    tolerance: float,
+    *,
+    by_law: bool,
+) -> tuple[SolvePlan, Vector, Solver | None, str]:
+    """The plan with other values of parameters written, the values to be bound (none: those of the plan), a solver if
+    there is one already, followed from the plan's anchor, and a note if it could not be followed (else empty).
 
     What continuation does not reach is planned anew, as a file with these values would be: that assembles, or says
     which joint stays open by how much.
     """
-    if not geometry:
-        return plan, (), None
-    mechanism = plan.mechanism.with_parameters(geometry)
-    if all(plan.mechanism.parameters[name].expression is None for name in geometry):
-        values = tuple(float(mechanism.parameters[parameter.name].value) for parameter in plan.parameters)
-        solver = with_parameters(load_module(plan), values, tolerance)
-        if not isinstance(solver, Stuck):
-            return replace(plan, mechanism=mechanism), values, solver
-    return compile_plan(mechanism, plan.outputs), (), None
+    written = plan.mechanism
+    settings = {**geometry, **constants}
+    changed = written.with_parameters(settings)
+    if not geometry and (not by_law or law_starts(changed) == law_starts(written)):
+        return plan, (), None, ""
+    if any(written.parameters[name].expression is not None for name in geometry):
+        followed = continued(written, settings)
+        return compile_plan(followed.mechanism, plan.outputs), (), None, followed.message
+    values = bound_values(plan, changed)
+    solver = with_parameters(load_module(plan), values, tolerance)
+    if by_law or isinstance(solver, Stuck):
+        start = at_law_start(solver, changed)
+        if not start.good:
+            return compile_plan(changed, plan.outputs), (), None, anew(start.message)
+    return replace(plan, mechanism=written.with_parameters(geometry)), values, solver, ""
 
 
 def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, tolerance: float, count: int) -> Engine:

@@ -72,7 +72,7 @@ def build(
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
-    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism
+    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
     with about(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(

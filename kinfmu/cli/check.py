@@ -42,7 +42,7 @@ def check(
     """
     from kinfmu.analysis import check as checked
 
-    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism
+    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism()
     with about(mechanism):
         report = checked(mech)
     if as_json:

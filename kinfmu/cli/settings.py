@@ -28,14 +28,25 @@ _ELSEWHERE = {
 class Settings:
     """Settings by name, each where it belongs.
 
-    mechanism: with its parameters and the constants of its laws in place; parameters, constants: the same as they were
-    set; of_run: what belongs to a run.
+    written: the mechanism as the file has it; parameters, constants: as they were set; of_run: what belongs to a run.
     """
 
-    mechanism: Mechanism
+    written: Mechanism
     parameters: Mapping[str, float | str]
     constants: Mapping[str, float | str]
     of_run: Mapping[str, float | str | bool]
+
+    def mechanism(self) -> Mechanism:
+        """Return the mechanism with its settings, in the pose to which the written one is followed.
+
+        A note on stderr says if that is not possible and it is assembled anew.
+        """
+        from kinfmu.continued import continued
+
+        followed = continued(self.written, {**self.parameters, **self.constants})
+        if followed.message:
+            note(followed.message)
+        return followed.mechanism
 
 
 def settled(
@@ -66,11 +77,11 @@ def settled(
                 raise click.UsageError(f"{where}: it must be a positive number")
     values = {parameter: _value(text) for parameter, text in settings if parameter not in of_run}
     try:
-        changed = mechanism.with_parameters(values)
+        mechanism.with_parameters(values)
     except MechanismError as error:
         raise click.UsageError(f"--set: {error}") from None
     return Settings(
-        changed,
+        mechanism,
         {parameter: value for parameter, value in values.items() if parameter in mechanism.parameters},
         {parameter: value for parameter, value in values.items() if parameter in constants},
         as_values([(parameter, text) for parameter, text in settings if parameter in of_run]),

@@ -125,9 +125,9 @@ def _fmu(
     mech = gallery.load(model)
     given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
     with about(model):
-        mech = mech.with_parameters(given.parameters)
+        mech = given.mechanism()
         fmu = build(mech, folder, drive="inputs" if has_inputs else default_drive(mech))
-    return fmu, {**given.constants, **given.of_run}
+    return fmu, dict(given.of_run)
 
 
 def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:

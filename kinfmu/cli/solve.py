@@ -116,7 +116,7 @@ def solve(
 
 def _check_one_driver(name: str, given: Settings) -> None:
     """UsageError if --angle cannot drive the mechanism of that name alone, or --set changes the law it replaces."""
-    drivers = given.mechanism.drivers
+    drivers = given.written.drivers
     if len(drivers) != 1:
         names = listed(driver.name for driver in drivers)
         raise click.UsageError(f"--angle drives one driver, {name} has {names}; simulate --input drives them")
