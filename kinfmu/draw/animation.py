@@ -28,6 +28,7 @@ from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
 from kinfmu.shapes import palette
+from kinfmu.shapes.completing import remedy
 from kinfmu.shapes.instant import Instant
 from kinfmu.shapes.placing import poses_of, world
 from kinfmu.shapes.slides import rods, slides
@@ -88,8 +89,11 @@ def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
         raise FigureError(f"{path}: {error}") from None
     poses, missing = poses_of(run, mechanism)
     if missing:
-        names = listed(name for columns in missing.values() for name in columns)
-        raise FigureError(f"{path}: the run does not hold {names}, without which the linkage cannot be drawn")
+        names = [name for columns in missing.values() for name in columns]
+        raise FigureError(
+            f"{path}: the run does not hold {listed(names)}, without which the linkage cannot be drawn; "
+            f"{remedy(run, names)}"
+        )
     last = np.maximum.accumulate(np.where(run.good, np.arange(len(run)), 0))  # the last sample with numbers
     held = {body: pose[last] for body, pose in poses.items()}
     return mechanism, held | {GROUND_NAME: np.zeros((len(run), 3))}

@@ -16,6 +16,7 @@ from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes.completing import remedy
 from kinfmu.shapes.cylinders import CylinderShape, cylinder_shapes
 from kinfmu.shapes.instant import Instant
 from kinfmu.shapes.outline import outline, points_of
@@ -105,7 +106,8 @@ def drawable(run: Run) -> tuple[Scene | None, str]:
     except MechanismError as error:
         return None, f"Not drawn: {error}"
     parts = [f"{body} (the run does not hold {', '.join(names)})" for body, names in found.left_out.items()]
-    return found, f"Not drawn: {'; '.join(parts)}." if parts else ""
+    advice = remedy(run, [name for names in found.left_out.values() for name in names])
+    return found, f"Not drawn: {'; '.join(parts)}; {advice}." if parts else ""
 
 
 def scene(run: Run, mechanism: Mechanism) -> Scene:

@@ -6,12 +6,18 @@ import numpy as np
 
 from kinfmu.mechanism.mechanism import COORDINATES, Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.shapes.completing import solved_again
 
 
 def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
-    """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing."""
+    """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing.
+
+    Coordinates that are no outputs of the run are solved again, if its drivers' values tell them.
+    """
     columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
+    if not columns.keys() >= set(mechanism.coordinate_names):
+        columns |= solved_again(run, mechanism) or {}
     poses: dict[str, FloatArray] = {}
     left_out: dict[str, tuple[str, ...]] = {}
     for body in mechanism.moving_bodies:

@@ -9,6 +9,7 @@ import pytest
 
 import kinfmu
 from kinfmu.log.scene import Scene, drawable
+from kinfmu.mechanism.toml_text import text
 from kinfmu.run import Run
 from kinfmu.shapes.placing import world
 from kinfmu.sweep import run_times
@@ -64,11 +65,56 @@ def test_poses_in_a_gap_are_unknown_even_where_coordinates_are_constant(run_with
 
 
 def test_a_body_whose_coordinates_are_not_in_the_run_is_left_out_by_name(run: Run) -> None:
-    less = dataclasses.replace(run, outputs=("crank.phi", "x", "y", "coupler.phi", "rocker.phi", "A.x", "A.y"))
-    found, note = drawable(less)
+    found, note = drawable(run.without(["coupler.x", "coupler.y"]))
     assert found
     assert [body.name for body in found.bodies] == ["crank", "rocker"]
-    assert note == "Not drawn: coupler (the run does not hold coupler.x, coupler.y)."
+    assert note == (
+        "Not drawn: coupler (the run does not hold coupler.x, coupler.y); "
+        "keep them: --channels all, or q among its names."
+    )
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "parallel_jaw", "five_bar", "cam_roller", "excavator"])
+def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    whole = solved(name)
+    few = whole.names[-1:]
+    for less in (
+        kinfmu.solve(dataclasses.replace(mechanism, coordinates=few), whole.t),
+        kinfmu.solve(mechanism, whole.t, outputs=few),
+    ):
+        assert set(less.outputs) < set(whole.outputs)
+        (found, note), (expected, _) = drawable(less), drawable(whole)
+        assert found
+        assert expected
+        assert note == ""
+        for body, other in zip(found.bodies, expected.bodies, strict=True):
+            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+
+
+def test_a_run_of_few_outputs_with_other_parameters_is_drawn_with_these() -> None:
+    mechanism = kinfmu.load("jansen_leg")
+    name, value = next((n, 1.02 * float(p.value)) for n, p in mechanism.parameters.items() if p.expression is None)
+    whole = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value})
+    few = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value}, outputs=whole.names[-1:])
+    of_fmu = dataclasses.replace(
+        few, mechanism_text=text(mechanism), info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
+    )
+    expected, _ = drawable(whole)
+    for run in (few, of_fmu):
+        found, note = drawable(run)
+        assert found
+        assert expected
+        assert note == ""
+        for body, other in zip(found.bodies, expected.bodies, strict=True):
+            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+
+
+def test_what_would_be_drawn_otherwise_than_the_run_says_is_left_out_with_the_remedy() -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), [0.0, 0.1], outputs=["rocker.phi"])
+    other = dataclasses.replace(run, values=run.values + 0.1)
+    _, note = drawable(other)
+    assert note.endswith("; name them in [outputs] coordinates, or leave that out.")
 
 
 def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
