@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kinfmu import VERSION
+from kinfmu.cli.tell import printable
 from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
 
 ORDER = ("list", "new", "check", "solve", "build", "simulate", "review", "export", "recover", "schema", "bench")
@@ -65,7 +66,7 @@ def main() -> None:
 
 def one_line(error: KinfmuError) -> str:
     """The message on a single line."""
-    return " ".join(str(error).splitlines())
+    return printable(str(error))
 
 
 @contextmanager

@@ -24,6 +24,7 @@ def recover(run: Path, output: Path | None) -> None:
     RUN is a record (.mcap) that was cut off or damaged, and stays as it is.
     """
     from kinfmu.axis import axis_of
+    from kinfmu.cli.tell import printable
     from kinfmu.cli.verdict import verdict
     from kinfmu.log import recover as recovered
 
@@ -31,5 +32,5 @@ def recover(run: Path, output: Path | None) -> None:
     found = recovered(run, target)
     for event in found.events[-1:]:
         if event.level == "warning":
-            click.echo(f"at {axis_of(found).place(event.t)}: {event.text}")
+            click.echo(printable(f"at {axis_of(found).place(event.t)}: {event.text}"))
     click.echo(f"{verdict(found)}; written to {target}")

@@ -20,7 +20,7 @@ MOST_IN_CHUNK = 2**27  # [bytes] unpacked; twice what a chunk of ours holds
 ALWAYS = 2**20  # [bytes] that every chunk may unpack to, whatever its index says
 MOST_UNPACKED = 2**27  # [bytes] in all chunks of a channel, or LARGEST_RATIO times the file
 LARGEST_RATIO = 2000  # of unpacked to packed; an index of 16 bytes a message leaves less
-MOST_RECORDS = 2**22  # in chunks that mix messages of several channels or lengths
+MOST_RECORDS = 4  # for each packed byte of a chunk; messages differ in their numbers, so each takes a byte or more
 _HEAD = struct.Struct("<BQ")  # of a record: its kind and its length
 _ENTRY = 16  # [bytes] of a message in the index of its chunk
 
@@ -78,7 +78,6 @@ class Scan:
         Raises a LogError where a chunk is damaged, and where one or all of them unpack to more than they can hold.
         """
         left = max(MOST_UNPACKED, LARGEST_RATIO * self._size)
-        budget = [MOST_RECORDS]
         with self._path.open("rb") as file:
             for chunk in self._chunks:
                 if not chunk.messages or channel in chunk.messages:
@@ -86,7 +85,7 @@ class Scan:
                     most = min(left, chunk.most(channel, length))
                     raw = _unpacked(file.read(chunk.length), chunk.place, most)
                     left -= len(raw)
-                    yield from _messages(raw, channel, chunk.place, budget)
+                    yield from _messages(raw, channel, chunk.place, MOST_RECORDS * chunk.length)
 
     def _read(self, file: BinaryIO, size: int) -> str:
         if file.read(len(MAGIC)) != MAGIC:
@@ -209,11 +208,8 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
     raise ValueError(f"compression {quoted(compression)} is not known")
 
 
-def _messages(raw: Bytes, channel: int, place: int, budget: list[int]) -> Iterator[Block]:
-    """Messages of a channel among the records of a chunk, which begins at this byte of the file.
-
-    budget: records of mixed chunks that may still be looked at; it goes down.
-    """
+def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Block]:
+    """Messages of a channel in a chunk, which begins at this byte of the file; most: records that it may hold."""
     length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
     if length and len(raw) % length == 0:
         table = raw.reshape(-1, length)
@@ -222,12 +218,12 @@ def _messages(raw: Bytes, channel: int, place: int, budget: list[int]) -> Iterat
             if heads["channel"][0] == channel:
                 yield _block(table)
             return
-    at, view = 0, raw.data
+    at, count, view = 0, 0, raw.data
     while at + 9 <= len(raw):
         kind, length = _HEAD.unpack_from(view, at)
-        budget[0] -= 1
-        if at + 9 + length > len(raw) or (kind == Opcode.MESSAGE and 9 + length < MESSAGE.itemsize) or budget[0] < 0:
-            told = "too many records" if budget[0] < 0 else "a record goes beyond its end"
+        count += 1
+        if at + 9 + length > len(raw) or (kind == Opcode.MESSAGE and 9 + length < MESSAGE.itemsize) or count > most:
+            told = "too many records" if count > most else "a record goes beyond its end"
             raise LogError(f"the chunk at byte {place} is damaged: {told}")
         if kind == Opcode.MESSAGE:
             record = raw[at : at + 9 + length].reshape(1, -1)

@@ -8,13 +8,15 @@ import os
 import resource
 import sys
 import tempfile
+import traceback
+import warnings
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from tests.fuzz.summary import Finding, Summary, seeds
 
-MEMORY = 3 * 2**30  # [bytes] of address space for a process of trials
+MEMORY = 2 * 2**30  # [bytes] that a process of trials may write to
 PATIENCE = 20.0  # [s] for one trial
 STARTING = 60.0  # [s] for a process to import what it needs
 
@@ -83,9 +85,12 @@ class _Worker:
 
 def _work(part: str, folder: Path, memory: int, pipe: Connection) -> None:
     trial: Trial = importlib.import_module(f"tests.fuzz.{part}").trial
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.chdir(folder)
+    tempfile.tempdir = str(folder)
+    os.environ["KINFMU_CACHE"] = str(folder / "cache")
+    warnings.simplefilter("error")
     watch = Watch(folder)
     sys.addaudithook(watch.hook)
     pipe.send("ready")
@@ -99,11 +104,19 @@ def _work(part: str, folder: Path, memory: int, pipe: Connection) -> None:
         except MemoryError:
             summary.find(seed, "memory", f"needs more than {memory / 2**30:g} GB")
         except Exception as error:
-            summary.find(seed, "traceback", f"{type(error).__name__}: {error}"[:500])
+            summary.find(seed, "traceback", failure(error))
         watch.is_on = False
         for text in watch.seen:
             summary.find(seed, "side effect", text)
         pipe.send((summary.tried, [tuple(one) for one in summary.findings]))
+
+
+def failure(error: BaseException) -> str:
+    """An error with its place in kinfmu."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = next((frame for frame in reversed(frames) if "kinfmu/" in frame.filename), frames[-1])
+    where = ours.filename.rpartition("kinfmu/")[2]
+    return f"{type(error).__name__} at {where}:{ours.lineno}: {error}"[:500]
 
 
 class Watch:
@@ -112,7 +125,8 @@ class Watch:
     def __init__(self, folder: Path) -> None:
         self.seen: list[str] = []
         self.is_on = False
-        self._inside = (os.path.realpath(folder) + os.sep, "/dev/null")
+        caches = (Path.home() / ".cache" / "matplotlib", Path.home() / ".config" / "matplotlib")
+        self._inside = (os.path.realpath(folder) + os.sep, "/dev/null", *(f"{place}{os.sep}" for place in caches))
 
     def hook(self, event: str, arguments: tuple[object, ...]) -> None:
         """Take an audit event."""
