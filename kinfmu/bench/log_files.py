@@ -1,4 +1,4 @@
-"""Logs of a long run of the four-bar: how fast they are written and read, and how large they are.
+"""Logs of a long run of the four-bar: how fast they are written and read, how large they are, what a logged step costs.
 
 Beside them the writer of the package mcap, which takes one message after another, and gets the same ones ready made.
 """
@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinfmu.bench.logged_step import STEPS
+from kinfmu.bench.logged_step import table as logged_steps
 from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import MissingPackageError
 from kinfmu.gallery import load
@@ -42,8 +44,11 @@ class Way(NamedTuple):
     file: Path
 
 
-def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
-    """A table: rows a second by the clock; processor time a row and how often it goes into the package mcap's; size."""
+def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str:
+    """A table: rows a second by the clock; processor time a row and how often it goes into the package mcap's; size.
+
+    Below it the processor time of a step of the FMU, alone and with its record.
+    """
     long_run = fourbar(samples)
     processor: dict[str, list[float]] = {}
     with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
@@ -67,7 +72,7 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES) -> str:
     recorded, best = found[-1].rows, min(clock[-1])
     lines.append(f"a Rerun recording of {recorded} samples, its record read, takes {best:.2f} s at best")
     lines.append(f"a row may take {allowed:.0f} B: {PER_DOUBLE:g} for each of {doubles} columns, and {PER_ROW:g}")
-    return "\n".join([*lines, *([absent] if absent else [])])
+    return "\n".join([*lines, *([absent] if absent else []), "", *logged_steps(rounds, steps)])
 
 
 def _timed(take: Callable[[], object], seconds: list[float]) -> Callable[[], object]:

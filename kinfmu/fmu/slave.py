@@ -24,6 +24,7 @@ from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
+_COUNTS = {"solver.status": "status", "solver.iterations": "iterations"}  # and what a pose calls them
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
@@ -85,6 +86,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real
         self._last_fetch = self._plan_fetch(())
+        self._motion_drive: tuple[Row, Row, Row] = ((), (), ())  # u, ud, udd of `_motion`
+        self._last_counted: list[int] = []  # of the last get_integer, and what it reads of a pose
+        self._counted: list[str] = []
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._unbound = False  # parameters were set and not yet bound
 
@@ -177,7 +181,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """u, ud, udd of what is shown."""
         drive = shown.drive
         if drive is None:
-            drive = shown.drive = self._committed_drive() if shown.stale else self._driven()
+            if self._motion is not None and not shown.stale:  # read before, as a rule
+                drive = self._motion_drive
+            else:
+                drive = self._committed_drive() if shown.stale else self._driven()
+            shown.drive = drive
         return drive
 
     # Parts of the list of variables, each computed when first read
@@ -210,8 +218,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if row is None:
             pose, shown = self._pose or self._asked(), self._shown
             if shown is None and pose.status <= LAST_GOOD:  # read first and alone, as a rule
-                _, ud, udd = self._driven()
-                row = self._solver.motion(pose, ud, udd)
+                drive = self._motion_drive = self._driven()
+                row = self._solver.motion(pose, drive[1], drive[2])
             else:
                 shown = self._look()
                 if shown.values is None and shown.rates is None:
@@ -250,7 +258,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return self._solver.watch(self._look().pose)
 
     def _read_driven(self) -> Row:
-        return tuple(value for driver in zip(*self._driven(), strict=True) for value in driver)
+        shown = self._look()
+        drive = self._driven() if shown.stale else self._drive(shown)
+        if len(drive[0]) == 1:
+            return drive[0] + drive[1] + drive[2]
+        return tuple(value for driver in zip(*drive, strict=True) for value in driver)
 
     def _read_constants(self) -> Row:
         return self._constants
@@ -295,21 +307,18 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return [NOT_A_NUMBER] * len(vrs)
 
     def get_integer(self, vrs: Sequence[int]) -> list[int]:
-        values = []
-        for vr in vrs:
-            name = self._references.name(vr)
-            try:
-                if name == "solver.status":
-                    values.append(int(self._asked().status))
-                elif name == "solver.iterations":
-                    values.append(int(self._asked().iterations))
-                else:
+        try:
+            if vrs != self._last_counted:
+                self._counted = [_COUNTS.get(self._references.name(vr), "") for vr in vrs]
+                self._last_counted = list(vrs)
+            if "" in self._counted:
+                for vr in (vr for vr, name in zip(vrs, self._counted, strict=True) if not name):
                     self.log(f"value reference {vr} is not an Integer variable of this FMU", Fmi2Status.error)
-                    values.append(0)
-            except Exception as error:  # an exception here would be Fatal for the host
-                self._report_defect(error)
-                values.append(0)
-        return values
+            pose = self._pose or self._asked()
+            return [int(getattr(pose, name)) if name else 0 for name in self._counted]
+        except Exception as error:  # an exception here would be Fatal for the host
+            self._report_defect(error)
+            return [0] * len(vrs)
 
     def get_boolean(self, vrs: Sequence[int]) -> list[bool]:
         values = []

@@ -12,7 +12,7 @@ import pytest
 
 from kinfmu import gallery
 from kinfmu.backends.c import compiler
-from kinfmu.bench import accuracy, case, chains, log_files, native_sweep, singular
+from kinfmu.bench import accuracy, case, chains, log_files, logged_step, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
@@ -252,12 +252,36 @@ def test_the_engine_that_is_shipped_comes_first(command: Command, tmp_path: Path
 
 
 def test_logs_are_measured_beside_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = log_files.run(rounds=1, samples=5000)
+    table = log_files.run(rounds=1, samples=5000, steps=500)
     assert re.search(r"^the record by the package mcap .* us/row +1\.0 +\d+\.\d B/row$", table, re.MULTILINE)
     sizes = [float(size) for size in re.findall(r"^MCAP: .* ([\d.]+) B/row$", table, re.MULTILINE)]
     assert len(sizes) == 2
     assert sizes[0] < float(re.findall(r"may take (\d+) B", table)[0])
     monkeypatch.setattr(log_files, "find_spec", lambda _: None)
-    table = log_files.run(rounds=1, samples=100)
-    assert table.endswith("mcap is not installed: pip install 'kinfmu[bench]'")
+    monkeypatch.setattr(logged_step, "FLAVOURS", ("python",))
+    table = log_files.run(rounds=1, samples=100, steps=50)
+    assert "\nmcap is not installed: pip install 'kinfmu[bench]'\n" in table
     assert "package mcap " not in table
+
+
+def test_a_step_is_measured_alone_and_with_its_record_in_both_flavours(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = logged_step.table(rounds=1, steps=2000)
+    assert lines[0].endswith("step alone              logged step")
+    costs = {}
+    for line in lines[1:]:
+        found = re.fullmatch(r"(python|native) +([\d.]+) us +best [\d.]+ +([\d.]+) us +best [\d.]+", line)
+        assert found, line
+        costs[found[1]] = float(found[2]), float(found[3])
+    assert list(costs) == ["python", "native"]
+    for alone, logged in costs.values():
+        assert 0.0 < alone < logged
+    assert costs["native"][1] < costs["python"][1]
+
+    def no_compiler(*arguments: object, flavour: str, **more: object) -> Path:
+        if flavour == "native":
+            raise CompilerError("no C compiler found")
+        return build(*arguments, flavour=flavour, **more)  # type: ignore[arg-type]
+
+    build = logged_step.build
+    monkeypatch.setattr(logged_step, "build", no_compiler)
+    assert logged_step.table(rounds=1, steps=50)[-1] == "native: no C compiler found"
