@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -114,7 +114,8 @@ class Interface:
 def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False) -> Interface:
     """The variables of the FMU of a plan; `drive` chooses the default of `driven_by_time`.
 
-    has_time: time is a variable, too, the last one, as FMI 3.0 wants it; what the drivers move depends on it.
+    has_time: time is a variable, too, the last one, as FMI 3.0 wants it; what the drivers move depends on it, and, as
+    FMI 3.0 counts them among what is known after initialization, on tunable parameters.
     """
     from kinfmu.fmu.linear import linear_inputs  # with scipy, which stepping an FMU does not need
 
@@ -141,7 +142,9 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
         Part("message", (_MESSAGE,)),
     )
     if has_time:
-        parts = (*(Part(part.name, tuple(map(_in_time, part.variables))) for part in parts), Part("time", (_TIME,)))
+        tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}
+        dependent = (Part(part.name, tuple(_in_fmi3(one, tunable) for one in part.variables)) for part in parts)
+        parts = (*dependent, Part("time", (_TIME,)))
     return Interface(
         mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), parts
     )
@@ -172,13 +175,19 @@ _MESSAGE = Variable(
 )
 
 
-def _in_time(variable: Variable) -> Variable:
-    """The same variable, depending on time if it does on drivers."""
+def _in_fmi3(variable: Variable, tunable: Collection[str]) -> Variable:
+    """Return the variable with what FMI 3.0 counts as known: time and tunable parameters, if it depends on drivers.
+
+    Parameters that are fixed are no dependencies of outputs: they cannot change any more.
+    """
+    if not variable.dependencies:
+        return variable
+    initial = variable.initial_dependencies or ()
+    now = tuple(name for name in initial if name in tunable)
     return replace(
         variable,
-        dependencies=variable.dependencies and (*variable.dependencies, _TIME.name),
-        initial_dependencies=variable.initial_dependencies
-        and (*variable.initial_dependencies, *((_TIME.name,) if variable.dependencies else ())),
+        dependencies=(*variable.dependencies, *now, _TIME.name),
+        initial_dependencies=(*initial, _TIME.name),
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any, ClassVar
@@ -26,6 +27,7 @@ LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.goo
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
 _COUNTS = {"solver.status": "status", "solver.iterations": "iterations"}  # and what a pose calls them
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
+LATE = 1e-3  # of a step: a sum of a million steps may end this late
 ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
 
@@ -96,6 +98,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._running = False  # from the end of initialization to terminate
         self._start_time = self.layout.start_time
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
+        self._stop_time = sys.float_info.max  # of the experiment, if the host gave one
         self._touched = False  # something was set since the last commit
         self._wired: set[int] = set()  # places among the inputs of rates seen other than 0
         self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
@@ -436,11 +439,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     # Run
 
-    def setup_experiment(self, start_time: float, *_: Any) -> None:
+    def setup_experiment(self, start_time: float, stop_time: float | None = None, *_: Any) -> None:
         if not math.isfinite(start_time):
             self._refuse("start time", f"= {start_time!r} s is not a finite number; {self._start_time!r} s stays")
             return
         self._time = self._start_time = start_time
+        self._stop_time = sys.float_info.max if stop_time is None else stop_time
         self._refused.pop("start time", None)
         self._forget()
 
@@ -449,6 +453,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             self._initialized = self._running = True
             if self._unbound:
                 self._bind()
+            pose = self._asked()
+            if not pose.good and not isinstance(self._solver, Stuck):
+                self.log(f"initialization fails: at t = {self._time:g} s: {pose.message}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
 
@@ -466,10 +473,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
             end = current_time + step_size
-            if not (self._running and end - end == 0.0 and step_size >= 0.0 and current_time >= self._start_time):
+            if not (self._running and step_size >= 0.0 and self._start_time <= current_time <= end <= self._stop_time):
                 reason = self._no_step(current_time, step_size)
                 if reason:
-                    self.log(reason, Fmi2Status.discard)
+                    self.log(reason, Fmi2Status.error)
                     return False
             if self._driven_by_time or self._refused:
                 return self._step(current_time, step_size)
@@ -507,6 +514,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return f"doStep from t = {current_time:g} s by {step_size:g} s: a step needs finite numbers, not below 0"
         if current_time < self._start_time - SAME_TIME * step_size:
             return f"doStep from t = {current_time!r} s: that is before the start at {self._start_time!r} s"
+        if current_time + step_size - self._stop_time > LATE * step_size + ROUNDING * abs(self._stop_time):
+            return (
+                f"doStep from t = {current_time:.12g} s by {step_size:.12g} s: past the stop time of the experiment, "
+                f"{self._stop_time:.12g} s"
+            )
         return ""
 
     def _step(self, current_time: float, step_size: float) -> bool:
@@ -575,6 +587,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "running": self._running,
             "start_time": self._start_time,
             "time": self._time,
+            "stop_time": self._stop_time,
             "touched": self._touched,
             "wired": sorted(self._wired),
             "refused": dict(self._refused),
@@ -604,6 +617,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._running = state["running"]
         self._start_time = state["start_time"]
         self._time = state["time"]
+        self._stop_time = state["stop_time"]
         self._touched = state["touched"]
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])

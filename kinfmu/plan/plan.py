@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from kinfmu.drivers import Driver
 from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import InconsistentError, MobilityError, RequestError, listed, suggestion
+from kinfmu.joints.arithmetic import Value
 from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
@@ -57,7 +59,8 @@ class SolvePlan:
     outputs: the generalized coordinates q, then the points of interest; fixed_nodes: coordinates that never move, as
     constants or formulas of parameters; blocks in the order of solving; watches: rows set aside as redundant, relative
     to the size; conditions: what parameters set at run time must leave true; laws: u, ud, udd of each driver over the
-    symbol `time`; anchor: an assembled, regular pose.
+    symbol `time`; jumps: times at which one of them jumps, each with the period after which it does again, 0 if once;
+    anchor: an assembled, regular pose.
     """
 
     mechanism: Mechanism
@@ -67,6 +70,7 @@ class SolvePlan:
     law_constants: tuple[LawConstant, ...]
     parameters: tuple[PlanParameter, ...]
     laws: tuple[Motion, ...]
+    jumps: tuple[tuple[Node, Node], ...]
     blocks: tuple[Block, ...]
     outputs_motion: tuple[Motion, ...]
     coordinate_count: int
@@ -240,6 +244,7 @@ def plan_from(
         law_constants=mechanism.law_constants,
         parameters=parameters,
         laws=_laws(mechanism, tracer),
+        jumps=_jumps(mechanism, tracer),
         blocks=tuple(blocks),
         outputs_motion=tuple(motions),
         coordinate_count=coordinate_count,
@@ -367,17 +372,34 @@ def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
     )
 
 
+def _law_constants(mechanism: Mechanism, tracer: Tracer) -> Iterator[tuple[Driver, dict[str, Value]]]:
+    """Each driver with the constants of its law: symbols, but formulas of parameters where they are written so."""
+    for driver, traced in zip(mechanism.drivers, tracer.drivers, strict=True):
+        yield (
+            driver,
+            {
+                key: value
+                if ("drivers", driver.name, "law", key) in mechanism.expressions
+                else tracer.graph.symbol(f"{driver.name}.{key}")
+                for key, (value, _) in traced.law.constants().items()
+            },
+        )
+
+
+def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...]:
+    """Times at which what drives jumps, each with its period."""
+    found = []
+    for driver, constants in _law_constants(mechanism, tracer):
+        jumps = driver.law.jumps(**constants)
+        found += [(tracer.graph.lift(at), tracer.graph.lift(jumps.period)) for at in jumps.at]
+    return tuple(found)
+
+
 def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
     graph = tracer.graph
     time, one = graph.symbol("time"), graph.constant(1.0)
     laws = []
-    for driver, traced in zip(mechanism.drivers, tracer.drivers, strict=True):
-        constants = {
-            key: value
-            if ("drivers", driver.name, "law", key) in mechanism.expressions
-            else graph.symbol(f"{driver.name}.{key}")
-            for key, (value, _) in traced.law.constants().items()
-        }
+    for driver, constants in _law_constants(mechanism, tracer):
         target = graph.lift(driver.law.target(time, **constants))
         (rate,) = graph.derivative([target], {time: one})
         (acceleration,) = graph.derivative([rate], {time: one})

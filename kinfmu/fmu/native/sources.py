@@ -12,6 +12,7 @@ from kinfmu.backends.c.text import array, booleans, string
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.native.events import events
 from kinfmu.plan import SolvePlan
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -43,8 +44,8 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     """Texts of all C files and headers of the FMU by name, but for those of FMI itself."""
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
-    tables = {"interface.h": _header(variables, version, token), "interface.c": _tables(variables)}
-    tables["step.c"] = _step(version)
+    tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
+    tables |= {"step.c": _step(version), "events.c": events(plan)}
     return dict(sorted((emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables).items()))
 
 
@@ -68,7 +69,7 @@ def headers(version: str) -> dict[str, str]:
         ) from None
 
 
-def _header(variables: Interface, version: str, token: str) -> str:
+def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> str:
     """interface.h: how many variables there are of what, and where."""
     references = variables.value_references()
     names = [part.name for part in variables.parts if part.name not in NOT_REAL]
@@ -97,6 +98,7 @@ def _header(variables: Interface, version: str, token: str) -> str:
         f"#define KF_MESSAGE_TEXT {references['solver.message']}",
         f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
         f"#define KF_UNKNOWN_ERROR {UNKNOWN_ERROR!r} /* of solver.error_q, _qd, _qdd: there is no estimate */",
+        f"#define KF_JUMPS {len(plan.jumps)} /* of what drives over time */",
         f'#define KF_REAL_WORD "{words[0]}"',
         f'#define KF_STATUS_WORD "{words[1]}"',
         f'#define KF_ITERATIONS_WORD "{words[2]}"',

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, get_type_hints
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.laws.jumps import Jumps
 from kinfmu.units import Quantity
 
 
@@ -62,6 +63,10 @@ class Law(ABC):
     @abstractmethod
     def target(self, x: Value, **constants: Value) -> Value:
         """f(x), in plain arithmetic, with the constants given by name."""
+
+    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
+        """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
+        return Jumps()
 
     def numbers(self) -> dict[Path, Constant]:
         """Every number of the law, by its path in the law's table; here the fields that are numbers."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.arithmetic import Value, curve
+from kinfmu.joints.laws.jumps import Jumps, jumping_breaks
 from kinfmu.joints.laws.law import Argument, Duration, Law, Led
 from kinfmu.solver.curve import CurveData, Piece
 
@@ -31,6 +32,10 @@ class Rise(Law):
     def target(self, x: Value, **constants: Value) -> Value:
         part = (x - constants["begin"]) / constants["duration"]
         return constants["start"] + constants["rise"] * curve(part, self.shape)
+
+    def jumps(self, **constants: Value) -> Jumps:
+        begin, duration = constants["begin"], constants["duration"]
+        return Jumps(tuple(begin + duration * x for x in jumping_breaks(self.shape)))
 
 
 def polynomial(origin: float, *coefficients: float) -> Piece:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints.arithmetic import Value, curve, floor, sqrt
 from kinfmu.joints.laws.cycloidal import Cycloidal
+from kinfmu.joints.laws.jumps import Jumps, jumping_breaks
 from kinfmu.joints.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
 from kinfmu.joints.laws.modified_sine import ModifiedSine
 from kinfmu.joints.laws.modified_trapezoid import ModifiedTrapezoid
@@ -94,6 +95,16 @@ class MotionSequence(Law):
                 value = value + rises[k] * curve((since - begin) / durations[k], _SHAPES[segment.law])
             begin = begin + durations[k]
         return value
+
+    def jumps(self, **constants: Value) -> Jumps:
+        found: list[Value] = []
+        begin = constants["begin"]
+        for k, segment in enumerate(self.segments, start=1):
+            duration = constants[f"duration_{k}"]
+            if segment.law != DWELL:
+                found += [begin + duration * x for x in jumping_breaks(_SHAPES[segment.law])]
+            begin = begin + duration
+        return Jumps(tuple(found), begin - constants["begin"] if self.repeat else 0.0)
 
     def check(self, where: str) -> None:
         super().check(where)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints.arithmetic import Value, curve, floor
+from kinfmu.joints.laws.jumps import Jumps, jumping_breaks
 from kinfmu.joints.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
 from kinfmu.joints.placement import Reference
 from kinfmu.solver.curve import CurveData, Piece
@@ -66,6 +67,10 @@ class Spline(Law):
             first, last = self.points[0][0], self.points[-1][0]
             x = x - (last - first) * floor((x - first) / (last - first))
         return curve(x, self.data)
+
+    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
+        width = self.points[-1][0] - self.points[0][0]
+        return Jumps(jumping_breaks(self.data), width if self.ends == PERIODIC else 0.0)
 
     def check(self, where: str) -> None:
         if self.ends not in ENDS:

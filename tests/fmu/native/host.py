@@ -50,16 +50,16 @@ class Host:
                 logMessage=lambda _host, status, _category, text: self.messages.append((status, text.decode())),
             )
 
-    def enter(self, t: float) -> None:
+    def enter(self, t: float, stop: float | None = None) -> None:
         """Into initialization mode."""
         if self.fmi == 2:
-            self.fmu.setupExperiment(startTime=t)
+            self.fmu.setupExperiment(startTime=t, stopTime=stop)
             self.fmu.enterInitializationMode()
         else:
-            self.fmu.enterInitializationMode(startTime=t)
+            self.fmu.enterInitializationMode(startTime=t, stopTime=stop)
 
-    def initialize(self, t: float) -> None:
-        self.enter(t)
+    def initialize(self, t: float, stop: float | None = None) -> None:
+        self.enter(t, stop)
         self.fmu.exitInitializationMode()
 
     def of(self, *names: str) -> list[int]:

@@ -85,19 +85,33 @@ def test_value_references_and_names_are_unique_and_names_legal(data: bytes, root
     assert b"generationDateAndTime" not in data
 
 
-def test_outputs_and_initial_unknowns_are_complete_with_as_many_kinds_as_dependencies(data: bytes) -> None:
+def test_outputs_and_initial_unknowns_are_complete_with_as_many_kinds_as_dependencies(data: bytes, fmi: int) -> None:
     about = description.read(data, "it").interface
     for variable in about:
         known = {v.name for v in about if v.causality in ("input", "parameter", "independent")}
         if variable.causality == "output":
             assert variable.dependencies is not None
-            assert {about_causality(about, name) for name in variable.dependencies} <= {"input", "independent"}
+            assert {about_causality(about, name) for name in variable.dependencies} <= (
+                {"input"} if fmi == 2 else {"input", "independent", "parameter"}
+            )
         assert set(variable.initial_dependencies or ()) <= known
     found = re.findall(r'<(\w+)[^<>]* dependencies="([^"]*)" dependenciesKind="([^"]*)"', data.decode())
     assert found
     for element, listed, kinds in found:  # FMI wants no other kinds of initial unknowns; in 2.0 both are an Unknown
         assert len(listed.split()) == len(kinds.split())
         assert set(kinds.split()) <= ({"dependent"} if element == "InitialUnknown" else {"dependent", "fixed"})
+
+
+def test_outputs_of_fmi_3_depend_on_tunable_parameters_and_on_none_that_is_fixed(data: bytes, fmi: int) -> None:
+    about = description.read(data, "it").interface
+    parameters = {v.name: v.variability for v in about if v.causality == "parameter"}
+    listed = {v.name: {name for name in v.dependencies or () if name in parameters} for v in about}
+    law = {name for name in parameters if name.startswith("crank.")}
+    turned = "upper" if about.name == "double_pendulum" else "crank"
+    for name in (f"{turned}.phi", f"{turned}.omega", f"{turned}.alpha", "solver.residual"):
+        assert listed[name] == (law if fmi == 3 else set())
+    assert listed["solver.status"] == (law | {"solver.tolerance"} if fmi == 3 else set())
+    assert {parameters[name] for names in listed.values() for name in names} == ({"tunable"} if fmi == 3 else set())
 
 
 def test_kind_is_fixed_where_an_output_is_linear_in_an_input(data: bytes) -> None:

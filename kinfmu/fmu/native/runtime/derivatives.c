@@ -292,15 +292,15 @@ static bool is_unknown(unsigned reference)
     return place < KF_REALS && !(KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS);
 }
 
-/* What may move: inputs and time, before the end of initialization parameters too. */
+/* What may move: inputs, time and tunable parameters; before the end of initialization the fixed ones too. */
 static bool is_known(const kf_state *s, unsigned reference)
 {
     const unsigned place = KF_PLACE(reference);
     if (place >= KF_REALS) {
         return reference == KF_TIME;
     }
-    return kf_part_of[place] == KF_PART_INPUTS ||
-           (s->mode <= KF_INITIALIZATION && (KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS) != 0);
+    return (KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS) != 0 &&
+           (kf_part_of[place] != KF_PART_PARAMETERS || s->mode <= KF_INITIALIZATION);
 }
 
 kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,

@@ -95,14 +95,12 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 {
     (void)toleranceDefined; /* Newton goes to round-off whatever tolerance is asked for */
     (void)tolerance;
-    (void)stopTimeDefined;
-    (void)stopTime;
-    return c ? (fmi2Status)kf_set_start_time(common(c), startTime) : fmi2Error;
+    return c ? (fmi2Status)kf_set_experiment(common(c), startTime, stopTimeDefined != fmi2False, stopTime) : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return c ? (fmi2Status)kf_enter_initialization(common(c), common(c)->now.time) : fmi2Error;
+    return c ? (fmi2Status)kf_enter_initialization(common(c)) : fmi2Error;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
@@ -246,7 +244,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return (fmi2Status)answer;
 }
 
-/* Model exchange: there are no continuous states and no events. */
+/* Model exchange: there are no continuous states; events are jumps of what drives over time, and changes of status. */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
@@ -259,6 +257,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
         return fmi2Error;
     }
     memset(eventInfo, 0, sizeof *eventInfo);
+    eventInfo->nextEventTimeDefined = kf_next_event(common(c), &eventInfo->nextEventTime) ? fmi2True : fmi2False;
     return fmi2OK;
 }
 
@@ -270,14 +269,16 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
 {
+    bool wants_event = false;
+    const kf_answer answer = c ? kf_complete_integrator_step(common(c), &wants_event) : KF_ERROR;
     (void)noSetFMUStatePriorToCurrentPoint;
     if (enterEventMode) {
-        *enterEventMode = fmi2False;
+        *enterEventMode = wants_event ? fmi2True : fmi2False;
     }
     if (terminateSimulation) {
         *terminateSimulation = fmi2False;
     }
-    return c ? (fmi2Status)kf_complete_integrator_step(common(c)) : fmi2Error;
+    return (fmi2Status)answer;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)

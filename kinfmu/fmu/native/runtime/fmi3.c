@@ -123,9 +123,13 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
     (void)toleranceDefined; /* Newton goes to round-off whatever tolerance is asked for */
     (void)tolerance;
-    (void)stopTimeDefined;
-    (void)stopTime;
-    return instance ? (fmi3Status)kf_enter_initialization(common(instance), startTime) : fmi3Error;
+    if (instance == NULL) {
+        return fmi3Error;
+    }
+    if (kf_set_experiment(common(instance), startTime, stopTimeDefined, stopTime) != KF_DONE) {
+        return fmi3Error;
+    }
+    return (fmi3Status)kf_enter_initialization(common(instance));
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
@@ -492,7 +496,7 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
-/* Events and continuous states: there are none. */
+/* Events are jumps of what drives over time, and changes of status; there are no continuous states. */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
@@ -511,13 +515,16 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
                                     fmi3Float64 *nextEventTime)
 {
+    double time = 0.0;
+    bool has_event;
     put(discreteStatesNeedUpdate, fmi3False);
     put(terminateSimulation, fmi3False);
     put(nominalsOfContinuousStatesChanged, fmi3False);
     put(valuesOfContinuousStatesChanged, fmi3False);
-    put(nextEventTimeDefined, fmi3False);
+    has_event = instance && kf_next_event(common(instance), &time);
+    put(nextEventTimeDefined, has_event);
     if (nextEventTime) {
-        *nextEventTime = 0.0;
+        *nextEventTime = has_event ? time : 0.0;
     }
     return instance ? fmi3OK : fmi3Error;
 }
@@ -530,10 +537,12 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
 {
+    bool wants_event = false;
+    const kf_answer answer = instance ? kf_complete_integrator_step(common(instance), &wants_event) : KF_ERROR;
     (void)noSetFMUStatePriorToCurrentPoint;
-    put(enterEventMode, fmi3False);
+    put(enterEventMode, wants_event);
     put(terminateSimulation, fmi3False);
-    return instance ? (fmi3Status)kf_complete_integrator_step(common(instance)) : fmi3Error;
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)

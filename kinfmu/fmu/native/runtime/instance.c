@@ -6,6 +6,8 @@
 #include <string.h>
 
 #define SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
+#define JUST_AFTER 4e-15 /* of the numbers that a jump is worked out from */
+#define LATE 1e-3      /* of a step: a sum of a million steps may end this late */
 
 bool kf_token_fits(const char *token)
 {
@@ -23,6 +25,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     memcpy(s->real, kf_real_starts, sizeof s->real);
     s->driven_by_time = kf_driven_by_time_start;
     s->time = s->last_time = kf_start_time;
+    s->stop_time = INFINITY;
     s->mode = KF_INSTANTIATED;
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
@@ -255,6 +258,18 @@ static kf_answer warn_of_inputs(kf_instance *instance)
                        kf_name_of(s->stray));
 }
 
+/* A step past the stop time of the experiment, other than by rounding. */
+static bool is_past_stop(const kf_state *s, double time, double step)
+{
+    return time + step - s->stop_time > LATE * step + 4.0 * DBL_EPSILON * fabs(s->stop_time);
+}
+
+static KF_RARE kf_answer past_stop(const kf_instance *instance, const char *function, double time, double step)
+{
+    return kf_answered(instance, KF_ERROR, "%s from t = %.12g s by %.12g s: past the stop time of the experiment, %.12g s",
+                       function, time, step, instance->now.stop_time);
+}
+
 /* Why a step is none. */
 static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, double step)
 {
@@ -263,8 +278,10 @@ static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, d
         return kf_answered(instance, KF_ERROR, "doStep before the end of initialization, or after terminate");
     }
     if (isfinite(time + step) && step >= 0.0) {
-        return kf_answered(instance, KF_ERROR, "doStep from t = %.17g s: that is before the start at %.17g s", time,
-                           s->start_time);
+        return is_past_stop(s, time, step) ? past_stop(instance, "doStep", time, step)
+                                           : kf_answered(instance, KF_ERROR,
+                                                         "doStep from t = %.17g s: that is before the start at %.17g s", time,
+                                                         s->start_time);
     }
     return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time, step);
 }
@@ -274,7 +291,8 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
     kf_state *const s = &instance->now;
     const double end = time + step;
     kf_answer answer, done;
-    if (!(s->mode == KF_STEPPING && end - end == 0.0 && step >= 0.0 && time >= s->start_time - SAME_TIME * step)) {
+    if (!(s->mode == KF_STEPPING && end - end == 0.0 && step >= 0.0 && time >= s->start_time - SAME_TIME * step) ||
+        is_past_stop(s, time, step)) {
         return refuse_step(instance, time, step);
     }
     answer = warn_of_inputs(instance);
@@ -289,18 +307,40 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
 
 /* Modes */
 
-kf_answer kf_enter_initialization(kf_instance *instance, double start_time)
+static bool is_fresh(const kf_instance *instance)
+{
+    return instance->now.mode == KF_INSTANTIATED;
+}
+
+static KF_RARE kf_answer not_fresh(const kf_instance *instance)
+{
+    return kf_answered(instance, KF_ERROR, "the instance is initialized already; reset it first");
+}
+
+kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_stop_time, double stop_time)
 {
     kf_state *const s = &instance->now;
-    if (s->mode != KF_INSTANTIATED) {
-        return kf_answered(instance, KF_ERROR, "enterInitializationMode: the instance is initialized already; reset it first");
+    if (!is_fresh(instance)) {
+        return not_fresh(instance);
     }
     if (!isfinite(start_time)) {
         return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", start_time);
     }
-    s->mode = KF_INITIALIZATION;
+    if (has_stop_time && !(stop_time >= start_time)) {
+        return kf_answered(instance, KF_ERROR, "the stop time %g s is not after the start time %g s", stop_time, start_time);
+    }
     s->time = s->last_time = s->start_time = start_time;
+    s->stop_time = has_stop_time ? stop_time : INFINITY;
     kf_forget(s);
+    return KF_DONE;
+}
+
+kf_answer kf_enter_initialization(kf_instance *instance)
+{
+    if (!is_fresh(instance)) {
+        return not_fresh(instance);
+    }
+    instance->now.mode = KF_INITIALIZATION;
     return KF_DONE;
 }
 
@@ -316,8 +356,25 @@ kf_answer kf_exit_initialization(kf_instance *instance)
     if (s->stuck) {
         return kf_answered(instance, KF_ERROR, "initialization fails: %s", s->solver.message);
     }
+    if (!KF_GOOD(kf_ask(instance))) {
+        return kf_answered(instance, KF_ERROR, "initialization fails: at t = %g s: %s", s->time, s->message);
+    }
     s->mode = s->model_exchange ? KF_EVENTS : KF_STEPPING;
     return KF_DONE;
+}
+
+/* Between events the discrete variables keep the values that they had at the last one. */
+static void hold_discrete(kf_instance *instance)
+{
+    kf_state *const s = &instance->now;
+    s->held_status = kf_ask(instance);
+    s->held_iterations = kf_shown(s)->found.iterations;
+    memcpy(s->held_message, s->message, sizeof s->held_message);
+}
+
+bool kf_holds(const kf_state *s)
+{
+    return s->mode == KF_CONTINUOUS;
 }
 
 kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function)
@@ -326,6 +383,9 @@ kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function)
     const bool running = s->mode == KF_EVENTS || s->mode == KF_CONTINUOUS;
     if (mode == KF_TERMINATED ? !(running || s->mode == KF_STEPPING) : !running) {
         return kf_answered(instance, KF_ERROR, "%s: not possible now", function);
+    }
+    if (mode == KF_CONTINUOUS) {
+        hold_discrete(instance);
     }
     s->mode = mode;
     return KF_DONE;
@@ -339,18 +399,6 @@ static void move_to(kf_state *s, double time)
             kf_forget(s);
         }
     }
-}
-
-kf_answer kf_set_start_time(kf_instance *instance, double time)
-{
-    if (instance->now.mode != KF_INSTANTIATED) {
-        return kf_answered(instance, KF_ERROR, "setupExperiment: the instance is initialized already; reset it first");
-    }
-    if (!isfinite(time)) {
-        return kf_answered(instance, KF_ERROR, "the start time %g s is not a finite number", time);
-    }
-    move_to(&instance->now, time);
-    return KF_DONE;
 }
 
 kf_answer kf_set_time(kf_instance *instance, double time)
@@ -368,15 +416,53 @@ kf_answer kf_set_time(kf_instance *instance, double time)
     return KF_DONE;
 }
 
-kf_answer kf_complete_integrator_step(kf_instance *instance)
+/* wants_event: solver.status is another one than at the last event. */
+kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
 {
     kf_state *const s = &instance->now;
+    const double last = s->samples ? s->history[s->samples - 1].t : s->time;
+    *wants_event = false;
     if (s->mode != KF_CONTINUOUS && s->mode != KF_EVENTS) {
         return kf_answered(instance, KF_ERROR, "completedIntegratorStep: the instance is not in continuous-time mode");
     }
     if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: it is too late for a smaller one */
         return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
     }
+    if (is_past_stop(s, last, s->time - last)) {
+        return past_stop(instance, "completedIntegratorStep", last, s->time - last);
+    }
+    *wants_event = kf_holds(s) && s->status != s->held_status;
     commit(s, s->time, 0.0);
     return warn_of_inputs(instance);
+}
+
+/* A time at which the law is beyond its jump, whatever it rounds. */
+static double just_after(double jump, double period, double times)
+{
+    const double at = jump + times * period;
+    return at + JUST_AFTER * (fabs(jump) + fabs(at) + period);
+}
+
+/* The next time at which what drives jumps: its value, speed or acceleration. */
+bool kf_next_event(const kf_instance *instance, double *time)
+{
+    const kf_state *const s = &instance->now;
+    double jumps[KF_ROOM(KF_JUMPS)], periods[KF_ROOM(KF_JUMPS)], next = INFINITY;
+    int k;
+    if (!s->driven_by_time) {
+        return false;
+    }
+    kf_jumps(&s->solver.model, KF_REAL(s, KF_PART_CONSTANTS), jumps, periods);
+    for (k = 0; k < KF_JUMPS; ++k) {
+        const double past = periods[k] > 0.0 ? floor((s->time - jumps[k]) / periods[k]) : 0.0;
+        double event = just_after(jumps[k], periods[k], past);
+        if (!(event > s->time) && periods[k] > 0.0) {
+            event = just_after(jumps[k], periods[k], past + 1.0);
+        }
+        if (event > s->time) {
+            next = fmin(next, event);
+        }
+    }
+    *time = next;
+    return next < INFINITY;
 }

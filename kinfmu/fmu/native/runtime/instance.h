@@ -69,7 +69,10 @@ typedef struct {
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
     bool failed, terminated;
     double failed_time, failed_step, last_time;
-    double start_time;
+    double start_time, stop_time; /* of the experiment; the stop time is infinite if none was given */
+    kf_status held_status; /* discrete variables of model exchange, which stay between events */
+    int held_iterations;
+    char held_message[KF_MESSAGE];
     kf_solver solver; /* the last: what it needs for a call only is not copied */
 } kf_state;
 
@@ -106,12 +109,13 @@ kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const cha
 /* Life. kf_start: as freshly instantiated. */
 bool kf_token_fits(const char *token);
 void kf_start(kf_instance *instance, bool model_exchange);
-kf_answer kf_enter_initialization(kf_instance *instance, double start_time);
+kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_stop_time, double stop_time);
+kf_answer kf_enter_initialization(kf_instance *instance);
 kf_answer kf_exit_initialization(kf_instance *instance);
 kf_answer kf_step(kf_instance *instance, double time, double step);
-kf_answer kf_set_start_time(kf_instance *instance, double time);
 kf_answer kf_set_time(kf_instance *instance, double time);
-kf_answer kf_complete_integrator_step(kf_instance *instance);
+kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event);
+bool kf_next_event(const kf_instance *instance, double *time);
 kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
 
 /* Variables, by value references: the place in the list, counted from 1 as FMI 2.0 counts the places of variables. So the
@@ -152,10 +156,13 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
 
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */
+bool kf_holds(const kf_state *state);    /* discrete variables keep their values */
 kf_status kf_ask_anew(kf_instance *instance);
 kf_pose *kf_shown(kf_state *state);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
+/* Times at which what drives jumps, and the periods after which it does again, 0 if it does not: events.c. */
+void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods);
 void kf_end_of_step(kf_state *state, double step);
 void kf_drop_input_derivatives(kf_state *state);
 void kf_find_rate_sources(kf_state *state);

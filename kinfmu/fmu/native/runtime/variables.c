@@ -165,11 +165,12 @@ kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t 
 
 kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value)
 {
+    kf_state *const s = &instance->now;
     if (reference == KF_STATUS && strcmp(type, KF_STATUS_WORD) == 0) {
-        *value = kf_ask(instance);
+        *value = kf_holds(s) ? s->held_status : kf_ask(instance);
     } else if (reference == KF_ITERATIONS && strcmp(type, KF_ITERATIONS_WORD) == 0) {
         kf_ask(instance);
-        *value = kf_shown(&instance->now)->found.iterations;
+        *value = kf_holds(s) ? s->held_iterations : kf_shown(s)->found.iterations;
     } else {
         return kf_not_a(instance, reference, type);
     }
@@ -192,7 +193,7 @@ kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **
         return kf_not_a(instance, reference, "String");
     }
     kf_ask(instance);
-    *value = instance->now.message;
+    *value = kf_holds(&instance->now) ? instance->now.held_message : instance->now.message;
     return KF_DONE;
 }
 
