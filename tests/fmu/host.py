@@ -36,8 +36,8 @@ class Host:
         )
         self.slave.instantiate(callbacks=fmi2_callbacks(lambda *message: self.messages.append(message)), loggingOn=True)
 
-    def initialize(self, t: float) -> None:
-        self.slave.setupExperiment(startTime=t)
+    def initialize(self, t: float, stop: float | None = None) -> None:
+        self.slave.setupExperiment(startTime=t, stopTime=stop)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
 

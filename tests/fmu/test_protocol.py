@@ -294,3 +294,46 @@ def test_many_slaves_one_after_another_live_in_one_process(start: Start) -> None
         host = start()
         host.set({"crank_angle": 0.1 * k})
         assert host.get("crank.phi") == [0.1 * k]
+
+
+@pytest.mark.parametrize("drive", ["time", "inputs"])
+def test_a_step_past_the_stop_time_is_discarded_with_an_error_and_one_that_rounds_past_it_is_done(
+    start: Start, drive: str
+) -> None:
+    host = start("fourbar", drive, initialize=False)
+    host.initialize(0.5, 1.5)
+    t = 0.5
+    for _ in range(10):
+        assert host.step(t, 0.1)
+        t += 0.1
+    for time, step in ((t, 0.1), (1.45, 0.1), (1.5, 1e-6), (0.5, 1.1)):
+        assert not host.step(time, step)  # pythonfmu's binary has no other answer than Discard
+        said = f"doStep from t = {time:.12g} s by {step:.12g} s: past the stop time of the experiment, 1.5 s"
+        assert host.messages[-1] == (3, said)
+    assert host.step(1.5, 0.0)
+    assert host.step(1.4, math.nextafter(0.1, 1.0))
+    host.slave.reset()
+    host.initialize(0.0)
+    assert host.step(0.0, 1e6)
+
+
+def test_an_initial_pose_out_of_reach_is_an_error_message_at_the_end_of_initialization(start: Start) -> None:
+    host = start("double_pendulum", "time", initialize=False)
+    host.initialize(2.5)
+    assert host.messages[-1][0] == 3
+    assert host.messages[-1][1].startswith("initialization fails: at t = 2.5 s: crank = ")
+    assert not host.step(2.5, 0.1)
+
+
+def test_fixed_parameters_and_outputs_are_refused_after_initialization_too(start: Start) -> None:
+    host = start("fourbar", "inputs")
+    before = host.outputs()
+    for values in ({"coupler.x": 7.0}, {"solver.residual": 1.0}, {"driven_by_time": True}, {"crank.x": 3.0}):
+        host.set(values)
+        (name,) = values
+        assert host.outputs() == before  # the binary hands messages over at the call that follows
+        assert host.messages[-1][0] == 3
+        assert host.messages[-1][1].startswith(name)
+        assert not host.step(0.0, 0.1)
+        assert host.messages[-1][1].startswith(f"at t = 0 s: {name}")
+    assert host.step(0.0, 0.1)

@@ -279,7 +279,61 @@ def test_steps_out_of_turn_or_of_no_length_are_errors(start: Start) -> None:
     assert host.step(0.0, 0.1) == OK
 
 
+@pytest.mark.parametrize("drive", ["time", "inputs"])
+def test_a_step_past_the_stop_time_is_an_error_and_one_that_rounds_past_it_is_none(start: Start, drive: str) -> None:
+    host = start("fourbar", drive, initialize=False)
+    host.initialize(0.5, 1.5)
+    t = 0.5
+    for _ in range(10):
+        assert host.step(t, 0.1) == OK
+        t += 0.1  # as many hosts do: 1.4999999999999998 and 1.6 times as much
+    before = host.outputs()
+    for time, step in ((t, 0.1), (1.45, 0.1), (1.5, 1e-6), (0.5, 1.1), (1.6, 0.0)):
+        assert host.step(time, step) == ERROR
+        assert host.messages[-1][1] == (
+            f"doStep from t = {time:.12g} s by {step:.12g} s: past the stop time of the experiment, 1.5 s"
+        )
+    assert host.outputs() == before
+    assert host.step(1.5, 0.0) == host.step(1.4, 0.1) == host.step(1.4, math.nextafter(0.1, 1.0)) == OK
+    host.fmu.reset()
+    host.initialize(0.0)
+    assert host.step(0.0, 1e6) == OK
+
+
+def test_stop_times_before_the_start_are_errors(start: Start) -> None:
+    for stop in (0.5, math.nan, -math.inf):
+        host = start(initialize=False)
+        assert answer(host.enter, 1.0, stop) == ERROR
+        assert host.messages[-1][1] == f"the stop time {stop:g} s is not after the start time 1 s"
+
+
+def test_an_accepted_step_past_the_stop_time_of_model_exchange_is_an_error(start: Start) -> None:
+    host = start("fourbar", "time", model_exchange=True, initialize=False)
+    host.initialize(0.0, 1.0)
+    host.fmu.enterContinuousTimeMode()
+    for t in (0.5, 1.0, math.nextafter(1.0, 2.0)):
+        host.fmu.setTime(t)
+        assert answer(host.fmu.completedIntegratorStep) == OK
+    host.fmu.setTime(1.2)
+    assert host.get("crank.phi") == pytest.approx([math.radians(1.2)])  # solvers try beyond the end
+    assert answer(host.fmu.completedIntegratorStep) == ERROR
+    assert "past the stop time of the experiment, 1 s" in host.messages[-1][1]
+
+
 # Poses and parameters that cannot be had
+
+
+@pytest.mark.parametrize("model_exchange", [False, True])
+def test_an_initial_pose_out_of_reach_is_an_error_with_the_reason(start: Start, model_exchange: bool) -> None:
+    host = start("double_pendulum", "time", initialize=False, model_exchange=model_exchange)
+    host.enter(2.5)
+    assert answer(host.fmu.exitInitializationMode) == ERROR
+    assert host.messages[-1][1].startswith("initialization fails: at t = 2.5 s: crank = ")
+    driven = start("double_pendulum", "inputs", initialize=False, model_exchange=model_exchange)
+    driven.enter(0.0)
+    driven.set({"crank_angle": 6.5})
+    assert answer(driven.fmu.exitInitializationMode) == ERROR
+    assert "crank = 6.5 rad" in driven.messages[-1][1]
 
 
 @pytest.mark.parametrize("angle", [6.5, 2.0])
@@ -430,7 +484,8 @@ def test_model_exchange_follows_inputs_and_time_without_estimates(start: Start) 
         host.fmu.setTime(0.1 * k)
         host.set({"crank_angle": 0.2 * k})
         assert host.get(*COUPLER) == pytest.approx([1 + math.cos(0.2 * k), 0.0, 0.0], abs=1e-13)
-        assert host.fmu.completedIntegratorStep() in ((False, False), (0, 0))
+        _, terminate = host.fmu.completedIntegratorStep()
+        assert not terminate
     clock = start("fourbar", "time", model_exchange=True)
     clock.fmu.setTime(30.0)
     assert clock.get("crank.phi") == pytest.approx([math.radians(30.0)])
