@@ -96,6 +96,32 @@ def test_bytes_that_are_no_state_of_this_fmu_are_refused(start: Start) -> None:
     assert host.outputs() == before
 
 
+def test_outputs_depend_on_the_inputs_that_are_listed_and_on_no_others(start: Start) -> None:
+    """Speeds depend on the angle too where they are estimated, also those of the driven body itself."""
+    estimated, wired = start("crank_rocker"), start("crank_rocker")
+    inputs = dict(zip(UNIT_INPUTS, (estimated.get("crank_angle")[0], 1.7, -0.6), strict=True))
+    wired.set(inputs)
+    for k in range(4):
+        estimated.set({"crank_angle": inputs["crank_angle"] + 0.1 * k})
+        for host in (estimated, wired):
+            assert host.step(0.1 * k, 0.1) == OK
+    about = estimated.about.interface
+    outputs = [v for part in ("values", "rates", "accelerations") for v in about.part(part)]
+    names = [v.name for v in outputs]
+    found: dict[str, set[str]] = {name: set() for name in names}
+    for host in (estimated, wired):
+        for name in ("crank_angle",) if host is estimated else UNIT_INPUTS:
+            (value,) = host.get(name)
+            host.set({name: value})
+            before = host.get(*names)
+            host.set({name: value + 0.01})
+            for changed, old, new in zip(names, before, host.get(*names), strict=True):
+                found[changed] |= {name} if old != new else set()
+            host.set({name: value})
+    assert found == {v.name: {name for name in v.dependencies or () if name in UNIT_INPUTS} for v in outputs}
+    assert found["crank.omega"] == {"crank_angle", "crank_speed"}
+
+
 def test_reset_instance_is_as_fresh(start: Start) -> None:
     host, fresh = start(), start()
     _drive(host, range(1, 9))
