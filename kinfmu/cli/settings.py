@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 
 TOLERANCE = "solver.tolerance"
 DRIVEN_BY_TIME = "driven_by_time"
+RATES = "rates"
 _ELSEWHERE = {
     TOLERANCE: "it belongs to a run: solve and simulate take it",
     DRIVEN_BY_TIME: "it belongs to an FMU: simulate takes it, build --drive chooses its default",
+    RATES: "it belongs to an FMU: simulate takes it, as auto, estimated or wired",
 }
 
 

@@ -13,7 +13,7 @@ from kinfmu.cli.arguments import MODEL, TIME, set_option
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import about, instead, main, stopped
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import DRIVEN_BY_TIME, TOLERANCE, as_values, settled
+from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, settled
 from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError, RequestError
@@ -123,7 +123,7 @@ def _fmu(
     if suffix_of(model) == ".fmu":
         return Path(model), as_values(settings)
     mech = gallery.load(model)
-    given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME))
+    given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
     with about(model):
         mech = given.mechanism()
         fmu = build(mech, folder, drive="inputs" if has_inputs else default_drive(mech))

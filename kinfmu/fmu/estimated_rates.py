@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import IntEnum
 from math import inf
 
 KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
 EPS = 2.220446049250313e-16
 UNSURE = 2.0  # what one term more says may change by this much over the step
 Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
+
+
+class Rates(IntEnum):
+    """Values of the parameter `rates`: where co-simulation takes the drivers' speeds and accelerations from."""
+
+    AUTO = 0
+    ESTIMATED = 1
+    WIRED = 2
 
 
 def estimated_rates(
@@ -18,8 +27,9 @@ def estimated_rates(
 
         a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
 
-    Backward differences on a non-uniform grid: v is O(h^2), a is O(h). samples: committed ones, oldest first, of which
-    those before t count; one of them gives a slope, none gives 0.
+    Backward differences on a non-uniform grid: v is of order 2, a of order 1 in the steps between the samples. Of two
+    samples v is the slope, of order 1, and a is 0; of one both are 0. samples: committed ones, oldest first; those
+    before t count.
     """
     count = len(samples)
     if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:  # most calls: at the last of all samples

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from kinfmu.errors import FmuError
+from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
@@ -27,7 +28,7 @@ _COORDINATE_WORDS = {
     "y": ("y", "y velocity", "y acceleration"),
     "phi": ("Angle", "Angular velocity", "Angular acceleration"),
 }
-_WIRING = "in co-simulation estimated from the samples until it is first set to other than 0"
+_WIRING = "an input or estimated, as parameter rates says"
 _ORDER_WORDS = ("", "rate of ", "acceleration of ")
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
 
@@ -36,9 +37,10 @@ _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
 class Variable:
     """One variable of an FMU, in FMI's words.
 
-    derivative_of: the variable of which this is the time derivative. dependencies: the inputs that an output depends on
-    structurally, None where FMI lists none; linear_in: those of them whose factor depends on fixed parameters alone;
-    initial_dependencies: inputs and parameters that it depends on when the FMU is initialized.
+    derivative_of: the variable of which this is the time derivative. declared_type: name of the type of an Enumeration.
+    dependencies: the inputs that an output depends on structurally, None where FMI lists none; linear_in: those of them
+    whose factor depends on fixed parameters alone; initial_dependencies: inputs and parameters that it depends on when
+    the FMU is initialized.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     derivative_of: str | None = None
+    declared_type: str | None = None
     dependencies: tuple[str, ...] | None = None
     linear_in: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] | None = None
@@ -138,7 +141,9 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
         Part("tolerance", (_TOLERANCE,)),
         Part("fixed", tuple(_fixed(plan))),
         Part("counts", tuple(_counts(plan, every))),
+        Part("ok", (_ok(plan, every),)),
         Part("drive", (_driven_by_time(drive),)),
+        Part("rate_source", (_RATES,)),
         Part("message", (_MESSAGE,)),
     )
     if has_time:
@@ -161,6 +166,22 @@ _TOLERANCE = Variable(
     start=DEFAULT_TOLERANCE,
     minimum=SMALLEST_TOLERANCE,
     maximum=1.0,
+)
+
+STATUS_TYPE, RATES_TYPE = "Status", "Rates"  # names of the enumerations' types
+
+_RATES = Variable(
+    "rates",
+    "Enumeration",
+    "parameter",
+    "fixed",
+    "Speeds and accelerations of drivers: wired: the inputs, 0 too; estimated: from the driver's values, of order 2 "
+    "and 1; auto: estimated until the input is first other than 0. Model exchange: always wired",
+    initial="exact",
+    start=int(Rates.AUTO),
+    minimum=int(min(Rates)),
+    maximum=int(max(Rates)),
+    declared_type=RATES_TYPE,
 )
 
 _TIME = Variable("time", "Real", "independent", "continuous", "Time", unit="s")
@@ -270,7 +291,8 @@ def _initial_names(
     prefixes = tuple(f"{plan.drivers[k].name}." for k in drivers)
     constants = tuple(name for name, *_ in plan.law_constants if name.startswith(prefixes))
     extra = (_TOLERANCE.name,) if tolerance else ()
-    return (*_input_names(plan, drivers, order), *constants, *extra, "driven_by_time")
+    rates = (_RATES.name,) if order else ()
+    return (*_input_names(plan, drivers, order), *constants, *extra, "driven_by_time", *rates)
 
 
 def _solver_output(
@@ -280,7 +302,7 @@ def _solver_output(
     description: str,
     order: int = 0,
     *,
-    kind: Literal["Real", "Integer", "Enumeration"] = "Real",
+    kind: Literal["Real", "Integer", "Enumeration", "Boolean"] = "Real",
     minimum: float | None = None,
     maximum: float | None = None,
 ) -> Variable:
@@ -294,9 +316,10 @@ def _solver_output(
         unit="1" if kind == "Real" else None,
         minimum=minimum,
         maximum=maximum,
+        declared_type=STATUS_TYPE if kind == "Enumeration" else None,
         dependencies=_input_names(plan, every, order),
         initial_dependencies=(
-            *_initial_names(plan, every, order, tolerance=kind == "Enumeration"),
+            *_initial_names(plan, every, order, tolerance=kind in ("Enumeration", "Boolean")),
             *(parameter.name for parameter in plan.parameters),
         ),
     )
@@ -402,3 +425,9 @@ def _counts(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
         maximum=max(Status),
     )
     yield _solver_output(plan, every, "solver.iterations", "Newton iterations of this pose", kind="Integer", minimum=0)
+
+
+def _ok(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
+    """The twin of solver.status for hosts that do not read enumerations."""
+    text = "true: solver.status is 0 to 2, the outputs hold; false: it is 3 to 5, the outputs are of the last good pose"
+    return _solver_output(plan, every, "solver.ok", text, kind="Boolean")

@@ -26,7 +26,7 @@ class Layout(NamedTuple):
 class Places:
     """Where the variable of a value reference is found: value references count the variables of a layout from 1."""
 
-    _NOT_REAL = ("counts", "drive", "message")
+    _NOT_REAL = ("counts", "ok", "drive", "rate_source", "message")
 
     def __init__(self, layout: Layout) -> None:
         self._places = [(k, i) for k, part in enumerate(layout.parts) for i in range(len(part.variables))]

@@ -43,7 +43,7 @@ CAPABILITIES = {
 }
 RUN_TIME = ("slave.py", "layout.py", "fetch.py", "estimated_rates.py", "hold.py")  # of this room
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive")
+PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source")
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 

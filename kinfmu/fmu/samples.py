@@ -32,7 +32,7 @@ class Samples:
         about: Description,
         count: int,
         *,
-        settings: Mapping[str, float | bool],
+        settings: Mapping[str, float | bool | str],
         mechanism_text: str,
         model_description: str,
     ) -> None:
@@ -52,7 +52,7 @@ class Samples:
             "title": interface.title,
             "generation_tool": about.generation_tool,
             "token": about.token,
-            "parameters": ", ".join(f"{name} = {value!r}" for name, value in settings.items()),
+            "parameters": ", ".join(f"{name} = {value}" for name, value in settings.items()),
         }
         self._events: list[Event] = []
         self.now = 0.0

@@ -15,6 +15,7 @@ import numpy as np
 from kinfmu.channels import kept_samples
 from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.fmu import description
+from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.input_notes import input_notes, undriven
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface, Variable
@@ -110,7 +111,7 @@ def simulate(
             return samples.end()
 
 
-def _as_set(mechanism_text: str, settings: Mapping[str, float | bool], where: str) -> str:
+def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> str:
     """The mechanism as it moves: with the values that the FMU is given, where it can have them."""
     mechanism = toml_file.parse(mechanism_text, where)
     own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
@@ -143,10 +144,10 @@ def _times(span: RunSettings | InputTable, start: float | None, stop: float | No
 
 def _parameters(
     interface: Interface, parameters: Mapping[str, float | str | bool], *, has_inputs: bool, where: str
-) -> dict[str, float | bool]:
+) -> dict[str, float | bool | str]:
     """The parameters to set, checked: inputs that are given shall drive unless the caller says otherwise."""
     known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
-    chosen: dict[str, float | bool] = {}
+    chosen: dict[str, float | bool | str] = {}
     for name, value in parameters.items():
         if name not in known:
             raise RequestError(
@@ -156,16 +157,28 @@ def _parameters(
             if value not in (False, True):
                 raise RequestError(f"{where}: {name} = {value!r} must be true or false")
             chosen[name] = bool(value)
+        elif known[name].type == "Enumeration":
+            chosen[name] = _rates(value, where)
         else:
             quantity = quantity_in(known[name].unit or "1", interface.length_unit)
             try:
-                chosen[name] = measured(f"{where}: {name}", value, quantity, interface.length_unit)
+                number = measured(f"{where}: {name}", value, quantity, interface.length_unit)
             except MechanismError as error:
                 raise RequestError(str(error)) from None
-            _check_range(known[name], chosen[name], where)
+            _check_range(known[name], number, where)
+            chosen[name] = number
     if has_inputs:
         chosen.setdefault("driven_by_time", False)
     return chosen
+
+
+def _rates(value: float | str | bool, where: str) -> str:
+    """The parameter `rates`, by its name or its number, as a name."""
+    names = {mode.name.lower(): mode for mode in Rates}
+    for name, mode in names.items():
+        if str(value).lower() == name or (not isinstance(value, str) and value == mode):
+            return name
+    raise RequestError(f"{where}: rates = {value!r} must be {listed(names)}")
 
 
 def _check_range(variable: Variable, value: float, where: str) -> None:
@@ -177,13 +190,13 @@ def _check_range(variable: Variable, value: float, where: str) -> None:
         raise RequestError(f"{where}: {variable.name} = {value:g} must be {valid}")
 
 
-def _time_drives(interface: Interface, parameters: Mapping[str, float | bool]) -> bool:
+def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | str]) -> bool:
     (switch,) = interface.part("drive")
     return bool(parameters.get(switch.name, switch.start))
 
 
 def _initialize(
-    slave: Slave, parameters: Mapping[str, float | bool], t: NDArray[np.float64], complaint: Callable[[], str]
+    slave: Slave, parameters: Mapping[str, float | bool | str], t: NDArray[np.float64], complaint: Callable[[], str]
 ) -> None:
     """Set the parameters and initialize; FmuError if one is refused or if they cannot be had.
 
@@ -195,6 +208,8 @@ def _initialize(
         for name, value in parameters.items():
             if isinstance(value, bool):
                 slave.set_boolean(slave.references[name], value)
+            elif isinstance(value, str):
+                slave.set_enumeration(slave.references[name], Rates[value.upper()])
             else:
                 slave.set([slave.references[name]], [value])
         slave.initialize(float(t[0]))

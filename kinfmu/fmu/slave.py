@@ -18,14 +18,18 @@ from typing import Any, ClassVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from kinfmu.fmu.estimated_rates import KEPT, Sample, errors_of_estimated_rates, estimated_rates
+from kinfmu.fmu.estimated_rates import KEPT, Rates, Sample, errors_of_estimated_rates, estimated_rates
 from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
 from kinfmu.fmu.layout import UNKNOWN_ERROR, Layout, Places
 from kinfmu.solver import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
-_COUNTS = {"solver.status": "status", "solver.iterations": "iterations"}  # and what a pose calls them
+_COUNTS = {
+    "solver.status": "status",
+    "solver.iterations": "iterations",
+    "rates": "rates",
+}  # attributes of a pose, or rates
 SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
 LATE = 1e-3  # of a step: a sum of a million steps may end this late
 ROUNDING = 4.44e-16  # of a time: its last digits
@@ -84,6 +88,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._parameters: Row = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
         self._driven_by_time: bool = parts["drive"].starts[0]
+        self._rates: int = parts["rate_source"].starts[0]
         self._references = Places(self.layout)
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real
@@ -100,7 +105,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
         self._stop_time = sys.float_info.max  # of the experiment, if the host gave one
         self._touched = False  # something was set since the last commit
-        self._wired: set[int] = set()  # places among the inputs of rates seen other than 0
+        self._wired: set[int] = set()  # places among the inputs of the rates that are inputs, not estimates
         self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
         self._stray_reported = False  # the host was warned that inputs have no effect
 
@@ -318,7 +323,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 for vr in (vr for vr, name in zip(vrs, self._counted, strict=True) if not name):
                     self.log(f"value reference {vr} is not an Integer variable of this FMU", Fmi2Status.error)
             pose = self._pose or self._asked()
-            return [int(getattr(pose, name)) if name else 0 for name in self._counted]
+            return [
+                self._rates if name == "rates" else int(getattr(pose, name)) if name else 0 for name in self._counted
+            ]
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
             return [0] * len(vrs)
@@ -326,10 +333,18 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def get_boolean(self, vrs: Sequence[int]) -> list[bool]:
         values = []
         for vr in vrs:
-            known = self._references.name(vr) == "driven_by_time"
-            if not known:
-                self.log(f"value reference {vr} is not a Boolean variable of this FMU", Fmi2Status.error)
-            values.append(known and self._driven_by_time)
+            name = self._references.name(vr)
+            try:
+                if name == "solver.ok":
+                    values.append(bool(self._asked().status <= LAST_GOOD))
+                elif name == "driven_by_time":
+                    values.append(self._driven_by_time)
+                else:
+                    self.log(f"value reference {vr} is not a Boolean variable of this FMU", Fmi2Status.error)
+                    values.append(False)
+            except Exception as error:  # an exception here would be Fatal for the host
+                self._report_defect(error)
+                values.append(False)
         return values
 
     def get_string(self, vrs: Sequence[int]) -> list[str]:
@@ -365,7 +380,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._shown = self._motion = None
                 if k % 3 == 0:
                     self._pose = None
-                elif value != 0.0:
+                elif value != 0.0 and self._rates == Rates.AUTO:
                     self._wired.add(k)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
@@ -418,8 +433,29 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 self._forget()
 
     def set_integer(self, vrs: Sequence[int], values: Sequence[int]) -> None:
-        for vr, _ in zip(vrs, values, strict=True):
-            self._refuse(self._references.name(vr) or f"value reference {vr}", "is not an Integer that can be set")
+        for vr, value in zip(vrs, values, strict=True):
+            name = self._references.name(vr)
+            if name != "rates":
+                self._refuse(name or f"value reference {vr}", "is not an Integer variable that can be set")
+            elif value not in tuple(Rates):
+                modes = f"{Rates.AUTO} (auto), {Rates.ESTIMATED} (estimated) or {Rates.WIRED} (wired)"
+                self._refuse(name, f"= {value} must be {modes}; {self._rates} stays")
+            elif value == self._rates:
+                self._refused.pop(name, None)
+            elif self._initialized:
+                self._refuse(name, f"= {value} comes too late: it is fixed once the FMU is initialized")
+            else:
+                self._refused.pop(name, None)
+                self._choose_rates(value)
+
+    def _choose_rates(self, rates: int) -> None:
+        self._rates = rates
+        rate_inputs = [k for k in range(len(self._inputs)) if k % 3]
+        if rates == Rates.AUTO:
+            self._wired = {k for k in rate_inputs if self._inputs[k] != 0.0}
+        else:
+            self._wired = set(rate_inputs) if rates == Rates.WIRED else set()
+        self._forget()
 
     def set_string(self, vrs: Sequence[int], values: Sequence[str]) -> None:
         for vr, _ in zip(vrs, values, strict=True):
@@ -583,6 +619,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             "parameters": list(self._parameters),
             "tolerance": self._tolerance,
             "driven_by_time": self._driven_by_time,
+            "rates": self._rates,
             "initialized": self._initialized,
             "running": self._running,
             "start_time": self._start_time,
@@ -613,6 +650,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._constants = _numbers(state["constants"], self._constants)
         self._tolerance = float(state["tolerance"])
         self._driven_by_time = state["driven_by_time"]
+        self._rates = state["rates"]
         self._initialized = state["initialized"]
         self._running = state["running"]
         self._start_time = state["start_time"]

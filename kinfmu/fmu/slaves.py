@@ -53,6 +53,9 @@ class Slave(ABC):
         self.fmpy.setBoolean([reference], [value])
 
     @abstractmethod
+    def set_enumeration(self, reference: int, value: int) -> None: ...
+
+    @abstractmethod
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         """Return what reads Real variables into a row of the table (n, len(references))."""
 
@@ -132,6 +135,9 @@ class Slave2(Slave):
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         self.fmpy.setReal(references, values)
 
+    def set_enumeration(self, reference: int, value: int) -> None:
+        self.fmpy.setInteger([reference], [value])
+
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         return RowCall(self.fmpy, "fmi2GetReal", references, rows, has_value_count=False)
 
@@ -186,6 +192,9 @@ class Slave3(Slave):
 
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         self.fmpy.setFloat64(references, values)
+
+    def set_enumeration(self, reference: int, value: int) -> None:
+        self.fmpy.setInt64([reference], [value])
 
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         return RowCall(self.fmpy, "fmi3GetFloat64", references, rows, has_value_count=True)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 from xml.etree.ElementTree import Element, SubElement
 
-from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.fmu.estimated_rates import Rates
+from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.solver.status import Status
 from kinfmu.units import METRES, display_units
 
 TOOL = "kinfmu"  # name of the annotation that tells our FMUs from others
-STATUS_TYPE = "Status"
 LOG_CATEGORIES = {
     "logStatusWarning": "What the host may have meant otherwise",
     "logStatusDiscard": "Steps that cannot be done: driver, value and limit",
@@ -26,6 +26,15 @@ _STATUS_WORDS = {
     Status.OUTSIDE: "the drivers cannot take the mechanism there",
     Status.INCONSISTENT: "a constraint set aside as redundant does not hold",
     Status.NOT_CONVERGED: "no solution found",
+}
+_RATES_WORDS = {
+    Rates.AUTO: "estimated until the input is first other than 0, or a derivative of the driver's value is given",
+    Rates.ESTIMATED: "estimated from the driver's values; inputs of rates have no effect",
+    Rates.WIRED: "the inputs as they are, 0 too",
+}
+ENUMERATIONS: dict[str, Mapping[Any, str]] = {  # by the name of the type: its items and what they mean
+    STATUS_TYPE: _STATUS_WORDS,
+    RATES_TYPE: _RATES_WORDS,
 }
 UnknownKind = Literal["outputs", "initial"]
 Unknowns = dict[
@@ -78,11 +87,10 @@ def _base_unit(name: str) -> dict[str, str]:
     return attributes if factor == 1.0 else {**attributes, "factor": text(factor)}
 
 
-def statuses(enumeration: Element) -> None:
-    """The items of the type of solver.status."""
-    for status in Status:
-        item = {"name": status.name.lower(), "value": str(int(status)), "description": _STATUS_WORDS[status]}
-        SubElement(enumeration, "Item", item)
+def items(enumeration: Element, name: str) -> None:
+    """Write the items of the enumeration type of that name."""
+    for item, meaning in ENUMERATIONS[name].items():
+        SubElement(enumeration, "Item", name=item.name.lower(), value=str(int(item)), description=meaning)
 
 
 def log_categories(root: Element) -> None:
@@ -131,8 +139,8 @@ def shown(variable: Variable, kinds: Collection[str]) -> Variable:
 def typed(variable: Variable) -> dict[str, str]:
     """The attributes that depend on its type, but for what it is the derivative of."""
     told: dict[str, str] = {}
-    if variable.type == "Enumeration":
-        told["declaredType"] = STATUS_TYPE
+    if variable.declared_type:
+        told["declaredType"] = variable.declared_type
     if variable.unit:
         told["unit"] = variable.unit
     if variable.display_unit:

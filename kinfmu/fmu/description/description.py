@@ -129,5 +129,6 @@ def _variable(attributes: Mapping[str, str], **fields: Any) -> Variable:
         start=start == "true" if start in ("true", "false") else number(start),
         minimum=number(attributes.get("min")),
         maximum=number(attributes.get("max")),
+        declared_type=attributes.get("declaredType"),
         **fields,
     )

@@ -23,8 +23,9 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
             for name in sources:
                 SubElement(files, "File", name=name)
     common.units(root, interface)
-    simple = SubElement(SubElement(root, "TypeDefinitions"), "SimpleType", name=common.STATUS_TYPE)
-    common.statuses(SubElement(simple, "Enumeration"))
+    definitions = SubElement(root, "TypeDefinitions")
+    for name in common.ENUMERATIONS:
+        common.items(SubElement(SubElement(definitions, "SimpleType", name=name), "Enumeration"), name)
     common.log_categories(root)
     common.experiment(root, interface.experiment)
     common.annotation(SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=common.TOOL), interface)

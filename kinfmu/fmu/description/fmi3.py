@@ -27,7 +27,8 @@ def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str
         SubElement(root, kind, attributes)
     common.units(root, interface)
     definitions = SubElement(root, "TypeDefinitions")
-    common.statuses(SubElement(definitions, "EnumerationType", name=common.STATUS_TYPE))
+    for name in common.ENUMERATIONS:
+        common.items(SubElement(definitions, "EnumerationType", name=name), name)
     common.log_categories(root)
     common.experiment(root, interface.experiment)
     references = interface.value_references()

@@ -10,13 +10,14 @@ from pathlib import Path
 from kinfmu.backends.c import compiler, emit
 from kinfmu.backends.c.text import array, booleans, string
 from kinfmu.errors import MissingPackageError
+from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.events import events
 from kinfmu.plan import SolvePlan
 
 RUNTIME = Path(__file__).with_name("runtime")
-NOT_REAL = ("counts", "drive", "message", "time")  # parts that follow those of Real variables
+NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts that follow those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -94,13 +95,16 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "",
         f"#define KF_STATUS {references['solver.status']}",
         f"#define KF_ITERATIONS {references['solver.iterations']}",
+        f"#define KF_SOLVER_OK {references['solver.ok']}",
         f"#define KF_DRIVEN_BY_TIME {references['driven_by_time']}",
+        f"#define KF_RATES {references['rates']}",
+        *(f"#define KF_RATES_{mode.name} {int(mode)}" for mode in Rates),
         f"#define KF_MESSAGE_TEXT {references['solver.message']}",
         f"#define KF_TIME {references.get('time', '0xffffffffu /* FMI 2.0 has no such variable */')}",
         f"#define KF_UNKNOWN_ERROR {UNKNOWN_ERROR!r} /* of solver.error_q, _qd, _qdd: there is no estimate */",
         f"#define KF_JUMPS {len(plan.jumps)} /* of what drives over time */",
         f'#define KF_REAL_WORD "{words[0]}"',
-        f'#define KF_STATUS_WORD "{words[1]}"',
+        f'#define KF_ENUMERATION_WORD "{words[1]}"',
         f'#define KF_ITERATIONS_WORD "{words[2]}"',
         "",
         "extern const char *const kf_variable_names[KF_VARIABLES];",
@@ -111,6 +115,7 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         "extern const double kf_real_starts[KF_REALS];",
         "extern const bool kf_real_is_positive[KF_REALS];",
         "extern const bool kf_driven_by_time_start;",
+        "extern const int kf_rates_start;",
         "extern const double kf_start_time;",
         "",
         "#endif",
@@ -122,7 +127,7 @@ def _tables(variables: Interface) -> str:
     """interface.c: names, starts and limits of the variables."""
     parts = [part for part in variables.parts if part.name not in NOT_REAL]
     real = [variable for part in parts for variable in part.variables]
-    (drive,) = variables.part("drive")
+    (drive,), (rates,) = variables.part("drive"), variables.part("rate_source")
     place = _numbers(len(part.variables) for part in parts)
     positive = [v.causality == "parameter" and v.minimum is not None and v.minimum >= 0.0 for v in real]
     lines = [
@@ -135,6 +140,7 @@ def _tables(variables: Interface) -> str:
         *array("double kf_real_starts", [float(variable.start or 0.0) for variable in real]),
         *array("bool kf_real_is_positive", booleans(positive)),
         f"const bool kf_driven_by_time_start = {'true' if drive.start else 'false'};",
+        f"const int kf_rates_start = {int(rates.start or 0)};",
         f"const double kf_start_time = {float(variables.experiment.start)!r};",
     ]
     return "\n".join(lines) + "\n"

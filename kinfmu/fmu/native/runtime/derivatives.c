@@ -75,11 +75,12 @@ static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
 {
     kf_sample still[KF_SAMPLES];
     double dv[KF_DRIVERS], da[KF_DRIVERS], u[KF_DRIVERS], t;
+    const bool has_inputs = s->model_exchange || s->rates != KF_RATES_ESTIMATED; /* of rates, that count */
     int k;
     for (k = 0; k < KF_DRIVERS; ++k) {
         way->du[k] = seed[3 * k];
-        way->dv[k] = seed[3 * k + 1];
-        way->da[k] = seed[3 * k + 2];
+        way->dv[k] = has_inputs ? seed[3 * k + 1] : 0.0;
+        way->da[k] = has_inputs ? seed[3 * k + 2] : 0.0;
     }
     if (s->model_exchange || (s->ended && !s->touched)) { /* no estimates, or they come from samples alone */
         return;

@@ -97,19 +97,25 @@ double kf_moment(const kf_state *s, double *t, double *u)
     return 0.0;
 }
 
-/* Find where the speed (order 1) and the acceleration (order 2) of each driver come from: inputs count first, then the
- * derivatives that the host gave of inputs of lower order, then estimates. Model exchange does not estimate.
+/* Find where the speed (order 1) and the acceleration (order 2) of each driver come from, as the parameter `rates` says. By
+ * default inputs count first, then the derivatives that the host gave of inputs of lower order, then estimates. Model
+ * exchange does not estimate.
  */
 KF_RARE void kf_find_rate_sources(kf_state *s)
 {
+    const bool all = s->model_exchange || s->rates == KF_RATES_WIRED;
     int k, order;
+    memset(s->sources, all ? KF_RATE_INPUT : KF_RATE_ESTIMATED, sizeof s->sources);
+    if (all || s->rates == KF_RATES_ESTIMATED) {
+        return;
+    }
     for (k = 0; k < KF_DRIVERS; ++k) {
         for (order = 1; order <= 2; ++order) {
             kf_rate_source source = s->orders[3 * k] >= order ? KF_RATE_OF_VALUE : KF_RATE_ESTIMATED;
             if (order == 2 && s->wired[3 * k + 1] && s->orders[3 * k + 1]) {
                 source = KF_RATE_OF_SPEED;
             }
-            s->sources[3 * k + order] = s->model_exchange || s->wired[3 * k + order] ? KF_RATE_INPUT : source;
+            s->sources[3 * k + order] = (unsigned char)(s->wired[3 * k + order] ? KF_RATE_INPUT : source);
         }
     }
 }

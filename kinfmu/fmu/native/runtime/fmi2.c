@@ -170,8 +170,12 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
-    const kf_answer answer = kf_check(common(c), vr, value, nvr);
-    return (fmi2Status)(answer == KF_DONE && nvr ? kf_not_settable(common(c), vr[0], "Integer") : answer);
+    kf_answer answer = kf_check(common(c), vr, value, nvr);
+    size_t k;
+    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
+        answer = kf_set_count(common(c), vr[k], "Integer", value[k]);
+    }
+    return (fmi2Status)answer;
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])

@@ -185,7 +185,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return (fmi3Status)(answer == KF_DONE ? kf_set_real(common(instance), valueReferences, nValueReferences, values) : answer);
 }
 
-/* solver.status is an enumeration, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */
+/* solver.status and rates are enumerations, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */
 #define GET_COUNT(word)                                                                                                \
     fmi3Status fmi3Get##word(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,  \
                              fmi3##word values[], size_t nValues)                                                       \
@@ -236,6 +236,17 @@ fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueRe
     return (fmi3Status)answer;
 }
 
+fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        const fmi3Int64 values[], size_t nValues)
+{
+    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
+    size_t k;
+    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
+        answer = kf_set_count(common(instance), valueReferences[k], "Int64", values[k]);
+    }
+    return (fmi3Status)answer;
+}
+
 /* Types that no variable has, or none that can be set. */
 static fmi3Status none_to_get(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
 {
@@ -281,7 +292,6 @@ NONE_TO_SET(Int16)
 NONE_TO_SET(UInt16)
 NONE_TO_SET(Int32)
 NONE_TO_SET(UInt32)
-NONE_TO_SET(Int64)
 NONE_TO_SET(UInt64)
 NONE_TO_SET(String)
 

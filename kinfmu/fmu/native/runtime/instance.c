@@ -24,6 +24,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     s->model_exchange = model_exchange;
     memcpy(s->real, kf_real_starts, sizeof s->real);
     s->driven_by_time = kf_driven_by_time_start;
+    s->rates = kf_rates_start;
     s->time = s->last_time = kf_start_time;
     s->stop_time = INFINITY;
     s->mode = KF_INSTANTIATED;

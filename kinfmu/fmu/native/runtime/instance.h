@@ -50,6 +50,7 @@ typedef struct {
     double real[KF_REALS];
     kf_mode mode;
     bool model_exchange, driven_by_time;
+    int rates; /* the parameter: KF_RATES_AUTO, _ESTIMATED or _WIRED */
     bool unbound; /* parameters were set and not yet bound */
     bool stuck;   /* they cannot be had */
     double time;  /* the communication point, or the point that a failed step asked for */
@@ -125,6 +126,7 @@ kf_answer kf_enter(kf_instance *instance, kf_mode mode, const char *function);
 kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values);
 kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values);
 kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value);
+kf_answer kf_set_count(kf_instance *instance, unsigned reference, const char *type, long long value);
 kf_answer kf_get_boolean(kf_instance *instance, unsigned reference, bool *value);
 kf_answer kf_set_boolean(kf_instance *instance, unsigned reference, bool value);
 kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **value);

@@ -166,8 +166,10 @@ kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t 
 kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *type, long long *value)
 {
     kf_state *const s = &instance->now;
-    if (reference == KF_STATUS && strcmp(type, KF_STATUS_WORD) == 0) {
+    if (reference == KF_STATUS && strcmp(type, KF_ENUMERATION_WORD) == 0) {
         *value = kf_holds(s) ? s->held_status : kf_ask(instance);
+    } else if (reference == KF_RATES && strcmp(type, KF_ENUMERATION_WORD) == 0) {
+        *value = s->rates;
     } else if (reference == KF_ITERATIONS && strcmp(type, KF_ITERATIONS_WORD) == 0) {
         kf_ask(instance);
         *value = kf_holds(s) ? s->held_iterations : kf_shown(s)->found.iterations;
@@ -179,10 +181,14 @@ kf_answer kf_get_count(kf_instance *instance, unsigned reference, const char *ty
 
 kf_answer kf_get_boolean(kf_instance *instance, unsigned reference, bool *value)
 {
-    if (reference != KF_DRIVEN_BY_TIME) {
+    kf_state *const s = &instance->now;
+    if (reference == KF_SOLVER_OK) {
+        *value = KF_GOOD(kf_holds(s) ? s->held_status : kf_ask(instance));
+    } else if (reference == KF_DRIVEN_BY_TIME) {
+        *value = s->driven_by_time;
+    } else {
         return kf_not_a(instance, reference, "Boolean");
     }
-    *value = instance->now.driven_by_time;
     return KF_DONE;
 }
 
@@ -267,6 +273,28 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
                 return answer;
             }
         }
+    }
+    return KF_DONE;
+}
+
+/* The parameter `rates`. */
+kf_answer kf_set_count(kf_instance *instance, unsigned reference, const char *type, long long value)
+{
+    kf_state *const s = &instance->now;
+    if (reference != KF_RATES || strcmp(type, KF_ENUMERATION_WORD) != 0) {
+        return kf_not_settable(instance, reference, type);
+    }
+    if (value != KF_RATES_AUTO && value != KF_RATES_ESTIMATED && value != KF_RATES_WIRED) {
+        return kf_answered(instance, KF_ERROR, "rates = %lld must be %d (auto), %d (estimated) or %d (wired); %d stays", value,
+                           KF_RATES_AUTO, KF_RATES_ESTIMATED, KF_RATES_WIRED, s->rates);
+    }
+    if (value != s->rates) {
+        if (s->mode > KF_INITIALIZATION) {
+            return kf_answered(instance, KF_ERROR, "rates = %lld comes too late: it is fixed once the FMU is initialized", value);
+        }
+        s->rates = (int)value;
+        kf_find_rate_sources(s);
+        kf_forget_motion(s);
     }
     return KF_DONE;
 }
