@@ -10,6 +10,8 @@ from kinfmu.log.verdict import MEANINGS, counts, happenings, worst_residual
 from kinfmu.run import Run
 
 MOST_EVENTS = 12  # the log holds them all
+_WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}
+_UNSHOWN = ("title", "token")  # the token tells FMUs apart for programs; the record holds it
 
 
 def card(run: Run, note: str = "") -> str:
@@ -35,7 +37,8 @@ def card(run: Run, note: str = "") -> str:
             f"Watched, set aside as redundant: {plain(', '.join(run.watch_names[:MOST_EVENTS]))}"
             + (f" and {len(run.watch_names) - MOST_EVENTS} more." if len(run.watch_names) > MOST_EVENTS else "."),
         ]
-    lines += _table("about", {key: value for key, value in run.info.items() if key != "title"})
+    about = {_WORDS.get(key, key): value for key, value in run.info.items() if key not in _UNSHOWN and value}
+    lines += _table("about", about)
     lines += _table("constant", {name: f"{value:g}" for name, value in run.fixed.items()})
     return "\n".join(lines) + "\n"
 

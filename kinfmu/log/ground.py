@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.log.labels import SUPPORT, places_below
 from kinfmu.log.scene import Scene
 from kinfmu.log.strokes import Stroke
 from kinfmu.run import FloatArray
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     import rerun as rr
 
 MOST_NAMES = 12  # more names than this would hide the linkage; they show when pointed at
-_HATCH = 0.05  # height of a support, as a part of the size
 
 
 def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> None:
@@ -26,18 +26,36 @@ def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> 
     """
     import rerun as rr
 
-    height = _HATCH * scene.stroke
+    height = SUPPORT * scene.stroke
     strips: list[NDArray[Any]] = [
         np.array(point) + height * stroke for point in scene.supports.values() for stroke in _support()
     ]
     for stroke in scene.ground:
-        strips += _rail(stroke, height) if stroke.name.startswith("rail/") else [stroke.points]
+        if stroke.name.startswith("rail/"):
+            strips += _rail(stroke, height)
+        elif stroke.name.startswith("block/"):
+            strips += _under(stroke, height, scene.stroke)
+        else:
+            strips.append(stroke.points)
     if strips:
         lines = rr.LineStrips2D(strips, colors=[palette.GROUND], radii=rr.Radius.ui_points(0.9), draw_order=0.0)
         rec.log(f"{root}/ground", lines, static=True)
+    blocks = [stroke for stroke in scene.ground if stroke.name.startswith("block/")]
+    if blocks:
+        radii = [stroke.radius * scene.stroke for stroke in blocks]
+        names = [stroke.name.partition("/")[2] for stroke in blocks]
+        bushes = rr.LineStrips2D(
+            [stroke.points for stroke in blocks],
+            colors=[palette.GROUND],
+            radii=radii,
+            labels=names,
+            show_labels=False,
+            draw_order=1.0,
+        )
+        rec.log(f"{root}/ground/blocks", bushes, static=True)
     if scene.supports:
         names = list(scene.supports)
-        below = np.array(list(scene.supports.values())) - [0.0, 1.7 * height]
+        below = places_below(scene)
         labels = rr.Points2D(
             below, labels=names, colors=[palette.GROUND], radii=[0.0], show_labels=len(names) <= MOST_NAMES
         )
@@ -64,6 +82,15 @@ def _rail(rail: Stroke, height: float) -> list[FloatArray]:
     if along[0] < 0.0:
         first, last, along = last, first, -along  # so that the ground is below
     down = 0.5 * height * np.array([along[1], -along[0]])
+    line = np.array([first - 0.8 * height * along, last + 0.8 * height * along]) + down
+    return [line, *_hatching(line[0], line[1], 0.45 * height)]
+
+
+def _under(block: Stroke, height: float, size: float) -> list[FloatArray]:
+    """The hatched line under a block of the ground, through which a body slides."""
+    first, last = block.points if block.points[0, 0] <= block.points[-1, 0] else block.points[::-1]
+    along = (last - first) / (float(np.hypot(*(last - first))) or 1.0)
+    down = block.radius * size * np.array([along[1], -along[0]])
     line = np.array([first - 0.8 * height * along, last + 0.8 * height * along]) + down
     return [line, *_hatching(line[0], line[1], 0.45 * height)]
 

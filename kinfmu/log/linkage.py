@@ -9,6 +9,7 @@ import numpy as np
 from kinfmu.log.blocks import send
 from kinfmu.log.frames import Frames
 from kinfmu.log.ground import MOST_NAMES, log_ground
+from kinfmu.log.labels import shown_names
 from kinfmu.log.scene import DrawnBody, Scene
 from kinfmu.log.strokes import BROAD, LINK, Stroke
 from kinfmu.log.timeline import Timeline
@@ -84,7 +85,8 @@ class _Linkage:
         self.size = width * scene.stroke
         self.width = width
         self.frames = Frames(rec, timeline, run, self.size, layer)
-        self.named = colour is None and len(scene.bodies) <= MOST_NAMES
+        is_named = colour is None and len(scene.bodies) <= MOST_NAMES
+        self.names = shown_names(scene) if is_named else frozenset[str]()
 
     def log(self) -> None:
         """Everything, the ground first."""
@@ -100,7 +102,7 @@ class _Linkage:
             along = bar.ends[:, 1] - bar.ends[:, 0]
             self.frames.move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
             line = np.array([[0.0, 0.0], [bar.length, 0.0]])
-            self.frames.line(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name, self.named)
+            self.frames.line(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name, bar.name in self.names)
         self._cylinders()
         for index, (name, points) in enumerate(self.scene.paths.items()):
             own = self.colour or palette.body(len(self.scene.bodies) + index)
@@ -116,7 +118,7 @@ class _Linkage:
         self.frames.move(path, body.pose)
         has_link = len(body.outline) > 1
         if has_link:
-            self.frames.line(path, body.outline, LINK, own, order, body.name, self.named)
+            self.frames.line(path, body.outline, LINK, own, order, body.name, body.name in self.names)
         for k, stroke in enumerate(body.strokes):
             label = body.name if k == 0 and not has_link else None
             self._stroke(path, stroke, own, order, label)
@@ -132,7 +134,13 @@ class _Linkage:
         tint = self.colour if self.colour and stroke.tone != "dark" else tones[stroke.tone]
         below = -0.5 if stroke.tone == "own" and not stroke.layer else 0.0  # a cam lies under the link through its pins
         self.frames.line(
-            f"{path}/{stroke.name}", stroke.points, stroke.radius, tint, order + stroke.layer + below, label, self.named
+            f"{path}/{stroke.name}",
+            stroke.points,
+            stroke.radius,
+            tint,
+            order + stroke.layer + below,
+            label,
+            label in self.names,
         )
 
     def _cylinders(self) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Distance
+from kinfmu.joints import Distance, Fixed, Revolute
 from kinfmu.joints.placement import body_of
 from kinfmu.log.strokes import Stroke, strokes
 from kinfmu.mechanism import toml_file
@@ -174,11 +174,18 @@ def _pins(mechanism: Mechanism) -> dict[str, list[tuple[str, FloatArray]]]:
 
 
 def _supports(mechanism: Mechanism, cylinders: Sequence[CylinderShape]) -> dict[str, tuple[float, float]]:
-    """Points of the ground, by name, that hold joints or cylinders."""
-    used = {name for joint in mechanism.joints for name in supported(joint)}
-    used |= {end for cylinder in cylinders for end in cylinder.between}
-    points = mechanism.body_points.items()
-    return {name.partition(".")[2]: at for name, at in points if name in used and body_of(name) == GROUND_NAME}
+    """Points of the ground that hold joints or cylinders, by the names of revolute joints and welds there, else by
+    their own, as figures name them.
+    """
+    joints: dict[str, list[str]] = {end: [] for cylinder in cylinders for end in cylinder.between}
+    for joint in mechanism.joints:
+        for name in supported(joint):
+            joints.setdefault(name, []).extend([joint.name] if isinstance(joint, Revolute | Fixed) else [])
+    at: dict[tuple[float, float], list[str]] = {}
+    for name, place in mechanism.body_points.items():
+        if name in joints and body_of(name) == GROUND_NAME:
+            at.setdefault(place, []).extend(joints[name] or [name.partition(".")[2]])
+    return {", ".join(dict.fromkeys(names)): place for place, names in at.items()}
 
 
 def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> Instant | None:
