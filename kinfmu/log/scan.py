@@ -50,9 +50,10 @@ class _Chunk:
 
     def most(self, channel: int, length: int | None) -> int:
         """Bytes that it may unpack to; length: of a message's payload, if all have the same."""
-        if length is None or list(self.messages) != [channel]:
+        if length is None:
             return MOST_IN_CHUNK
-        return min(MOST_IN_CHUNK, max(ALWAYS, 2 * self.messages[channel] * (MESSAGE.itemsize + length)))
+        count = 2 * self.messages[channel] if list(self.messages) == [channel] else MOST_RECORDS * self.length
+        return min(MOST_IN_CHUNK, max(ALWAYS, count * (MESSAGE.itemsize + length)))
 
 
 class Scan:
