@@ -84,11 +84,15 @@ class MissingPackageError(KinfmuError):
     """An optional package is not installed."""
 
 
+MOST_LISTED = 100  # names in a message
 LONGEST_WORD = 200  # characters of a word that may be a misspelt name
 
 
 def listed(names: Iterable[str]) -> str:
-    """`a, b, c`, or `none`: how messages list what would be valid."""
+    """`a, b, c`, or `none`: how messages list what would be valid; of more than MOST_LISTED names the first."""
+    names = list(names)
+    if len(names) > MOST_LISTED:
+        names[MOST_LISTED - 1 :] = [f"... ({len(names)} in all)"]
     return ", ".join(names) or "none"
 
 

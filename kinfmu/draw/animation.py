@@ -46,6 +46,7 @@ _SAMPLES = 1000  # of the run; paths show no more
 _CLOSED = 1e-3  # of a body's way over the run; a motion that ends so near to where it began repeats
 _TRAIL = 0.12  # of the pictures, over which the trail reaches back
 _FARTHEST = 0.5 * math.pi  # [rad] that a body may turn from picture to picture
+_LARGEST = 1e100  # of positions to draw: squares of larger ones are infinite
 _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
 _LOST: palette.Colour = (185, 28, 28)
 
@@ -96,6 +97,9 @@ def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
         )
     last = np.maximum.accumulate(np.where(run.good, np.arange(len(run)), 0))  # the last sample with numbers
     held = {body: pose[last] for body, pose in poses.items()}
+    for body, pose in held.items():
+        if not np.abs(pose).max(initial=0.0) < _LARGEST:
+            raise FigureError(f"{path}: the run holds poses of '{body}' that are too large to draw")
     return mechanism, held | {GROUND_NAME: np.zeros((len(run), 3))}
 
 

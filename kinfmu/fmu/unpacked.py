@@ -74,6 +74,8 @@ def _check(path: Path, zipped: zipfile.ZipFile) -> None:
     entries = zipped.infolist()
     if len(entries) > MOST_FILES:
         raise FmuError(f"{path}: holds {len(entries)} files; an FMU has at most {MOST_FILES}")
+    if not all(entry.filename for entry in entries):
+        raise FmuError(f"{path}: is no FMU (damaged: a file without a name)")
     size = sum(entry.file_size for entry in entries)
     if size > LARGEST:
         raise FmuError(f"{path}: takes {size} bytes unpacked; an FMU has at most {LARGEST}")

@@ -22,7 +22,10 @@ def shown_range(values: FloatArray, usual: float) -> tuple[float, float] | None:
     if np.abs(known).max() < ROUND_OFF * usual:
         return -usual, usual
     low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
-    width = high - low
+    with np.errstate(over="ignore"):  # infinite where numbers are as large as they get: the usual choice then
+        width = high - low
+    if width == np.inf:
+        return None
     if width > 0.0 and (known.min() < low - width or known.max() > high + width):
         return float(low - width / 2), float(high + width / 2)
     return None

@@ -111,6 +111,15 @@ def test_an_fmu_that_takes_gigabytes_is_not_unpacked(
     assert told(whole, tmp_path).endswith("files; an FMU has at most 3")
 
 
+def test_a_file_without_a_name_is_one_line(whole: bytes, tmp_path: Path) -> None:
+    content = bytearray(with_file(whole, "a", b""))
+    for signature in (b"PK\x03\x04", b"PK\x01\x02"):
+        name = content.rindex(signature) + (30 if signature.endswith(b"\x04") else 46)
+        assert content[name : name + 1] == b"a"
+        content[name] = 0  # names end at a zero
+    assert told(bytes(content), tmp_path) == "is no FMU (damaged: a file without a name)"
+
+
 def test_a_size_that_lies_unpacks_no_more_than_it_says(whole: bytes, tmp_path: Path) -> None:
     bomb = bytearray(with_file(whole, "resources/zeros", bytes(2**20)))
     at = bomb.rindex(b"PK\x01\x02")

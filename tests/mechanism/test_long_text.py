@@ -89,6 +89,18 @@ def test_a_key_of_too_many_parts_is_refused_wherever_it_is(place: str) -> None:
         parse(text)
 
 
+def test_messages_list_a_hundred_names_at_most() -> None:
+    parameters = "".join(f"p{k} = {k}\n" for k in range(3000))
+    bodies = "".join(f"[bodies.b{k}]\n" for k in range(3000))
+    references = '[joints.J]\ntype = "revolute"\nbetween = ["body.P", "b1.P"]\n'
+    outputs = '[outputs]\ncoordinates = ["body.x"]\n'
+    for more in ('q = "parameter + 1"\n[bodies.bar]\n', f"{bodies}{references}", f"{bodies}{outputs}"):
+        with pytest.raises(MechanismError) as caught:
+            parse(f'name = "a"\n[parameters]\n{parameters}{more}')
+        assert len(str(caught.value)) < 1500
+        assert str(caught.value).endswith("in all)")
+
+
 def test_keys_of_few_parts_and_numbers_are_left_alone() -> None:
     points = ", ".join(["[0.5, 0.25]"] * 200)
     text = f'name = "a"\nbodies.bar.points.P = [1.5, 0.5]\n[joints]\nx = {{ type = "nothing", points = [{points}] }}\n'
