@@ -98,8 +98,8 @@ def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
     last = np.maximum.accumulate(np.where(run.good, np.arange(len(run)), 0))  # the last sample with numbers
     held = {body: pose[last] for body, pose in poses.items()}
     for body, pose in held.items():
-        if not np.abs(pose).max(initial=0.0) < _LARGEST:
-            raise FigureError(f"{path}: the run holds poses of '{body}' that are too large to draw")
+        if not (np.abs(pose[run.good]) < _LARGEST).all():
+            raise FigureError(f"{path}: the run holds poses of '{body}' that are no numbers, or too large to draw")
     return mechanism, held | {GROUND_NAME: np.zeros((len(run), 3))}
 
 

@@ -117,19 +117,7 @@ def run_of(
         raise LogError(f"sample {row} has the status {run.status[row]}; known: 0 to {max(Status):d}")
     if not np.isfinite(run.t).all():
         raise LogError(f"time of sample {int(np.argmin(np.isfinite(run.t)))} is not a finite number")
-    _check_positions(run)
     return run
-
-
-def _check_positions(run: Run) -> None:
-    """Raise a LogError for a sample that has numbers by its status, and a position that is none."""
-    good = run.good
-    for column, name in enumerate(run.outputs):  # one by one: a table of flags takes memory
-        bad = good & ~np.isfinite(run.values[:, column])
-        if name not in run.absent and bad.any():
-            row = int(np.argmax(bad))
-            status = Status(int(run.status[row])).name.lower()
-            raise LogError(f"sample {row} has the status {status}, and {name} = {run.values[row, column]} is no number")
 
 
 def _empty(about: Mapping[str, Any], n: int) -> Run:
