@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
+from kinfmu.analysis.design_notes import motion_notes, part_notes
 from kinfmu.analysis.drivers import DriverAdvice, better_told, driver_advice
 from kinfmu.analysis.file_notes import file_notes
 from kinfmu.analysis.findings import as_json
@@ -119,7 +120,7 @@ def check(mechanism: Mechanism) -> Report:
     Faults of the mechanism do not raise; they stand in the report's `problem`.
     """
     refuse_other(mechanism, "check")
-    notes = list(file_notes(mechanism))
+    notes = [*file_notes(mechanism), *part_notes(mechanism)]
     local, origin = localized(mechanism)
     system = System(local)
     redundancy = find_redundancy(system)
@@ -139,6 +140,6 @@ def check(mechanism: Mechanism) -> Report:
             notes.append(f"{driver.name} cannot be followed alone: {reason}")
     ranges = tuple(driver_range(way) for way in ways)
     notes += run_notes(plan, ranges)
-    return Report(
-        mechanism, redundancy, None, plan, ranges, find_named(mechanism, redundancy, ways), None, tuple(notes)
-    )
+    loops = find_named(mechanism, redundancy, ways)
+    notes += motion_notes(mechanism, ways, loops)
+    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes))

@@ -189,7 +189,7 @@ def _motion(report: Report) -> Iterator[str]:
     if several and report.ranges:
         yield _line("", "each with the other drivers at their start values")
     if report.ranges and not report.singular and not any(reach.stopped for reach in report.ranges):
-        yield _line("singular", "nowhere on the way")
+        yield _line("singular", "none in the range")
     for note in report.notes:
         yield _line("note", note)
 

@@ -1,0 +1,121 @@
+"""What a designer would see: each fault has its note, and sound mechanisms have none."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_file import parse
+
+FOURBAR = """
+name = "fourbar"
+[units]
+length = "mm"
+[run]
+stop = "1 s"
+[bodies.ground]
+points = { O = [0, 0], C = [40, 0] }
+[bodies.crank]
+points = { O = [0, 0], P = [20, 0] }
+[bodies.coupler]
+points = { P = [0, 0], Q = [50, 0] }
+start = { x = 20, phi = "78 deg" }
+[bodies.rocker]
+points = { C = [0, 0], Q = [50, 0] }
+start = { x = 40, phi = "102 deg" }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+speed = "60 rpm"
+"""
+BACK_AND_FORTH = """
+law = "harmonic"
+amplitude = "60 deg"
+frequency = "1 Hz"
+"""
+
+
+def changed(*changes: tuple[str, str]) -> Mechanism:
+    text = FOURBAR
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return parse(text, "fourbar.toml")
+
+
+def notes(*changes: tuple[str, str]) -> tuple[str, ...]:
+    return kinfmu.check(changed(*changes)).notes
+
+
+def test_a_sound_mechanism_has_no_note() -> None:
+    assert notes() == ()
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_no_gallery_mechanism_has_a_note(name: str) -> None:
+    assert kinfmu.check(kinfmu.load(name)).notes == ()
+
+
+def test_bodies_that_a_swapped_point_made_rigid_are_named() -> None:
+    (note,) = [note for note in notes(('"crank.P", "coupler.P"', '"ground.O", "coupler.P"')) if "move" in note]
+    assert note.startswith("coupler, rocker do not move with any driver: look at the points of their joints, or weld")
+
+
+def test_a_body_that_is_welded_to_the_ground_may_stand_still() -> None:
+    frame = (
+        '[bodies.frame]\npoints = { O = [0, 0] }\n[joints]\nF = { type = "fixed", between = ["ground.O", "frame.O"] }'
+    )
+    assert notes(("[joints]", frame)) == ()
+
+
+def test_points_that_nothing_uses_are_named() -> None:
+    assert notes(("Q = [50, 0] }\nstart = { x = 20", "Q = [50, 0], R = [9, 9] }\nstart = { x = 20")) == (
+        "point coupler.R is used by no joint, driver or point of interest",
+    )
+    two = notes(("P = [20, 0] }", "P = [20, 0], A = [1, 1], B = [2, 2] }"))
+    assert two == ("points crank.A, crank.B are used by no joint, driver or point of interest",)
+    interest = ("[drivers.crank]", '[points]\ntip = "crank.A"\n[drivers.crank]')
+    assert notes(("P = [20, 0] }", "P = [20, 0], A = [1, 1] }"), interest) == ()
+
+
+def test_joints_that_hold_the_same_bodies_in_one_place_are_named() -> None:
+    twice = 'P2 = { type = "revolute", between = ["coupler.P", "crank.P"] }\nQ = {'
+    assert "joints P, P2 hold coupler, crank in one place: one of them is enough" in [
+        note.replace("crank, coupler", "coupler, crank") for note in notes(("Q = {", twice))
+    ]
+
+
+@pytest.mark.parametrize(("length", "is_told"), [("0.02", True), ("0.019", True), ("0.051", False), ("20", False)])
+def test_a_link_in_another_unit_is_told(length: str, is_told: bool) -> None:
+    found = notes(("P = [20, 0] }", f"P = [{length}, 0] }}"), ("C = [40, 0]", "C = [60, 0]"))
+    told = [note for note in found if "are its points in another unit?" in note]
+    assert len(told) == is_told
+    if is_told:
+        assert told[0].startswith(f"crank is {length} mm long between its joints, its neighbours at least 50 mm:")
+
+
+def test_a_step_longer_than_the_run_is_told() -> None:
+    found = notes(('stop = "1 s"', 'stop = "1 s"\nstep = "2 s"'))
+    assert found == ("[run] step = 2 s is longer than the run, 0 to 1 s: it has one sample",)
+
+
+def test_a_toggle_position_that_the_run_crosses_is_told_where_it_is() -> None:
+    # Crank and coupler fall in line, stretched, where the rocker's pin Q is 20 + 50 from O.
+    stretched = math.acos((70.0**2 + 40.0**2 - 50.0**2) / (2.0 * 70.0 * 40.0))
+    (note,) = notes(('law = "constant_speed"\nspeed = "60 rpm"', BACK_AND_FORTH))
+    assert note.startswith("the run crosses a toggle position: crank, coupler fall in line at crank = ")
+    assert float(note.partition("= ")[2].split()[0]) == pytest.approx(stretched, abs=1e-8)
+
+
+def test_a_run_of_a_whole_turn_crosses_dead_points_without_a_note() -> None:
+    assert notes(('speed = "60 rpm"', 'speed = "120 rpm"')) == ()
