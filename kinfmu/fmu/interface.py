@@ -129,8 +129,8 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
     parts: tuple[Part, ...] = (
         Part("inputs", tuple(_inputs(plan))),
         Part("values", tuple(_output(plan, name, 0, depends[name], linear[name]) for name in plan.outputs)),
-        Part("rates", tuple(_output(plan, name, 1, depends[name]) for name in plan.outputs)),
-        Part("accelerations", tuple(_output(plan, name, 2, depends[name]) for name in plan.outputs)),
+        Part("rates", tuple(_output(plan, name, 1, depends[name], linear[name]) for name in plan.outputs)),
+        Part("accelerations", tuple(_output(plan, name, 2, depends[name], linear[name]) for name in plan.outputs)),
         Part("residual", (_residual(plan, every),)),
         Part("margin", (_margin(plan, every),)),
         Part("errors", tuple(_errors(plan, every))),
@@ -267,23 +267,30 @@ def _output(
         initial="calculated",
         unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
         derivative_of=derivative_name(name, order - 1) if order else None,
-        dependencies=_input_names(plan, drivers, order),
-        linear_in=linear_in,
-        initial_dependencies=(*_initial_names(plan, drivers, order), *plan.parameters_of(name)),
+        dependencies=_input_names(plan, drivers, order, linear_in),
+        linear_in=() if order else linear_in,
+        initial_dependencies=(*_initial_names(plan, drivers, order, linear_in), *plan.parameters_of(name)),
     )
 
 
-def _input_names(plan: SolvePlan, drivers: tuple[int, ...], order: int) -> tuple[str, ...]:
+def _input_names(
+    plan: SolvePlan, drivers: tuple[int, ...], order: int, linear_in: tuple[str, ...] = ()
+) -> tuple[str, ...]:
     """Inputs that a quantity of the given order depends on.
 
-    A position depends on the value, a rate also on the speed, an acceleration on all three. It stays so when time
-    drives and when rates are estimated from values: what is declared holds for every setting of the parameters.
+    A position depends on the value, a rate also on the speed, an acceleration on all three; but what is linear in the
+    value accelerates without regard to the speed. It depends on the value all the same, from which co-simulation may
+    estimate the acceleration: what is declared holds for every setting of the parameters.
     """
-    return tuple(name for k in drivers for name in plan.drivers[k].inputs[: order + 1])
+    names: list[str] = []
+    for k in drivers:
+        inputs = plan.drivers[k].inputs
+        names += (inputs[0], inputs[2]) if order == 2 and inputs[0] in linear_in else inputs[: order + 1]
+    return tuple(names)
 
 
 def _initial_names(
-    plan: SolvePlan, drivers: tuple[int, ...], order: int, *, tolerance: bool = False
+    plan: SolvePlan, drivers: tuple[int, ...], order: int, linear_in: tuple[str, ...] = (), *, tolerance: bool = False
 ) -> tuple[str, ...]:
     """The same at initialization, where parameters are known quantities too: the law's constants may drive."""
     if not drivers:
@@ -292,7 +299,7 @@ def _initial_names(
     constants = tuple(name for name, *_ in plan.law_constants if name.startswith(prefixes))
     extra = (_TOLERANCE.name,) if tolerance else ()
     rates = (_RATES.name,) if order else ()
-    return (*_input_names(plan, drivers, order), *constants, *extra, "driven_by_time", *rates)
+    return (*_input_names(plan, drivers, order, linear_in), *constants, *extra, "driven_by_time", *rates)
 
 
 def _solver_output(
