@@ -96,7 +96,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersi
 def _build_description(identifier: str, units: tuple[str, ...]) -> bytes:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
-    files = SubElement(configuration, "SourceFileSet", language="C99")
+    files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off")
     for name in units:
         SubElement(files, "SourceFile", name=name)
     ET.indent(root)

@@ -14,6 +14,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.events import events
+from kinfmu.fmu.native.names import prefixed
 from kinfmu.plan import SolvePlan
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -47,7 +48,8 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     del instance[_OTHER_VERSION[version]]
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
     tables |= {"step.c": _step(version), "events.c": events(plan)}
-    return dict(sorted((emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables).items()))
+    files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
+    return dict(sorted(prefixed(files, version).items()))
 
 
 def _step(version: str) -> str:
