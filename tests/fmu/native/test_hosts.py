@@ -7,15 +7,19 @@ with its own `ecos` command (both versions). KINFMU_HOSTS may name another Pytho
 from __future__ import annotations
 
 import csv
+import math
 import os
 import subprocess
 import sys
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.fmu import description
 from tests.fmu.native.conftest import Build
 
 PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)
@@ -48,6 +52,42 @@ with EcosSimulation(float(step), structure=structure) as simulation:
     for _ in range(int(count)):
         simulation.step(1)
         print(*(repr(simulation.get_real(f"fourbar::{name}")) for name in names))
+"""
+
+
+OSP_BY_INPUTS = """
+import sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimManipulator import CosimManipulator
+from libcosimpy.CosimObserver import CosimObserver
+from libcosimpy.CosimSlave import CosimLocalSlave
+fmu, step, values, input, ok, *references = sys.argv[1:]
+execution = CosimExecution.from_step_size(step_size=round(float(step) * 1e9))
+slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="it"))
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer)
+manipulator = CosimManipulator.create_override()
+execution.add_manipulator(manipulator)
+for value in values.split():
+    manipulator.slave_real_values(slave, [int(input)], [float(value)])
+    done = execution.step()
+    seen = observer.last_boolean_values(slave, [int(ok)])
+    seen += observer.last_real_values(slave, [int(reference) for reference in references])
+    print("row", int(done), *(repr(float(one)) for one in seen))
+"""
+ECOS_BY_INPUTS = """
+import sys
+from ecospy import EcosSimulation, EcosSimulationStructure
+fmu, step, values, input, ok, *names = sys.argv[1:]
+structure = EcosSimulationStructure()
+structure.add_model("it", fmu)
+with EcosSimulation(float(step), structure=structure) as simulation:
+    simulation.init()
+    for value in values.split():
+        simulation.set_real(f"it::{input}", float(value))
+        done = simulation.step(1) > 0.0
+        seen = [simulation.get_bool(f"it::{ok}"), *(simulation.get_real(f"it::{name}") for name in names)]
+        print("row", int(done), *(repr(float(one)) for one in seen))
 """
 
 
@@ -114,3 +154,99 @@ def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path
     np.testing.assert_allclose(
         rows[:, 1:], _wanted("crank_rocker", rows[:, 0]), rtol=0, atol=2e-5
     )  # it prints 6 digits
+
+
+# Driven by inputs, in steps that the host chooses, up to a limit and past it
+
+
+@pytest.fixture(scope="module")
+def fmus(built_native: Build, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Path]:
+    """`fmus(flavour, name)`: an FMU that inputs drive; these hosts hold Python, so they load the python flavour too."""
+    folder = tmp_path_factory.mktemp("python")
+
+    def get(flavour: str, name: str) -> Path:
+        path = folder / f"{name}.fmu"
+        if flavour != "python":
+            return built_native(name, int(flavour[-1]), "inputs")
+        return path if path.exists() else kinfmu.build(kinfmu.load(name), path, flavour="python", drive="inputs")
+
+    return get
+
+
+def _driven(host: str, fmu: Path, folder: Path, step: float, values: list[float], *names: str) -> np.ndarray:
+    """Rows of a host: whether the step was done, solver.ok, and variables, after each step."""
+    with zipfile.ZipFile(fmu) as zipped:
+        about = description.read(zipped.read("modelDescription.xml"), str(fmu))
+    references = about.interface.value_references()
+    wanted = ["crank_angle", "solver.ok", *names]
+    if host == "libcosimpy":
+        wanted = [str(references[name]) for name in wanted]
+    script = OSP_BY_INPUTS if host == "libcosimpy" else ECOS_BY_INPUTS
+    command = [PYTHON, "-c", script, str(fmu), repr(step), " ".join(map(repr, values)), *wanted]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return np.array(
+        [[float(one) for one in line.split()[1:]] for line in done.stdout.splitlines() if line[:3] == "row"]
+    )
+
+
+HOSTS = [
+    pytest.param(host, flavour, marks=pytest.mark.skipif(not _has(host), reason=f"{host} is not installed"))
+    for host, flavour in (
+        ("libcosimpy", "native 2"),
+        ("libcosimpy", "python"),
+        ("ecospy", "native 2"),
+        ("ecospy", "native 3"),
+        ("ecospy", "python"),
+    )
+]
+
+
+@pytest.mark.parametrize(("host", "flavour"), HOSTS)
+def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alone(
+    fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
+) -> None:
+    h, count = 0.01, 40
+    t = h * np.arange(count)
+    values = (1.0 + 0.3 * np.sin(2.0 * t)).tolist()
+    names = ("crank.phi", "crank.omega", "crank.alpha")
+    rows = _driven(host, fmus(flavour, "fourbar"), tmp_path, h, values, *names)
+    assert rows[:, :2].all()  # every step is done and ok
+    exact = np.column_stack([values, 0.6 * np.cos(2.0 * t), -1.2 * np.sin(2.0 * t)])
+    errors = np.abs(rows[3:, 2:] - exact[3:]).max(axis=0)
+    assert (errors < [1e-13, 0.8 * 1.1 * h**2, 2.4 * 1.1 * h]).all()
+
+
+@pytest.mark.parametrize(("host", "flavour"), HOSTS)
+def test_what_a_host_does_at_a_limit_is_what_the_page_says(
+    fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
+) -> None:
+    values = [5.3 + 0.1 * k for k in range(14)]  # the limit is 2 pi, before value number 10
+    rows = _driven(host, fmus(flavour, "double_pendulum"), tmp_path, 0.1, values, "upper.phi")
+    past = np.array(values) > 2.0 * math.pi
+    assert rows[~past, :2].all()
+    np.testing.assert_allclose(rows[~past, 2], np.array(values)[~past], rtol=0, atol=1e-12)
+    if host == "libcosimpy":  # it stops, and shows the last good sample
+        assert not rows[past, 0].any()
+        assert rows[past, 1].all()
+    else:  # it goes on: only solver.ok tells that the numbers are old
+        assert rows[past, 0].all()
+        assert not rows[past, 1].any()
+    np.testing.assert_allclose(rows[past, 2], values[9], rtol=0, atol=1e-12)
+
+
+@pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
+def test_the_ecos_command_writes_ok_as_a_column_that_turns_0_at_the_limit(built_native: Build, tmp_path: Path) -> None:
+    ecos = _ecos()
+    assert ecos is not None
+    fmu = built_native("double_pendulum", 2, "time")
+    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", "3", "--stepSize", "0.1"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    if "error while loading shared libraries" in done.stderr:
+        pytest.skip("the ecos command lacks libtbb12")
+    assert done.returncode == 0, done.stdout + done.stderr
+    with next(iter(tmp_path.rglob("*.csv"))).open() as file:
+        header, *lines = list(csv.reader(file))
+    (ok,) = (k for k, cell in enumerate(header) if "::solver.ok[BOOL]" in cell)
+    rows = [(float(line[1]), int(line[ok])) for line in lines if len(line) > 1]
+    assert {t for t, good in rows if not good} == {t for t, _ in rows if t > 2.0 + 1e-9}  # 360 degrees are there at 2 s

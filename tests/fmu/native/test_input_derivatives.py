@@ -7,12 +7,15 @@ import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from kinfmu.fmu.estimated_rates import Rates
 from tests.fmu.native.conftest import Build
 from tests.fmu.native.host import DISCARD, OK, Host
 
 H = 0.01  # [s]
+QUANTITIES = ("length", "speed", "acceleration")
 Give = Callable[[float], list[float]]
 
 
@@ -220,3 +223,82 @@ def test_point_that_is_stepped_again_replaces_its_sample(start: Callable[..., Ho
     assert host.step(again, 0.1) == OK
     assert host.get("crank.omega") == pytest.approx([1.0], abs=2e-3)
     assert host.get("crank.alpha") == pytest.approx([0.0], abs=0.02)
+
+
+# Masters
+
+
+def test_estimated_rates_at_the_end_of_extrapolated_steps_are_of_order_2(built_native: Build, tmp_path: Path) -> None:
+    """With `rates` = estimated the slope that a master gives moves the input, and the rates follow the samples."""
+
+    def largest(h: float) -> tuple[float, float]:
+        host = Host(built_native("fourbar", 2, "inputs"), tmp_path / "slave")
+        host.set({"rates": Rates.ESTIMATED})
+        host.initialize(0.0)
+        speed = acceleration = 0.0
+        for k in range(round(0.6 / h)):
+            t = k * h
+            host.set({"crank_angle": motion(0, t)})
+            give(host, "crank_angle", [(motion(0, t) - motion(0, t - h)) / h])
+            assert host.step(t, h) == OK
+            if k >= 3:
+                omega, alpha, *bounds = host.get("crank.omega", "crank.alpha", "solver.error_qd", "solver.error_qdd")
+                speed = max(speed, abs(omega - motion(1, t + h)))
+                acceleration = max(acceleration, abs(alpha - motion(2, t + h)))
+                assert abs(omega - motion(1, t + h)) <= 1.5 * bounds[0]
+                assert abs(alpha - motion(2, t + h)) <= 1.5 * bounds[1]
+        host.free()
+        return speed, acceleration
+
+    (speed, acceleration), fine = largest(H), largest(H / 4)
+    assert math.log(speed / fine[0], 4.0) == pytest.approx(2.0, abs=0.1)
+    assert math.log(acceleration / fine[1], 4.0) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("with_states", [False, True])
+@pytest.mark.parametrize("has_derivatives", [False, True])
+def test_master_that_takes_steps_back_and_halves_them_ends_as_one_that_does_not(
+    start: Callable[..., Host], has_derivatives: bool, with_states: bool
+) -> None:
+    straight, back = start(), start()
+
+    def go(host: Host, t: float, h: float) -> None:
+        host.set({"crank_angle": motion(0, t)})
+        if has_derivatives:
+            give(host, "crank_angle", [motion(1, t), motion(2, t)])
+        assert host.step(t, h) == OK
+
+    for k in range(8):
+        t = H * k
+        go(straight, t, H / 2)
+        go(straight, t + H / 2, H / 2)
+        state = back.state() if with_states else None
+        go(back, t, H)  # refused by another model, say
+        if state is not None:
+            back.restore(state)
+            back.free_state(state)
+        go(back, t, H / 2)
+        go(back, t + H / 2, H / 2)
+        assert back.outputs() == pytest.approx(straight.outputs(), rel=1e-9, abs=1e-12)
+
+
+def test_fmpy_with_input_derivatives(built_native: Build) -> None:
+    """fmpy's own loop; its table of derivatives has nine places, so it works for three drivers alone."""
+    from fmpy import simulate_fmu
+
+    h, drivers = 0.01, ("boom_cylinder", "stick_cylinder", "bucket_cylinder")
+    starts = {"boom_cylinder": 2.25, "stick_cylinder": 2.45, "bucket_cylinder": 1.85}
+    t = h * np.arange(41)
+    table = np.zeros(41, [("time", float)] + [(f"{d}_{q}", float) for d in drivers for q in QUANTITIES])
+    table["time"] = t
+    for k, driver in enumerate(drivers):
+        table[f"{driver}_length"] = starts[driver] + 0.05 * np.sin((2 + k) * t)
+    names = [f"driven.{driver}_{quantity}" for driver in drivers for quantity in QUANTITIES]
+    options = {"fmi_type": "CoSimulation", "stop_time": 0.4, "output_interval": h, "set_input_derivatives": True}
+    rows = simulate_fmu(str(built_native("excavator", 2, "inputs")), input=table, output=names, **options)
+    for k, driver in enumerate(drivers):
+        w, phase = 2 + k, (2 + k) * rows["time"]
+        exact = (starts[driver] + 0.05 * np.sin(phase), 0.05 * w * np.cos(phase), -0.05 * w * w * np.sin(phase))
+        bounds = (0.05 * w * w * h * h, 1.5 * 0.05 * w * w * h, 2 * 0.05 * w**3 * h)  # the slopes of the step before
+        for quantity, value, bound in zip(QUANTITIES, exact, bounds, strict=True):
+            assert np.abs(rows[f"driven.{driver}_{quantity}"] - value)[4:].max() < 1.1 * bound
