@@ -7,6 +7,7 @@ from enum import IntEnum
 from math import inf
 
 KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
+LARGEST = 1e100  # of rates, and of what a host sets: the squares of larger numbers are infinite
 EPS = 2.220446049250313e-16
 UNSURE = 2.0  # what one term more says may change by this much over the step
 Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
@@ -37,7 +38,7 @@ def estimated_rates(
         step = t - second
         slope = (u[0] - b) / step
         bend = (slope - (b - a) / (second - first)) / (t - first)
-        return (slope + bend * step,), (bend + bend,)
+        return (_usable(slope + bend * step),), (_usable(bend + bend),)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
@@ -46,15 +47,20 @@ def estimated_rates(
     t1, u1 = samples[count - 1]
     h2 = t - t1
     if count == 1:
-        return tuple([(u[k] - u1[k]) / h2 for k in range(len(u))]), (0.0,) * len(u)
+        return tuple([_usable((u[k] - u1[k]) / h2) for k in range(len(u))]), (0.0,) * len(u)
     t0, u0 = samples[count - 2]
     speeds, accelerations = [], []
     for a, b, c in zip(u0, u1, u, strict=True):
         d2 = (c - b) / h2
         bend = (d2 - (b - a) / (t1 - t0)) / (t - t0)
-        speeds.append(d2 + bend * h2)
-        accelerations.append(bend + bend)
+        speeds.append(_usable(d2 + bend * h2))
+        accelerations.append(_usable(bend + bend))
     return tuple(speeds), tuple(accelerations)
+
+
+def _usable(rate: float) -> float:
+    """A rate beyond LARGEST, from samples that are all but at one time, is no estimate."""
+    return rate if -LARGEST <= rate <= LARGEST else 0.0
 
 
 def errors_of_estimated_rates(
@@ -80,12 +86,12 @@ def errors_of_estimated_rates(
             h2, h1 = t - times[1], t - times[2]
             rounding = EPS * max(map(abs, values))
             speed = abs(differences[2]) * h2
-            if len(before) > 2:
+            if len(before) > 2 and h2 * h1 > 0.0:
                 speed = UNSURE * abs(differences[3]) * h2 * h1
                 acceleration = 2.0 * UNSURE * abs(differences[3]) * (h2 + h1) + 4.0 * rounding / (h2 * h1)
             speed += 2.0 * rounding / h2
-        speeds.append(speed)
-        accelerations.append(acceleration)
+        speeds.append(speed if speed < inf else inf)  # no numbers count as no knowledge
+        accelerations.append(acceleration if acceleration < inf else inf)
     return tuple(speeds), tuple(accelerations)
 
 

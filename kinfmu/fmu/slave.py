@@ -18,7 +18,14 @@ from typing import Any, ClassVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from kinfmu.fmu.estimated_rates import KEPT, Rates, Sample, errors_of_estimated_rates, estimated_rates
+from kinfmu.fmu.estimated_rates import (
+    KEPT,
+    LARGEST,
+    Rates,
+    Sample,
+    errors_of_estimated_rates,
+    estimated_rates,
+)
 from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
 from kinfmu.fmu.layout import UNKNOWN_ERROR, Layout, Places
 from kinfmu.solver import Pose, Status, Stuck, with_parameters
@@ -132,6 +139,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return self._by_inputs(self._inputs, t, u)
         return u, *estimated_rates(self._history, t, u)
 
+    def _law(self, t: float) -> Row:
+        """u by the laws; no numbers where rates are beyond LARGEST: no pose belongs to it."""
+        u, ud, udd = self._solver.model.drive(t, self._constants)
+        for rate in ud + udd:
+            if not -LARGEST <= rate <= LARGEST:
+                return (NOT_A_NUMBER,) * len(u)
+        return u  # type: ignore[no-any-return]
+
     def _moment(self) -> Sample:
         """The time and u of what the inputs ask for."""
         history = self._history
@@ -172,7 +187,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if pose is None:
             if self._unbound:
                 self._bind()
-            u = self._driven()[0] if self._driven_by_time else self._wanted()
+            u = self._law(self._time) if self._driven_by_time else self._wanted()
             pose = self._pose = self._solver.solve(self._committed, u)
         return pose
 
@@ -362,7 +377,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         inputs = self._inputs
         if len(vrs) == 1 and vrs[0] == 1 and not (self._driven_by_time or self._refused):  # the one driver's value
             value = values[0]
-            if value - value == 0.0:
+            if -LARGEST <= value <= LARGEST:
                 if value != inputs[0]:
                     inputs[0] = value
                     self._pose = self._shown = self._motion = None
@@ -372,7 +387,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                 return
         for vr, value in zip(vrs, values):  # noqa: B905  # the host's lists are equally long
             k = vr - 1
-            if not (0 <= k < len(inputs) and value - value == 0.0):  # inputs come first; a finite number
+            if not (0 <= k < len(inputs) and -LARGEST <= value <= LARGEST):  # inputs come first
                 self._set_other_real(vr, value)
                 continue
             if value != inputs[k]:
@@ -396,8 +411,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if kind not in ("inputs", "constants", "parameters", "tolerance"):
             self._refuse(name or f"value reference {vr}", "is not a Real variable that can be set")
             return
-        if not math.isfinite(value):
-            self._refuse(name, f"= {value!r} is not a finite number; {self.get_real([vr])[0]!r} stays")
+        if not -LARGEST <= value <= LARGEST:
+            why = f"is too large: at most {LARGEST:g} is taken" if math.isfinite(value) else "is not a finite number"
+            self._refuse(name, f"= {value!r} {why}; {self.get_real([vr])[0]!r} stays")
             return
         if kind == "constants" and place in self.model.POSITIVE and not value > 0.0:
             self._refuse(name, f"= {value!r} must be positive; {self._constants[place]!r} stays")
@@ -569,7 +585,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         pose = self._at_start_of_step(current_time, step_size)
         if pose.good:
             self._time = current_time + step_size
-            pose = self._solver.solve(pose, self._driven()[0])
+            pose = self._solver.solve(pose, self._law(self._time))
         else:
             self._time = current_time
         self._forget()
@@ -592,8 +608,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
         if self._history and not self._touched and abs(current_time - self._history[-1][0]) <= SAME_TIME * step_size:
             return self._committed
-        u, _, _ = self._solver.model.drive(current_time, self._constants)
-        return self._solver.solve(self._committed, u)
+        return self._solver.solve(self._committed, self._law(current_time))
 
     def _commit(self, pose: Pose, t: float, step_size: float) -> None:
         history = self._history

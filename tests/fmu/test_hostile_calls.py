@@ -69,6 +69,40 @@ def test_runs_may_start_before_time_0(start: Start) -> None:
     assert host.step(-1.5, 0.5)
 
 
+HUGE = [1e101, -1e155, 1e300, -1.7e308]
+
+
+@pytest.mark.parametrize("name", ["crank_angle", "crank_speed", "crank_acceleration", "crank.speed"])
+def test_numbers_whose_squares_are_infinite_are_refused(start: Start, name: str) -> None:
+    host = start("fourbar", "time" if name == "crank.speed" else "inputs")
+    (before,) = host.get(name)
+    for value in HUGE:
+        host.set({name: value})
+        assert host.get(name) == [before]
+        assert f"{name} = {value!r} is too large: at most 1e+100 is taken; {before!r} stays" in host.messages[-1][1]
+        assert not host.step(0.0, 0.1)
+    assert host.step(0.0, 0.1)
+
+
+@pytest.mark.parametrize("h", [5e-324, 1e-300, 1e-150])
+def test_rates_estimated_over_no_time_are_no_infinities(start: Start, h: float) -> None:
+    host = start()
+    for k in range(6):
+        host.set({"crank_angle": 0.1 * k})
+        assert all(math.isfinite(value) for value in host.outputs()), k
+        assert host.step(k * h, h)
+        assert all(math.isfinite(value) for value in host.outputs()), k
+
+
+def test_laws_whose_rates_are_beyond_all_bounds_have_no_pose(start: Start) -> None:
+    host = start("crank_rocker", "time")
+    host.set({"crank.speed": 1e100})
+    assert all(math.isfinite(value) for value in host.outputs())
+    assert not host.step(0.0, 0.1)
+    host.set({"crank.speed": 1.0})
+    assert host.step(0.0, 0.1)
+
+
 def damaged(data: bytes, rng: random.Random) -> bytes:
     """A state with some of its bytes changed, missing or added."""
     kind = rng.randrange(4)

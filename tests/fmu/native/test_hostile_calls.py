@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from tests.fmu.native.conftest import Start
-from tests.fmu.native.host import ERROR, OK, WARNING, Host, answer
-from tests.fmu.test_hostile_calls import NO_STEPS, damaged
+from tests.fmu.native.host import DISCARD, ERROR, OK, WARNING, Host, answer
+from tests.fmu.test_hostile_calls import HUGE, NO_STEPS, damaged
 
 
 def component(host: Host) -> ctypes.c_void_p:
@@ -44,6 +44,43 @@ def test_runs_may_start_before_time_0(start: Start) -> None:
     assert host.step(-2.1, 0.5) == ERROR
     assert host.messages[-1][1].startswith("doStep from t = -2.1")
     assert "before the start at -2 s" in host.messages[-1][1]
+
+
+@pytest.mark.parametrize("name", ["crank_angle", "crank_speed", "crank_acceleration", "crank.speed"])
+def test_numbers_whose_squares_are_infinite_are_refused(start: Start, name: str) -> None:
+    host = start("fourbar", "time" if name == "crank.speed" else "inputs")
+    (before,) = host.get(name)
+    for value in HUGE:
+        assert answer(host.set, {name: value}) == ERROR
+        assert host.messages[-1] == (
+            ERROR,
+            f"{name} = {value:g} is too large: at most 1e+100 is taken; {before:.17g} stays",
+        )
+    assert host.get(name) == [before]
+    assert host.step(0.0, 0.1) == OK
+
+
+@pytest.mark.parametrize("h", [5e-324, 1e-300, 1e-150])
+def test_rates_estimated_over_no_time_are_no_infinities(start: Start, h: float) -> None:
+    host = start()
+    for k in range(6):
+        host.set({"crank_angle": 0.1 * k})
+        assert all(math.isfinite(value) for value in host.outputs()), k
+        assert host.step(k * h, h) == OK
+        assert all(math.isfinite(value) for value in host.outputs()), k
+
+
+@pytest.mark.parametrize(("value", "h"), [(1e90, 1e30), (1e60, 1e50), (1.0, 1e101)])
+def test_inputs_that_run_away_by_their_derivatives_are_discard(start: Start, fmi: int, value: float, h: float) -> None:
+    if fmi == 3:
+        pytest.skip("FMI 3.0 has no input derivatives")
+    host = start()
+    for order in (1, 2, 3):
+        host.fmu.setRealInputDerivatives(host.of("crank_angle"), [order], [value])
+    assert host.step(0.0, h) == DISCARD
+    assert host.get("crank_angle") == [0.0]
+    host.set({"crank_angle": 0.1})
+    assert host.status() == 0
 
 
 def test_every_changed_byte_of_a_state_is_found(start: Start) -> None:

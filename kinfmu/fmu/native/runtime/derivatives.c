@@ -374,9 +374,9 @@ kf_answer kf_set_input_derivative(kf_instance *instance, unsigned reference, int
     if (s->model_exchange) {
         return kf_answered(instance, KF_ERROR, "setRealInputDerivatives: this instance is for model exchange, which has no steps");
     }
-    if (order < 1 || order > KF_INPUT_ORDERS || !isfinite(value)) {
-        return kf_answered(instance, KF_ERROR, "%s: derivative of order %d = %g; orders 1 to %d and finite numbers are taken", name,
-                      order, value, KF_INPUT_ORDERS);
+    if (order < 1 || order > KF_INPUT_ORDERS || !(fabs(value) <= KF_LARGEST)) {
+        return kf_answered(instance, KF_ERROR, "%s: derivative of order %d = %g; orders 1 to %d and numbers up to %g are taken",
+                      name, order, value, KF_INPUT_ORDERS, KF_LARGEST);
     }
     if (s->ahead) {
         kf_forget(s);

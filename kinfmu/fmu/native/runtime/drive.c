@@ -12,6 +12,12 @@
 
 #define UNSURE 2.0 /* what one term more says may change by this much over the step */
 
+/* A rate beyond KF_LARGEST, from samples that are all but at one time, is no estimate. */
+static double usable(double rate)
+{
+    return fabs(rate) <= KF_LARGEST ? rate : 0.0;
+}
+
 void kf_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double *ud, double *udd)
 {
     int k;
@@ -30,6 +36,8 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
                 udd[k] = bend * (2.0 * share);
                 ud[k] = d2 + bend * (h2 * share);
             }
+            ud[k] = usable(ud[k]);
+            udd[k] = usable(udd[k]);
         }
     }
 }
@@ -72,6 +80,8 @@ void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t,
                 of_udd[k] = 2.0 * UNSURE * fabs(leading[3]) * (e2 + e1 + ahead) + 4.0 * rounding / (h2 * h1);
             }
             of_ud[k] += 2.0 * rounding / h2 * (1.0 + 2.0 * ahead / h1);
+            of_ud[k] = of_ud[k] < INFINITY ? of_ud[k] : INFINITY; /* no numbers count as no knowledge */
+            of_udd[k] = of_udd[k] < INFINITY ? of_udd[k] : INFINITY;
         }
     }
 }
@@ -173,7 +183,7 @@ void kf_end_of_step(kf_state *s, double step)
     }
     kf_estimated_rates(s->history, s->samples, last->t, last->u, s->ended_ud, s->ended_udd);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        s->ended_ud[k] += step * s->ended_udd[k];
+        s->ended_ud[k] = usable(s->ended_ud[k] + step * s->ended_udd[k]);
     }
     choose(s, s->real, s->ended_ud, s->ended_udd);
     s->ended = true;
@@ -194,6 +204,18 @@ static void ended_drive(const kf_state *s, double *u, double *ud, double *udd)
     memcpy(u, s->committed_u, sizeof s->committed_u);
     memcpy(ud, s->ended_ud, sizeof s->ended_ud);
     memcpy(udd, s->ended_udd, sizeof s->ended_udd);
+}
+
+/* u, ud, udd by the laws at time t; where rates are beyond KF_LARGEST, u is no number, and no pose belongs to it. */
+void kf_law(const kf_state *s, double t, double *u, double *ud, double *udd)
+{
+    int k;
+    kf_drive(&s->solver.model, t, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        if (!(fabs(ud[k]) <= KF_LARGEST && fabs(udd[k]) <= KF_LARGEST)) {
+            u[k] = NAN;
+        }
+    }
 }
 
 /* u, ud, udd of what is asked for. */

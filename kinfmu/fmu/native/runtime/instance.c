@@ -102,7 +102,7 @@ kf_status kf_ask_anew(kf_instance *instance)
         bind(instance);
     }
     if (s->driven_by_time) {
-        kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+        kf_law(s, s->time, u, ud, udd);
     } else {
         int k;
         for (k = 0; k < KF_DRIVERS; ++k) {
@@ -166,17 +166,25 @@ static KF_RARE kf_answer discard(kf_instance *instance, double time, double step
     return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", at, s->message);
 }
 
-/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. */
+/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. Where they or their rates are beyond
+ * KF_LARGEST there is no pose.
+ */
 static KF_RARE void move_inputs(kf_state *s, double step)
 {
+    bool usable = true;
     int k, order;
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
+        const double *const rates = s->input_rates[k];
         double term = 1.0;
         for (order = 0; order < KF_INPUT_ORDERS; ++order) {
             term *= step / (order + 1);
-            s->real[k] += s->input_rates[k][order] * term;
+            s->real[k] += rates[order] * term;
         }
+        usable = usable && fabs(s->real[k]) <= KF_LARGEST &&
+                 fabs(rates[0]) + step * (fabs(rates[1]) + 0.5 * step * fabs(rates[2])) <= KF_LARGEST &&
+                 fabs(rates[1]) + step * fabs(rates[2]) <= KF_LARGEST;
     }
+    s->real[0] = usable ? s->real[0] : NAN;
     kf_forget(s);
 }
 
@@ -237,7 +245,7 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
         commit(s, time, step);
     }
     s->time = time + step;
-    kf_drive(&s->solver.model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
+    kf_law(s, s->time, u, ud, udd);
     kf_forget(s);
     solve(s, u);
     if (!KF_GOOD(s->status)) {

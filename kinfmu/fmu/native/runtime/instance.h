@@ -11,6 +11,7 @@
 #include "solver.h"
 
 #define KF_SAMPLES 4      /* committed ones: two for rates estimated with the current one, one more for their errors */
+#define KF_LARGEST 1e100  /* of what a host sets and of rates: the squares of larger numbers are infinite */
 #define KF_INPUT_ORDERS 3 /* derivatives of an input that a step may follow */
 
 /* Numbered as fmi2Status and fmi3Status are. */
@@ -169,6 +170,7 @@ void kf_end_of_step(kf_state *state, double step);
 void kf_drop_input_derivatives(kf_state *state);
 void kf_find_rate_sources(kf_state *state);
 void kf_touch(kf_state *state); /* something is set: what is shown is that at the current time, not at the commit */
+void kf_law(const kf_state *state, double t, double *u, double *ud, double *udd);
 void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
 void kf_find_errors(kf_state *state, double errors[3]);
 void kf_bound_errors(double errors[3]);

@@ -217,6 +217,10 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     if (!isfinite(value)) {
         return kf_answered(instance, KF_ERROR, "%s = %g is not a finite number; %.17g stays", name, value, s->real[place]);
     }
+    if (fabs(value) > KF_LARGEST) {
+        return kf_answered(instance, KF_ERROR, "%s = %g is too large: at most %g is taken; %.17g stays", name, value, KF_LARGEST,
+                           s->real[place]);
+    }
     if (kf_real_is_positive[place] && !(value > 0.0)) {
         return kf_answered(instance, KF_ERROR, "%s = %.17g must be positive; %.17g stays", name, value, s->real[place]);
     }
@@ -265,7 +269,7 @@ kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t 
     for (k = 0; k < count; ++k) {
         const unsigned place = KF_PLACE(references[k]);
         const double value = values[k];
-        if (place < 3 * KF_DRIVERS && value - value == 0.0) { /* inputs come first; a finite number */
+        if (place < 3 * KF_DRIVERS && fabs(value) <= KF_LARGEST) { /* inputs come first */
             set_input(s, place, value);
         } else {
             const kf_answer answer = set_other(instance, references[k], value);

@@ -1,0 +1,89 @@
+"""Native FMUs under sanitizers: a random host in C calls every function of FMI in every state. See fmu_driver.c."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import kinfmu
+from kinfmu.backends.c import compiler
+from kinfmu.fmu.interface import interface
+from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.plan import compile_plan
+from tests.fmu.test_parameters import linkage
+from tests.fuzz.summary import Summary, seeds
+
+DRIVER = Path(__file__).with_name("fmu_driver.c")
+TOKEN = "{00000000-0000-0000-0000-000000000000}"  # noqa: S105  a guid
+MECHANISMS = {"fourbar": None, "settable": linkage, "five_bar": None, "double_pendulum": None}
+CALLS = 400  # of a trial, by each thread
+PATIENCE = 120.0  # [s] for one trial
+SANITIZERS = {
+    "address": ("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+    "thread": ("-fsanitize=thread",),
+}
+
+
+class Variant(NamedTuple):
+    """A program: an FMU's sources and the host, under sanitizers."""
+
+    mechanism: str
+    fmi: int
+    sanitizer: str
+
+    def __str__(self) -> str:
+        return f"{self.mechanism}, FMI {self.fmi}, {self.sanitizer} sanitizer"
+
+
+VARIANTS = [
+    Variant(*chosen)
+    for chosen in zip(itertools.cycle(MECHANISMS), (2, 3, 3, 2, 3, 2, 2, 3), ["address", "thread"] * 4, strict=False)
+]
+
+
+def run(seed: int, seconds: float) -> Summary:
+    """Run trials from `seed` on: each seed has its program and its calls. Compiling does not count as time."""
+    summary = Summary("fmu")
+    with tempfile.TemporaryDirectory(prefix="kinfmu_fuzz_") as folder:
+        for one in seeds(seed, seconds):
+            trial(one, Path(folder), summary)
+    return summary
+
+
+def trial(seed: int, folder: Path, summary: Summary) -> None:
+    """Do the trial of a seed and keep what it finds: one line of the host, or the first of a sanitizer."""
+    variant = VARIANTS[seed % len(VARIANTS)]
+    threads = 2 if variant.sanitizer == "thread" else 1
+    program = _program(variant, folder)
+    command = [str(program), str(seed), str(CALLS), str(threads)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        summary.find(seed, str(variant), f"no end after {PATIENCE:g} s")
+        return
+    summary.count(f"times {CALLS} calls, {variant.sanitizer} sanitizer")
+    if done.returncode != 0 or done.stderr:
+        lines = done.stderr.splitlines() or [f"the program ended with status {done.returncode}"]
+        marks = ("finding:", "runtime error", "ERROR:", "WARNING:")
+        summary.find(
+            seed, str(variant), next((line for line in lines if any(mark in line for mark in marks)), lines[0])
+        )
+
+
+def _program(variant: Variant, folder: Path) -> Path:
+    """The program of a variant, compiled when it is first wanted."""
+    path = folder / f"{variant.mechanism}_{variant.fmi}_{variant.sanitizer}"
+    if not path.exists():
+        make = MECHANISMS[variant.mechanism]
+        plan = compile_plan(make() if make else kinfmu.load(variant.mechanism))
+        variables = interface(plan, "inputs", has_time=variant.fmi == 3)
+        version = f"{variant.fmi}.0"
+        files = sources(plan, variables, version, TOKEN) | headers(version) | {DRIVER.name: DRIVER.read_text("utf-8")}
+        flags = ("-std=c99", "-g", "-O0", "-ffp-contract=off", "-pthread")
+        compiler.compiled(
+            compiler.command(), files, (*flags, f"-DFMI={variant.fmi}", *SANITIZERS[variant.sanitizer]), path
+        )
+    return path
