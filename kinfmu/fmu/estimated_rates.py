@@ -38,7 +38,9 @@ def estimated_rates(
         step = t - second
         slope = (u[0] - b) / step
         bend = (slope - (b - a) / (second - first)) / (t - first)
-        return (_usable(slope + bend * step),), (_usable(bend + bend),)
+        speed = slope + bend * step
+        if -LARGEST <= speed <= LARGEST and -LARGEST <= bend <= LARGEST:
+            return (speed,), (bend + bend,)
     while count and samples[count - 1][0] >= t:
         count -= 1
     if not count:
