@@ -30,6 +30,7 @@ _LOOKS = 4  # random poses at which the structure of the rows is seen
 _STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
+_ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
 _SHORTEST = 1e-3  # the same; where steps get shorter a limit lies between
@@ -42,17 +43,19 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
     """The pose nearest to q where all rows of a system or of a part of it hold, and its residual relative to the size.
 
     Levenberg-Marquardt far away, the shortest Gauss-Newton step near by, so that redundant rows and singular points do
-    no harm. Stops on the residual: a residual above CLOSED means that the pose does not close.
+    no harm; close to a dead centre, where that step goes too far, Levenberg-Marquardt again. Stops on the residual: a
+    residual above CLOSED means that the pose does not close.
     """
     part = Part(part) if isinstance(part, System) else part
     best, residual = _straight(part, q, u)
-    damping = 1e-3
+    damping, too_far = 1e-3, False
     for _ in range(_ITERATIONS):
         norm = float(np.linalg.norm(residual))
         if norm == 0.0:
             break
         jacobian = part.jacobian(best)
-        if norm <= 1e-3:  # close enough for the full step
+        is_whole = norm <= 1e-3 and not too_far  # close enough for the full step
+        if is_whole:
             step = np.linalg.lstsq(jacobian, -residual, rcond=_RANK)[0]
         else:
             damped = np.vstack([jacobian, np.sqrt(damping) * np.eye(jacobian.shape[1])])
@@ -63,9 +66,11 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
         trial_residual = part.residual(trial, u)
         if np.linalg.norm(trial_residual) < norm:
             best, residual = trial, trial_residual
-            damping = max(damping / 5.0, 1e-12)
-        elif norm <= 1e-3 or damping > 1e8:
+            damping, too_far = max(damping / 5.0, 1e-12), False
+        elif norm <= _ROUNDED or damping > 1e8:
             break
+        elif is_whole:
+            too_far = True
         else:
             damping *= 8.0
     return best, float(np.abs(residual).max(initial=0.0))

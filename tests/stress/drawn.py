@@ -86,6 +86,8 @@ class Drawn:
     sketch: Sketch
     frame: Frame
     start: tuple[float, ...]
+    law_start: tuple[float, ...] | None = None  # None: the start
+    rough: Mapping[str, float] | None = None  # coordinates of the start poses; None: those of the start
 
     def exactly(self, numbers: Numbers, u: Array, ud: Array, udd: Array) -> Exactly:
         """Every coordinate at driver values, speeds and accelerations (n, d); angles as principal values."""
@@ -120,7 +122,7 @@ class Drawn:
     @cached_property
     def mechanism(self) -> Mechanism:
         """The mechanism that kinfmu is given: lengths and start pose as doubles."""
-        length, starts = self.frame.length, self.starts
+        length, starts = self.frame.length, self.starts if self.rough is None else self.rough
         bodies, pins = [], dict[str, list[str]]()
         for body, points in self.sketch.points.items():
             place = self.frame.ground if body == "ground" else lambda x, y: (length(x), length(y))
@@ -134,7 +136,7 @@ class Drawn:
                 pins.setdefault(name, []).append(f"{body}.{name}")
         joints: list[Joint] = [Revolute(name, (ends[0], ends[1])) for name, ends in pins.items() if len(ends) == 2]
         joints += self.sketch.joints(self.frame)
-        return Mechanism("drawn", bodies, joints, self.sketch.drivers(self.frame, self.start))
+        return Mechanism("drawn", bodies, joints, self.sketch.drivers(self.frame, self.law_start or self.start))
 
 
 def standing(numbers: Numbers, x: Exact, y: Exact, like: Jet) -> Vector:

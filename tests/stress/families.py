@@ -569,6 +569,16 @@ def cylinders(rng: Draw) -> Sketch:
     return Sketch(points, poses, drivers, kinds=kinds, reach=(0.1, 4.0))
 
 
+STARTS_ANYWHERE = "starts anywhere"
+
+
+def starts_anywhere(rng: Draw) -> Sketch:
+    """A mechanism of any other family; its law and its start poses are drawn in kinfmu's way: see starts.py."""
+    others = {name: family for name, family in FAMILIES.items() if name != STARTS_ANYWHERE}
+    (name,) = rng.choices(list(others), [weight for _, weight in others.values()])
+    return others[name][0](rng)
+
+
 FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often of a hundred
     "four-bars": (four_bars, 16),
     "change points": (change_points, 14),
@@ -585,4 +595,5 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "five-bars": (five_bars, 4),
     "robots": (robots, 4),
     "cylinders": (cylinders, 4),
+    STARTS_ANYWHERE: (starts_anywhere, 5),
 }

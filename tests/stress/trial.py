@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 import kinfmu
 from kinfmu import Run
 from kinfmu.backends.python import load_model
+from kinfmu.errors import AmbiguousStartError
 from kinfmu.naming import derivative_name
 from kinfmu.plan import compile_plan
 from tests.stress.branch import INSIDE, OUTSIDE, TURN, Expected, Floats, Interval, Walk, branch_of
 from tests.stress.drawn import Drawn, Frame
-from tests.stress.families import FAMILIES, Draw, RedrawError
+from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError
 from tests.stress.jets import DIGITS, SCREENING, Numbers
 from tests.stress.patterns import drawn_steps
+from tests.stress.starts import Started, started
 
 WRONG = 1e-9  # of the column's largest magnitude
 TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
@@ -34,6 +36,8 @@ AGREED = 0.1  # the two oracles may differ by this part of the error, or of what
 STARTS = 64
 MANY = 400  # samples at least for the native engine, which lays many side by side
 FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms stand a million lengths, or some, off the origin
+AMBIGUOUS = 1e-4  # sine at the start of a law below which several branches may be told to leave it
+SAME = 1e-6  # [rad, lengths]; a first sample further off is another assembly
 MEETING = 0.3  # least sine of the angle under which bars meet at the start
 DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (Fraction(3, 5), Fraction(4, 5)), (Fraction(-7, 25), Fraction(24, 25)))
 ORDERS = ("q", "qd", "qdd")
@@ -63,6 +67,8 @@ class Verdict:
     narrow: int  # the same behind a change point too narrow, or too close to a limit
     digits: int  # samples that were judged by 50 digits
     gap: float  # largest difference of the two oracles, as a part of what is judged
+    refused: bool = False  # as ambiguous, at a singular start
+    other: bool = False  # assembled otherwise: the start poses do not tell which is meant
     faults: list[Fault] = field(default_factory=list)
 
 
@@ -77,6 +83,7 @@ class Trial:
     patterns: Sequence[str]
     inputs: tuple[Floats, Floats, Floats]  # (n, d) each: values, speeds, accelerations
     engine: Literal["python", "native"] = "python"
+    started: Started | None = None  # where the law starts, if not where the branch does
 
     def run(self) -> tuple[Run, float]:
         """What kinfmu says to it, and the size that it measures errors by."""
@@ -95,10 +102,21 @@ class Trial:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 run, size = self.run()
+        except AmbiguousStartError as error:
+            if self._is_singular_at_start():
+                verdict.refused = True  # several branches are as near as that: the message lists them
+            else:
+                verdict.faults.append(Fault("raised", -1, f"{type(error).__name__}: {error}"))
+            return verdict
         except Exception as error:  # whatever it is, it is a fault, and the next mechanism goes on
             verdict.faults.append(Fault("raised", -1, f"{type(error).__name__}: {error}"))
             return verdict
         verdict.statuses, verdict.estimate = run.status, run.error
+        if self.started is not None and not self._is_on_the_branch(run):
+            if self._is_clear():
+                verdict.faults.append(Fault("another assembly", 0, "the start poses are nearer to that of the oracle"))
+            verdict.other = True
+            return verdict
         expected = self.branch.expected(self.inputs[0], run.good)
         verdict.side = expected.side
         self._judge_status(run, expected, verdict)
@@ -111,6 +129,33 @@ class Trial:
         self._confirm(run, expected, which, size, verdict)
         self._judge_errors(run, expected, verdict)
         return verdict
+
+    def _sine_at_start(self) -> float:
+        """Least sine of the angle under which bars meet at the start of the law."""
+        assert self.started is not None
+        sines = self.drawn.positions(self.started.law_start[None]).closing.sines
+        return min(abs(float(np.atleast_1d(sine)[0])) for sine in sines)
+
+    def _is_singular_at_start(self) -> bool:
+        return self.started is not None and self._sine_at_start() < AMBIGUOUS
+
+    def _is_clear(self) -> bool:
+        """True if the start poses tell the assemblies apart: noise is small against what lies between them."""
+        assert self.started is not None
+        return not self.started.is_there or self._sine_at_start() > MEETING
+
+    def _is_on_the_branch(self, run: Run) -> bool:
+        """True if the first sample, at the start of the law, is the oracle's pose; or if there is none."""
+        if not run.good[0]:
+            return True
+        exact = self.drawn.positions(self.inputs[0][:1]).columns
+        unit = float(self.drawn.frame.scale)
+        for name in run.outputs:
+            off = float(run[name][0]) - float(np.atleast_1d(exact[name].d0)[0])
+            off = abs(off - TURN * round(off / TURN)) if name.endswith(".phi") else abs(off) / unit
+            if off > SAME:
+                return False
+        return True
 
     def _judge_status(self, run: Run, expected: Expected, verdict: Verdict) -> None:
         start = self.drawn.positions(np.array([self.drawn.start]))
@@ -243,7 +288,10 @@ def trial(seed: int, family: str | None = None, engine: Literal["python", "nativ
         except (RedrawError, ZeroDivisionError, ValueError):
             continue
         break
+    begun = started(rng, branch) if family == STARTS_ANYWHERE else None
     names, u = drawn_steps(rng, branch)
+    if begun is not None:
+        drawn, u = begun.drawn, np.concatenate([begun.law_start[None], u])
     while engine == "native" and len(u) < MANY:
         others, more = drawn_steps(rng, branch)
         names, u = [*names, *(other for other in others if other not in names)], np.concatenate([u, more])
@@ -251,7 +299,7 @@ def trial(seed: int, family: str | None = None, engine: Literal["python", "nativ
     units = [1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds]
     ud = generator.uniform(0.3, 1.5, u.shape) * generator.choice((1.0, -1.0), u.shape) * units
     udd = generator.uniform(-1.0, 1.0, u.shape) * units
-    return Trial(seed, family, drawn, branch, names, (u, ud, udd), engine)
+    return Trial(seed, family, drawn, branch, names, (u, ud, udd), engine, begun)
 
 
 def _drawn(rng: Draw, family: str) -> Drawn:
