@@ -27,13 +27,16 @@ _THROWS_TO_COME_NEARER = 15  # where the first pose is regular and only not near
 _DENSE_THROWS = 8
 _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zero; so does a weight in a combination
 _LOOKS = 4  # random poses at which the structure of the rows is seen
-_STEPS = 16  # in which a nearly singular start pose is left
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
 _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
-_SHORTEST = 1e-3  # the same; where steps get shorter a limit lies between
+_SHORTEST = 1e-5  # the same; where steps get shorter a limit lies between
+_STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is not believed
+_TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: so far off lie branches
+_PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches beside a singular start pose are sought
+_NEARLY = 0.01  # residual of a pose that may close beside the start
 _CORRECTION = 0.02  # [rad, sizes]; a prediction that is corrected by more may have left the branch
 _SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
@@ -240,24 +243,42 @@ def _with_angles(system: System, q: FloatArray, change: FloatArray) -> FloatArra
 
 def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
     """True if a straight way of the drivers leads from a pose to other driver values: no limit lies between."""
-    q, u, at_rest = found.q, found.u, np.zeros(len(target))
-    way = target - u
-    done, step = 0.0, 1.0 / max(1.0, float(np.abs(way / _reaches(system)).max()) / _LONGEST)
-    while done < 1.0:
+    _, u = _followed(system, found.q, found.u, target)
+    return np.array_equal(u, target)
+
+
+def _followed(
+    system: System, q: FloatArray, u: FloatArray, target: FloatArray, trust: float | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return a pose followed on a straight way of the drivers to `target` or as far as it leads, and where that is.
+
+    Steps are predicted to second order. trust: the margin over the largest correction of a prediction, so that no
+    other branch is that near; None: any branch will do where branches cross.
+    """
+    way, at_rest = target - u, np.zeros(len(target))
+    length = float(np.abs(way / _reaches(system)).max())
+    shortest = _SHORTEST if trust is None else _ROUNDED
+    done, step = 0.0, min(1.0, _LONGEST / length)
+    here = margin(system, q) if trust else 0.0
+    while done < 1.0 and step * length >= shortest:
         step = min(step, 1.0 - done)
         ahead = target if step == 1.0 - done else u + step * way
         jacobian = system.jacobian(q)
         qd = np.linalg.lstsq(jacobian, system.nu(q, u, step * way), rcond=_RANK)[0]
         qdd = np.linalg.lstsq(jacobian, system.gamma(q, qd, u, step * way, at_rest), rcond=_RANK)[0]
         predicted = q + qd + 0.5 * qdd
-        trial, gap = close(system, predicted, ahead)
-        if gap <= CLOSED and np.abs((trial - predicted) / system.column_scales).max() <= _CORRECTION:
-            q, u, done, step = trial, ahead, done + step, 2.0 * step
+        corrected, allowed = np.inf, _CORRECTION
+        if np.abs((predicted - q) / system.column_scales).max() <= _LONGEST * _STEEPEST:
+            trial, gap = close(system, predicted, ahead)
+            if gap <= CLOSED:
+                corrected = float(np.abs((trial - predicted) / system.column_scales).max())
+                there = margin(system, trial) if trust else 0.0
+                allowed = min(allowed, here / trust, there / trust) if trust else allowed
+        if corrected <= allowed:
+            q, u, here, done, step = trial, ahead, there, done + step, 2.0 * step
         else:
             step /= 2.0
-            if step * float(np.abs(way / _reaches(system)).max()) < _SHORTEST:
-                return False
-    return True
+    return q, u
 
 
 def _reaches(system: System) -> FloatArray:
@@ -299,23 +320,39 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
         )
     q, gap = close(system, start.q, u)
     if gap > CLOSED:
-        return None if order.blocks else _thrown_together(system, start, None, order)
+        found = _assembled_beside(system, start) if gap < _NEARLY else None
+        return found if found or order.blocks else _thrown_together(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
     beside = []
     for side in (1.0, -1.0):
-        way = side * BESIDE * _reaches(system)
         if found.margin > SINGULAR:
-            near = _walked(system, q, u, way)
-            back = None if near is None else _walked(system, near, u + way, -way)
-            if back is None or np.abs((back - q) / system.column_scales).max() > _APART:
-                near = None  # the way passed a limit or a crossing: another branch
-        else:
-            near = next(iter(branches(system, q, u + way)), None)
-        if near is not None:
-            beside.append(Assembled(near, u + way, margin(system, near)))
+            there, at = _followed(system, q, u, u + side * BESIDE * _reaches(system), trust=_TRUST)
+            beside.append(Assembled(there, at, margin(system, there)))
+            continue
+        for part in _PARTS:
+            at = u + side * part * BESIDE * _reaches(system)
+            near = next(iter(branches(system, q, at)), None)
+            if near is not None:
+                beside.append(Assembled(near, at, margin(system, near)))
+                break
     return max([found, *beside], key=lambda pose: pose.margin)
+
+
+def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
+    """Return the most regular pose a little beside the start from which the start is reached; None if there is none.
+
+    Near a change point a rough pose may lie between the branches, where all rows are open by a little.
+    """
+    beside = []
+    for side in (1.0, -1.0):
+        u = start.u + side * BESIDE * _reaches(system)
+        q, gap = close(system, start.q, u)
+        if gap <= CLOSED:
+            near = Assembled(q, u, margin(system, q))
+            beside += [near] if near.margin > SINGULAR and _is_reached(system, near, start.u) else []
+    return max(beside, key=lambda pose: pose.margin, default=None)
 
 
 def comfortable(system: System) -> float:
@@ -462,23 +499,6 @@ def _block_margin(jacobian: FloatArray) -> float:
         return min(1.0, abs(float(jacobian[0, 0])))
     singular = np.linalg.svd(jacobian, compute_uv=False)
     return float(singular[-1] / singular[0])
-
-
-def _walked(system: System, q: FloatArray, u: FloatArray, way: FloatArray) -> FloatArray | None:
-    """The pose a way of the drivers further on the same branch, or None if it does not close there.
-
-    Small steps with a second-order prediction, for close to a singular point the prediction decides the branch.
-    """
-    ud, at_rest = way / _STEPS, np.zeros(len(way))
-    for k in range(1, _STEPS + 1):
-        jacobian = system.jacobian(q)
-        qd = np.linalg.lstsq(jacobian, system.nu(q, u + (k - 1) * ud, ud), rcond=_RANK)[0]
-        gamma = system.gamma(q, qd, u + (k - 1) * ud, ud, at_rest)
-        qdd = np.linalg.lstsq(jacobian, gamma, rcond=_RANK)[0]
-        q, gap = close(system, q + qd + 0.5 * qdd, u + k * ud)
-        if gap > CLOSED:
-            return None
-    return q
 
 
 def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatArray]:

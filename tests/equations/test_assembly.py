@@ -12,6 +12,8 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
 from kinfmu.equations.assembly import assemble, in_order, start_targets
 from kinfmu.equations.system import System
+from tests.stress.families import STARTS_ANYWHERE
+from tests.stress.trial import trial
 
 
 def near_its_limit() -> Mechanism:
@@ -149,3 +151,42 @@ def test_start_poses_on_another_branch_than_the_law_can_reach_give_way() -> None
         mechanism = Mechanism("ranges", bodies, joints, [AngleDriver("crank", "crank", ConstantSpeed(start, 0.0))])
         assert kinfmu.solve(mechanism, crank_angle=[start]).good.all()
         assert len(kinfmu.check(mechanism).notes) == (start > 0)
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_close_to_a_dead_centre_the_start_is_assembled(gap: float, noise: float) -> None:
+    """The last part before the limit of a triple rocker, where the whole Gauss-Newton step goes too far."""
+    mechanism = kinfmu.load("triple_rocker")
+    start = math.acos((65**2 + 100**2 - 115**2) / (2 * 65 * 100)) - gap
+    for side in (1, -1):
+        pin = 65 * math.cos(start), 65 * math.sin(start)
+        away = math.hypot(100 - pin[0], pin[1])
+        to_pivot = math.atan2(-pin[1], 100 - pin[0])
+        coupler = to_pivot + side * math.acos((50**2 + away**2 - 65**2) / (2 * 50 * away))
+        end = pin[0] + 50 * math.cos(coupler), pin[1] + 50 * math.sin(coupler)
+        rough = {
+            "left": (0.0, 0.0, start + noise),
+            "coupler": (pin[0] - 65 * noise, pin[1] + 65 * noise, coupler - noise),
+            "right": (100.0, 0.0, math.atan2(end[1], end[0] - 100) + noise),
+        }
+        bodies = [Body(body.name, body.points, rough.get(body.name, (None,) * 3)) for body in mechanism.bodies]
+        (driver,) = mechanism.drivers
+        at_start = replace(driver, law=ConstantSpeed(start, 0.0))  # type: ignore[type-var]
+        assembled = assemble(System(replace(mechanism, bodies=bodies, drivers=(at_start,))))
+        assert assembled is not None
+        assert assembled.margin > 1e-6
+        found = dict(zip(mechanism.coordinate_names, assembled.q.tolist(), strict=True))
+        if noise == 0.0 and gap > 1e-7:  # exact start poses tell the assemblies apart
+            assert np.sign(math.sin(found["coupler.phi"] - found["right.phi"])) == np.sign(
+                math.sin(coupler - rough["right"][2])
+            )
+
+
+@pytest.mark.parametrize("seed", [18, 19, 54, 1097])
+def test_rough_starts_near_change_points_are_assembled(seed: int) -> None:
+    """Crank = rod, a pin in a slot whose lever turns within 0.01 rad, a redundant bar: each was refused."""
+    one = trial(seed, STARTS_ANYWHERE)
+    assembled = assemble(System(one.drawn.mechanism))
+    assert assembled is not None
+    assert assembled.margin > 1e-6

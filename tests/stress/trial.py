@@ -37,7 +37,8 @@ STARTS = 64
 MANY = 400  # samples at least for the native engine, which lays many side by side
 FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms stand a million lengths, or some, off the origin
 AMBIGUOUS = 1e-4  # sine at the start of a law below which several branches may be told to leave it
-SAME = 1e-6  # [rad, lengths]; a first sample further off is another assembly
+SAME = 1e-3  # [rad, lengths]; a pose further off is another assembly
+CLEAR = 0.1  # least sine of the angle under which bars meet where assemblies are told apart
 MEETING = 0.3  # least sine of the angle under which bars meet at the start
 DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (Fraction(3, 5), Fraction(4, 5)), (Fraction(-7, 25), Fraction(24, 25)))
 ORDERS = ("q", "qd", "qdd")
@@ -112,13 +113,13 @@ class Trial:
             verdict.faults.append(Fault("raised", -1, f"{type(error).__name__}: {error}"))
             return verdict
         verdict.statuses, verdict.estimate = run.status, run.error
-        if self.started is not None and not self._is_on_the_branch(run):
+        expected = self.branch.expected(self.inputs[0], run.good)
+        verdict.side = expected.side
+        if self.started is not None and not self._is_on_the_branch(run, expected):
             if self._is_clear():
                 verdict.faults.append(Fault("another assembly", 0, "the start poses are nearer to that of the oracle"))
             verdict.other = True
             return verdict
-        expected = self.branch.expected(self.inputs[0], run.good)
-        verdict.side = expected.side
         self._judge_status(run, expected, verdict)
         which = np.flatnonzero(run.good & (expected.side == INSIDE))
         if len(which) == 0:
@@ -144,16 +145,19 @@ class Trial:
         assert self.started is not None
         return not self.started.is_there or self._sine_at_start() > MEETING
 
-    def _is_on_the_branch(self, run: Run) -> bool:
-        """True if the first sample, at the start of the law, is the oracle's pose; or if there is none."""
-        if not run.good[0]:
-            return True
-        exact = self.drawn.positions(self.inputs[0][:1]).columns
+    def _is_on_the_branch(self, run: Run, expected: Expected) -> bool:
+        """True if the first sample that tells the assemblies apart is the oracle's pose; or if there is none."""
+        with np.errstate(all="ignore"):
+            exact = self.drawn.positions(self.inputs[0])
+        sines = np.minimum.reduce([np.abs(np.asarray(sine, dtype=float)) for sine in exact.closing.sines])
+        which = np.flatnonzero(run.good & (expected.side == INSIDE) & (sines > CLEAR))
         unit = float(self.drawn.frame.scale)
-        for name in run.outputs:
-            off = float(run[name][0]) - float(np.atleast_1d(exact[name].d0)[0])
-            off = abs(off - TURN * round(off / TURN)) if name.endswith(".phi") else abs(off) / unit
-            if off > SAME:
+        for name in run.outputs if len(which) else ():
+            k = which[0]
+            off = float(run[name][k]) - float(np.broadcast_to(exact.columns[name].d0, sines.shape)[k])
+            if name.endswith(".phi"):
+                off = float(run[name][k]) - expected.angles[name][k]
+            if abs(off) > SAME * (1.0 if name.endswith(".phi") else unit):
                 return False
         return True
 
