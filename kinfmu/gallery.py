@@ -11,6 +11,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read
 from kinfmu.mechanism.toml_text import text
 from kinfmu.suffix import suffix_of
+from kinfmu.whole_file import write_whole
 
 
 def folder() -> Path:
@@ -50,7 +51,7 @@ def save(mechanism: Mechanism, path: str | Path) -> Path:
     """Write a mechanism file; `load` gives the same mechanism back."""
     path = Path(path)
     try:
-        path.write_text(text(mechanism), encoding="utf-8")
+        write_whole(path, text(mechanism).encode())
     except OSError as error:
         raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
     return path

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -36,13 +38,36 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with _ended_in_order():
+                return super().invoke(ctx)
         except KinfmuError as error:
             click.echo(f"kinfmu: {one_line(error)}", err=True)
             ctx.exit(1)
         except MemoryError:
             click.echo("kinfmu: there is not enough memory for so large a mechanism", err=True)
             ctx.exit(1)
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """SIGTERM and SIGHUP end this block as an exception does, so that no half-written file stays behind."""
+
+    def end(number: int, _frame: Any) -> NoReturn:
+        click.echo(f"kinfmu: ended by {signal.Signals(number).name}", err=True)
+        raise SystemExit(128 + number)  # as shells count
+
+    changed = []
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)  # Windows has no SIGHUP
+            if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+                signal.signal(number, end)
+                changed.append(number)
+    try:
+        yield
+    finally:
+        for number in changed:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

@@ -11,6 +11,7 @@ from kinfmu.cli.arguments import MECHANISM
 from kinfmu.cli.files import OutputFile, exists
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
+from kinfmu.whole_file import write_whole
 
 
 @main.command(epilog="Example: kinfmu new fourbar mine.toml")
@@ -28,7 +29,7 @@ def new(mechanism: str, file: Path) -> None:
         if ":" in mechanism and gallery.has(mechanism):  # a chain, which no file holds
             gallery.save(gallery.load(mechanism), file)
         else:
-            file.write_bytes(source.read_bytes())
+            write_whole(file, source.read_bytes())
     except OSError as error:
         raise KinfmuError(f"{file}: cannot be written ({error.strerror})") from None
     click.echo(f"{file}: written; next: kinfmu check {file}")

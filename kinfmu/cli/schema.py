@@ -9,6 +9,7 @@ import click
 from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
+from kinfmu.whole_file import write_whole
 
 
 @main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")
@@ -24,7 +25,7 @@ def schema(output: Path | None) -> None:
         click.echo(schema_text(), nl=False)
         return
     try:
-        output.write_text(schema_text(), encoding="utf-8", newline="\n")
+        write_whole(output, schema_text().encode())
     except OSError as error:
         raise KinfmuError(f"{output}: cannot be written ({error.strerror})") from None
     click.echo(f"{output}: written; a mechanism file names it in its first line: #:schema {output}")

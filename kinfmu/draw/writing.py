@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from kinfmu.errors import FigureError, MissingPackageError, listed
 from kinfmu.suffix import suffix_of
+from kinfmu.whole_file import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +52,7 @@ def house_style(path: Path) -> Iterator[None]:
 def write_bytes(path: Path, image: bytes) -> None:
     """Write a picture; a FigureError if the file cannot be written."""
     try:
-        path.write_bytes(image)
+        write_whole(path, image)
     except OSError as error:
         raise FigureError(f"{path}: cannot be written ({error.strerror or error})") from None
 

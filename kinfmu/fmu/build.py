@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from kinfmu.joints.laws import External
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.suffix import suffix_of
+from kinfmu.whole_file import write_whole
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -98,11 +98,8 @@ def _file(path: str | Path | None, name: str) -> Path:
 
 def _write(path: Path, data: bytes) -> None:
     """The whole file or none: a host never sees half an FMU."""
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.write_bytes(data)
-        unfinished.replace(path)
+        write_whole(path, data)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise FmuError(f"{path}: cannot be written ({error.strerror})") from None

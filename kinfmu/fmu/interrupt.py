@@ -1,31 +1,50 @@
-"""Ctrl-C while foreign code runs: noted, and acted upon where it can be."""
+"""Signals that end a process, while foreign code runs: noted, and acted upon where it can be."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from types import TracebackType
 from typing import Any
 
+ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # no SIGHUP on Windows
 
-@contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
-    """Within it Ctrl-C is only noted; the function that is given tells whether it came.
 
-    A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Outside the main thread, where Python
-    does not deliver signals, nothing is changed.
+class Interruption:
+    """Notes Ctrl-C, SIGTERM and SIGHUP in a `with` block; true once one came.
+
+    A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Ignored signals stay ignored. Outside
+    the main thread, where Python does not deliver signals, nothing is changed.
     """
-    came: list[int] = []
 
-    def note(number: int, _frame: Any) -> None:
-        came.append(number)
+    def __init__(self) -> None:
+        self._came: list[int] = []
+        self._before: dict[int, Any] = {}
 
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-    before = signal.signal(signal.SIGINT, note)
-    try:
-        yield lambda: bool(came)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    def __bool__(self) -> bool:
+        return bool(self._came)
+
+    def __enter__(self) -> Interruption:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, *ENDING):
+                before = signal.getsignal(number)
+                if number == signal.SIGINT or before not in (signal.SIG_IGN, None):
+                    self._before[number] = before
+                    signal.signal(number, self._note)
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _traceback: TracebackType | None
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        self._before = {}
+
+    def _note(self, number: int, _frame: Any) -> None:
+        self._came.append(number)
+
+    def deliver(self) -> None:
+        """Do now what SIGTERM or SIGHUP do, if one came: end the process, as a rule."""
+        for number in self._came:
+            if number in ENDING:
+                signal.raise_signal(number)

@@ -19,7 +19,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.input_notes import input_notes, undriven
 from kinfmu.fmu.input_table import InputTable, input_table
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.interrupt import interruptible
+from kinfmu.fmu.interrupt import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST, MECHANISM, text_in, unpacked
@@ -63,7 +63,7 @@ def simulate(
     as kinfmu.log.McapLog("run.mcap"), or any other kinfmu.Sink. progress: called with (samples done, samples in all).
 
     Ctrl-C ends the run, too; what was reached is kept, with an event that says so. Before the first sample it raises
-    KeyboardInterrupt, and the sink is left alone.
+    KeyboardInterrupt, and the sink is left alone. SIGTERM and SIGHUP do the same and then what they always do.
 
     What is probably not meant (inputs that nothing drives, angles that jump by more than half a turn, radians that look
     like degrees) is told by events of level "warning" and "info".
@@ -77,38 +77,42 @@ def simulate(
     if isinstance(fmu_path, Mechanism):
         raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")
     path = Path(fmu_path)
-    with unpacked(path) as folder:
-        xml = text_in(path, folder, DESCRIPTION, LARGEST)
-        about = description.read(xml.encode(), str(path))
-        interface = about.interface
-        if wrap and inputs is None:
-            raise RequestError("wrap follows angles among the inputs, and no inputs are given")
-        table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
-        experiment = interface.experiment
-        t = _times(table or experiment, start, stop, experiment.step if step is None else step)
-        rows = np.empty((len(t), 0)) if table is None else table.at(t)
-        kept = kept_samples(t, rate)
-        settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-        text = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
-        samples = Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
-        if not _time_drives(interface, settings):
-            samples.extend(undriven(interface, table, float(t[0])))
-        if table is not None:
-            samples.extend(input_notes(interface, table, start, stop))
-        with interruptible() as interrupted:
-            with slave(about, folder, samples.log) as one:
-                _initialize(one, settings, t, samples.first_error)
-                samples.read_fixed(one)
-                if interrupted():
-                    raise KeyboardInterrupt
-                samples.begin(one, channels, sink)
-                try:
-                    driven = [] if table is None else [one.references[name] for name in table.names]
-                    _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
-                except BaseException as failure:
-                    samples.end(str(failure) or type(failure).__name__)
-                    raise
-            return samples.end()
+    interrupted = Interruption()
+    try:
+        with unpacked(path) as folder:
+            xml = text_in(path, folder, DESCRIPTION, LARGEST)
+            about = description.read(xml.encode(), str(path))
+            interface = about.interface
+            if wrap and inputs is None:
+                raise RequestError("wrap follows angles among the inputs, and no inputs are given")
+            table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
+            experiment = interface.experiment
+            t = _times(table or experiment, start, stop, experiment.step if step is None else step)
+            rows = np.empty((len(t), 0)) if table is None else table.at(t)
+            kept = kept_samples(t, rate)
+            settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
+            text = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
+            samples = Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
+            if not _time_drives(interface, settings):
+                samples.extend(undriven(interface, table, float(t[0])))
+            if table is not None:
+                samples.extend(input_notes(interface, table, start, stop))
+            with interrupted:
+                with slave(about, folder, samples.log) as one:
+                    _initialize(one, settings, t, samples.first_error)
+                    samples.read_fixed(one)
+                    if interrupted:
+                        raise KeyboardInterrupt
+                    samples.begin(one, channels, sink)
+                    try:
+                        driven = [] if table is None else [one.references[name] for name in table.names]
+                        _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
+                    except BaseException as failure:
+                        samples.end(str(failure) or type(failure).__name__)
+                        raise
+                return samples.end()
+    finally:
+        interrupted.deliver()
 
 
 def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> str:
@@ -227,7 +231,7 @@ def _step_through(
     inputs: list[int],
     rows: NDArray[np.float64],
     progress: Callable[[int, int], None] | None,
-    interrupted: Callable[[], bool],
+    interrupted: Interruption,
 ) -> None:
     """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step.
 
@@ -240,7 +244,7 @@ def _step_through(
     set_inputs = slave.setter(inputs, rows) if inputs else None
     for k, time in enumerate(times):
         samples.now = time
-        if k and interrupted():
+        if k and interrupted:
             samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
         if set_inputs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import FileIO
@@ -13,13 +14,15 @@ from kinfmu.log.target import check_room, checked, replacing, unwritable
 from kinfmu.log.verdict import status_events, unexplained
 from kinfmu.run import Event, Run
 from kinfmu.solver.status import Status
+from kinfmu.whole_file import hold
 
 
 class McapLog:
     """A sink for `simulate`: an MCAP file as `write_mcap` writes it, with a chunk in it for every piece of the run.
 
     drawn: with the topics that viewers of ROS 2 draw. The file takes the place of an older one with its first samples.
-    Of a run that was killed it holds what was added; `recover` makes a whole file of it. When it can no longer be
+    Until its end no other run takes this name. Of a run that was killed it holds what was added; `recover` makes a
+    whole file of it. When it can no longer be
     written, what was written stays, and the LogError says up to when.
     """
 
@@ -61,12 +64,23 @@ class McapLog:
 
     def _start(self, run: Run) -> None:
         """The file with its first samples: whatever fails here leaves an older file as it was."""
-        with replacing(self.path) as temporary, FileIO(temporary, "w") as file:
-            content = Content(file, run, zero_of(run.t), drawn=self._drawn, at_once=True)
-            self._put(content, run)
-        self._file = FileIO(checked(self.path), "a")
-        content.go_on_in(self._file)
-        self._content = content
+        file: FileIO | None = None
+        try:
+            with replacing(self.path) as temporary:
+                file = FileIO(temporary, "w")
+                hold(file.fileno())
+                content = Content(file, run, zero_of(run.t), drawn=self._drawn, at_once=True)
+                self._put(content, run)
+                if sys.platform == "win32":  # where an open file cannot be renamed
+                    file.close()
+        except BaseException:
+            if file:
+                file.close()
+            raise
+        if file.closed:
+            file = FileIO(checked(self.path), "a")
+            content.go_on_in(file)
+        self._file, self._content = file, content
 
     def _put(self, content: Content, run: Run) -> None:
         content.add(run)

@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
+_ENCODING = "Failed to encode LogMsg: "  # Rerun's words
+
 
 def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it.
@@ -99,7 +101,10 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
         rec = rr.RecordingStream(application, recording_id=f"{Path(path).stem}-{uuid4()}")
         rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
         rec.set_log_tick_enabled(False)
-        rec.save(temporary, default_blueprint=layout)
+        try:
+            rec.save(temporary, default_blueprint=layout)
+        except RuntimeError as error:  # what Rerun makes of an OSError
+            raise LogError(f"{path}: cannot be written ({str(error).removeprefix(_ENCODING)})") from error
         rec.send_recording_name(name)
         try:
             yield rec

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 from kinfmu.errors import LogError
+from kinfmu.whole_file import beside, check_is_free, replacement
 
 
 @contextmanager
@@ -19,16 +19,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
     written is a LogError.
     """
     target = checked(path)
-    temporary = _beside(target)
     try:
-        temporary.open("xb").close()  # not tempfile: its files are readable by nobody else
-        yield temporary
-        temporary.replace(target)
+        with replacement(target) as temporary:
+            yield temporary
     except OSError as error:
         raise unwritable(path, error) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def checked(path: str | Path) -> Path:
@@ -44,9 +39,11 @@ def checked(path: str | Path) -> Path:
 
 
 def check_room(path: str | Path) -> None:
-    """LogError if no file can be made where `path` is to be."""
-    temporary = _beside(checked(path))
+    """LogError if no file can be made where `path` is to be, or if another run is being written to it."""
+    target = checked(path)
+    temporary = beside(target)
     try:
+        check_is_free(target)
         temporary.open("xb").close()
         temporary.unlink()
     except OSError as error:
@@ -56,7 +53,3 @@ def check_room(path: str | Path) -> None:
 def unwritable(path: str | Path, error: OSError, more: str = "") -> LogError:
     """What is told when a file cannot be written."""
     return LogError(f"{path}: cannot be written ({error.strerror or error}){more}")
-
-
-def _beside(target: Path) -> Path:
-    return target.with_name(f".{target.stem}.{uuid4().hex[:8]}{target.suffix}")

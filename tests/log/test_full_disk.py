@@ -18,7 +18,7 @@ from tests.log.runs import fourbar
 run, path = fourbar(np.arange(0.0, 180.0, 0.02)), sys.argv[1]
 write = {"mcap": write_mcap, "rrd": write_rrd}.get(path.rpartition(".")[2], write_table)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
 try:
     write(run, path)
 except LogError as error:
@@ -27,12 +27,14 @@ except LogError as error:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
-@pytest.mark.parametrize("suffix", ["mcap", "rrd", "csv", "parquet", "npz"])
-def test_a_file_that_finds_no_room_is_one_clear_line(suffix: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("suffix", "room"), [*((suffix, 200_000) for suffix in ("mcap", "rrd", "csv", "parquet", "npz")), ("rrd", 1)]
+)
+def test_a_file_that_finds_no_room_is_one_clear_line(suffix: str, room: int, tmp_path: Path) -> None:
     path = tmp_path / f"run.{suffix}"
     path.write_bytes(b"old")
     told = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(path)],
+        [sys.executable, "-c", PROGRAM, str(path), str(room)],
         capture_output=True,
         text=True,
         check=True,

@@ -1,0 +1,95 @@
+"""Files that appear whole or not at all: written beside the target under a hidden name, then renamed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from uuid import uuid4
+
+try:
+    import fcntl
+except ImportError:  # Windows, where a file that is open cannot be replaced
+    fcntl = None  # type: ignore[assignment]
+
+
+class BeingWrittenError(OSError):
+    """Another process, or another sink of this one, writes to the file."""
+
+    def __init__(self) -> None:
+        super().__init__("a run that goes on writes to it; choose another name, or wait until it has ended")
+        self.strerror = self.args[0]
+
+
+def write_whole(path: str | Path, data: bytes) -> None:
+    """Write a file; an OSError leaves an older one as it was. What is no file, such as /dev/stdout, is written to."""
+    path = Path(path)
+    if path.exists() and not path.is_file():
+        path.write_bytes(data)
+        return
+    with replacement(Path(os.path.realpath(path))) as temporary:  # a link stays a link
+        temporary.write_bytes(data)
+
+
+@contextmanager
+def replacement(target: Path) -> Iterator[Path]:
+    """Give an empty file beside `target` that takes its place when the block ends without an error.
+
+    target: the file itself, no link to it. Raises an OSError if a file cannot be written or is being written to.
+    """
+    temporary = beside(target)
+    try:
+        temporary.open("xb").close()  # not tempfile: its files are readable by nobody else
+        yield temporary
+        with _alone_in(target.parent):
+            check_is_free(target)
+            temporary.replace(target)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def beside(target: Path) -> Path:
+    """Return a hidden name in the same folder that no other file has."""
+    return target.with_name(f".{target.stem[:100]}.{uuid4().hex[:8]}{target.suffix}")
+
+
+def hold(descriptor: int) -> None:
+    """Mark an open file as being written to, until it is closed or its process ends."""
+    if fcntl:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def check_is_free(target: Path) -> None:
+    """Raise BeingWrittenError if `hold` marks the file."""
+    if not fcntl:
+        return
+    try:
+        descriptor = os.open(target, os.O_RDONLY | os.O_NONBLOCK)
+    except OSError:  # no such file, or none that can be read
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BeingWrittenError from None
+    except OSError:  # a file system without locks
+        return
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """In this block no other process is in such a block for the same folder."""
+    descriptor = -1
+    if fcntl:
+        with suppress(OSError):
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if descriptor >= 0:
+            os.close(descriptor)
