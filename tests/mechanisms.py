@@ -214,3 +214,27 @@ def uneven_chain(count: int) -> Mechanism:
             Revolute(f"Q_{k}", (f"coupler_{k}.Q", f"bar_{k}.P")),
         ]
     return Mechanism("uneven_chain", bodies, joints, [AngleDriver("crank", "bar_0", ConstantSpeed(first, 1.0))])
+
+
+def wheels(rods: dict[str, tuple[int, int, float]], *, start: float = 0.5, second: bool = False) -> Mechanism:
+    """Equal wheels of radius 0.5, 2 apart, that rods couple: name -> (wheel, other wheel, direction of the pin [rad]).
+
+    second: beside them an arm with a driver of its own.
+    """
+    count, angle = 1 + max(wheel for _, wheel, _ in rods.values()), start
+    pins: list[dict[str, tuple[float, float]]] = [{f"O{k}": (0.0, 0.0)} for k in range(count)]
+    links, joints = [], [Revolute(f"O{k}", (f"ground.O{k}", f"wheel{k}.O{k}")) for k in range(count)]
+    for name, (first, last, turn) in rods.items():
+        for wheel, letter in ((first, "P"), (last, "Q")):
+            pins[wheel][f"{letter}{name}"] = (0.5 * math.cos(turn), 0.5 * math.sin(turn))
+            joints.append(Revolute(f"{letter}{name}", (f"wheel{wheel}.{letter}{name}", f"rod{name}.{letter}{name}")))
+        x, y = 2.0 * first + 0.5 * math.cos(angle + turn), 0.5 * math.sin(angle + turn)
+        links.append(Body(f"rod{name}", {f"P{name}": (0, 0), f"Q{name}": (2.0 * (last - first), 0)}, (x, y, 0.0)))
+    bodies = [Body(f"wheel{k}", pins[k], (2.0 * k, 0.0, angle)) for k in range(count)] + links
+    drivers = [AngleDriver("crank", "wheel0", ConstantSpeed(start, 1.0))]
+    if second:
+        bodies.append(Body("arm", {"S": (0, 0)}, (0.0, 3.0, 0.0)))
+        joints.append(Revolute("S", ("ground.S", "arm.S")))
+        drivers.append(AngleDriver("arm", "arm", ConstantSpeed(0.0, 1.0)))
+    pivots = {f"O{k}": (2.0 * k, 0.0) for k in range(count)} | ({"S": (0.0, 3.0)} if second else {})
+    return Mechanism("wheels", [Body("ground", pivots), *bodies], joints, drivers)

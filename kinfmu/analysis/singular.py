@@ -117,31 +117,28 @@ def _kind(limit: Limit) -> str:
 
 
 def _change_point(way: Way, bridge: Bridge) -> SingularPoint:
-    """The zero of the determinant inside a bridge's window, by bisection on interpolated poses."""
+    """The zero of the determinant inside a bridge's window, by thirds: its size falls straight to it."""
     low, high = bridge.centre - 0.999 * bridge.half, bridge.centre + 0.999 * bridge.half
     block = _block(bridge)
-    at_low = _determinant(bridge, low, block)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        at_middle = _determinant(bridge, middle, block)
-        if at_middle == 0.0:
-            low = high = middle
-        elif (at_middle < 0.0) == (at_low < 0.0):
-            low = middle
+    for _ in range(90):
+        third = (high - low) / 3.0
+        if _determinant(bridge, low + third, block) < _determinant(bridge, high - third, block):
+            high -= third
         else:
-            high = middle
+            low += third
     return SingularPoint(0.5 * (low + high), "change point", block + 1, way.name)
 
 
 def _block(bridge: Bridge) -> int:
-    """The block whose determinant changes its sign."""
-    before, after = bridge.nodes[2].determinants, bridge.nodes[3].determinants
-    return next(k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a * b < 0.0)
+    """The block that is interpolated; of several the one whose determinant is the smallest beside the point."""
+    held = [block for block in range(len(bridge.nodes[2].determinants)) if bridge.span.held >> block & 1]
+    return min(held, key=lambda block: abs(bridge.nodes[2].determinants[block]))
 
 
 def _determinant(bridge: Bridge, u: float, block: int) -> float:
+    """Its size."""
     pose: Pose = bridge.pose((u,))
-    return float(pose.determinants[block])
+    return abs(float(pose.determinants[block]))
 
 
 def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.equations.system import System
 from kinfmu.naming import derivative_name
-from kinfmu.plan.structure import BlockStructure, RowTracer, given_value
+from kinfmu.plan.companions import BlockStructure
+from kinfmu.plan.structure import RowTracer, given_value
 from kinfmu.plan.trace import Tracer
 
 _DETERMINANT_SAMPLES = 48
@@ -27,7 +28,8 @@ class Block:
         acceleration   J zdd = -acceleration  acceleration (m,): second rate of r with zdd = 0
 
     assigned: coordinate -> its position, rate and acceleration as nodes, in the order of evaluation. row_scales:
-    residual per mechanism size. Symbols are coordinates, rates and accelerations under their contract names.
+    residual per mechanism size; 1 for least squares, whose rows are relative to the size themselves. Symbols are
+    coordinates, rates and accelerations under their contract names.
     """
 
     assigned: tuple[tuple[str, tuple[Node, Node, Node]], ...]
@@ -104,6 +106,10 @@ def build_block(
     solved = (*structure.rows, *structure.companions)
     unknowns = [tracer.symbols[name] for name in structure.unknowns]
     residuals = [row(index, known) for index in solved]
+    scales = tuple(float(system.rows[index].scale * system.size) for index in solved)
+    if structure.companions:  # least squares weigh lengths against angles: as pure numbers
+        residuals = [residual / scale for residual, scale in zip(residuals, scales, strict=True)]
+        scales = (1.0,) * len(scales)
     one = tracer.graph.constant(1.0)
     columns = [tracer.graph.derivative(residuals, {unknown: one}) for unknown in unknowns]
     jacobian = tuple(zip(*columns, strict=True)) if columns else ()
@@ -113,7 +119,7 @@ def build_block(
         unknowns=structure.unknowns,
         row_names=tuple(system.rows[index].name for index in solved),
         assigned_by=tuple(system.rows[index].name for _, index in structure.assigned),
-        row_scales=tuple(float(system.rows[index].scale * system.size) for index in solved),
+        row_scales=scales,
         residuals=tuple(residuals),
         jacobian=jacobian,
         velocity=tuple(rates.of(residuals, at_rest=unknowns)),

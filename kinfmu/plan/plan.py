@@ -217,7 +217,7 @@ def plan_from(
     anchor = find_anchor(system)
     tracer = Tracer(local)
     set_aside = [row.index for row in redundancy.redundant]
-    structure = find_structure(system, tracer, redundancy.kept, set_aside)
+    structure = find_structure(system, tracer, redundancy, anchor.q)
     known = structure.fixed
     rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)

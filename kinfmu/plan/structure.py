@@ -12,28 +12,11 @@ from dataclasses import dataclass
 
 from kinfmu.equations.blocks import ordered_blocks
 from kinfmu.equations.graph import Node, symbols
-from kinfmu.equations.system import System
+from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import MobilityError, listed
+from kinfmu.plan.companions import BlockStructure, with_companions
 from kinfmu.plan.trace import Tracer, is_parameter
-
-
-@dataclass(frozen=True)
-class BlockStructure:
-    """Rows solved together, by index into System.rows.
-
-    assigned: (coordinate, row) in the order of evaluation: the row gives the coordinate outright. unknowns: coordinates
-    left for Newton, with their rows; companions: rows set aside whose joint keeps another row here, solved along by
-    least squares.
-    """
-
-    assigned: tuple[tuple[str, int], ...]
-    unknowns: tuple[str, ...]
-    rows: tuple[int, ...]
-    companions: tuple[int, ...] = ()
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        return (*(name for name, _ in self.assigned), *self.unknowns)
+from kinfmu.redundancy import Redundancy
 
 
 @dataclass(frozen=True)
@@ -63,9 +46,12 @@ class RowTracer:
         return self.tracer.driver(self.tracer.drivers[number], known)
 
 
-def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_aside: Sequence[int]) -> Structure:
-    """Order of solving the kept joint rows and the driver rows; rows set aside may join a block as companions."""
-    row = RowTracer(system, tracer)
+def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose: FloatArray) -> Structure:
+    """Order of solving the kept joint rows and the driver rows; redundant rows may join a block as companions.
+
+    pose: closed, (n,).
+    """
+    row, kept = RowTracer(system, tracer), redundancy.kept
     known, used = _constants(system, tracer, row, kept)
     driving = range(system.joint_row_count, len(system.rows))
     open_rows = [index for index in (*kept, *driving) if index not in used]
@@ -84,7 +70,11 @@ def find_structure(system: System, tracer: Tracer, kept: Sequence[int], set_asid
         _torn(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
         for rows, columns in order.blocks
     ]
-    return Structure(known, tuple(_with_companions(system, row, known, blocks, kept, set_aside)))
+
+    def met(index: int) -> list[str]:
+        return [symbol.name for symbol in symbols([row(index, known)])]
+
+    return Structure(known, tuple(with_companions(system, met, blocks, redundancy, pose)))
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:
@@ -176,27 +166,3 @@ def _reaches(needs: Mapping[str, set[str]], start: set[str], goal: str) -> bool:
         seen |= new
         stack += new
     return False
-
-
-def _with_companions(
-    system: System,
-    row: RowTracer,
-    known: Mapping[str, Node],
-    blocks: Sequence[BlockStructure],
-    kept: Sequence[int],
-    set_aside: Sequence[int],
-) -> list[BlockStructure]:
-    """Blocks with the rows set aside whose joint keeps another row: dropping one axis of a pin by file order would make
-    singular points that the mechanism has not, so the last block that the row meets solves it along.
-    """
-    home = {name: k for k, block in enumerate(blocks) for name in block.coordinates}
-    owners = {system.rows[index].owner for index in kept}
-    companions: dict[int, list[int]] = {}
-    for index in set_aside:
-        met = [home[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in home]
-        if system.rows[index].owner in owners and met and blocks[max(met)].unknowns:
-            companions.setdefault(max(met), []).append(index)
-    return [
-        BlockStructure(block.assigned, block.unknowns, block.rows, tuple(companions.get(k, ())))
-        for k, block in enumerate(blocks)
-    ]

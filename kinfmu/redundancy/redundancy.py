@@ -81,8 +81,10 @@ def find_redundancy(system: System) -> Redundancy:
     u = np.zeros(len(system.mechanism.drivers))
     for index, implying in reversed(suspects.items()):
         others = [k for k in kept if k != index]
-        found = _poses_of_dependence(system, start, index, implying) if implying else None
-        found = found or _poses_of_dependence(system, start, index, others)
+        joints = {system.member_of[row] for row in (*implying, index)}
+        of_joints = [k for k in others if system.member_of[k] in joints]  # in one pose some of them have no weight
+        companies = [implying, of_joints, others] if implying else [others]
+        found = next(filter(None, (_poses_of_dependence(system, start, index, rows) for rows in companies)), None)
         if found is None:
             continue
         poses, rows = found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
+from .linear import orientation
 from .message import LOCATED, ROUGHLY, differs, place
 from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road, position
 from .road import Road, Searched
@@ -133,11 +134,22 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
+    if model.TALL and _turns_over(model, pose, trial):
+        return None
     if trial.moved > UNDOUBTED:
         for second, scale in zip(zdd, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, both
             if abs(second) * s * s > 2.0 * BENT * scale:
                 return None
     return trial
+
+
+def _turns_over(model: Model, pose: Pose, trial: Pose) -> bool:
+    """True if the columns of a block's J change their orientation from a pose to another, det(J^T J') <= 0.
+
+    The determinant of a block of more rows than unknowns has no sign by which a crossing in between could be seen.
+    """
+    here, there = model.jacobians(pose.values), model.jacobians(trial.values)
+    return any(orientation(here[block], there[block]) <= 0.0 for block in model.TALL)
 
 
 def keeps_branch(model: Model, pose: Pose, trial: Pose, direction: Vector, s: float) -> bool:

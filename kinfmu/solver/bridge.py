@@ -190,8 +190,10 @@ def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float, w
             return None
         near.append(arrived)
     far = _crossed(model, centre, half, side, near)
-    if far is None or near[-1].determinants[block] * far[0].determinants[block] >= 0.0:
-        return None  # not reached, or touched and not crossed: no change point of two smooth branches
+    if far is None:
+        return None
+    if near[-1].determinants[block] * far[0].determinants[block] >= 0.0 and block not in model.TALL:
+        return None  # touched and not crossed: no change point of two smooth branches
     return Span(model, centre, half, near + far if side > 0.0 else (near + far)[::-1])
 
 

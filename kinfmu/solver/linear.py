@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from operator import mul
 
 Matrix = list[list[float]]
 
@@ -126,17 +127,28 @@ def _reflect(reflector: list[float], square: float, column: list[float]) -> None
         column[i] -= weight * entry
 
 
+def orientation(a: Matrix, b: Matrix) -> float:
+    """det(A^T B) of two tall matrices over the lengths of its rows: negative if their columns turn the other way."""
+    columns = list(zip(*b, strict=True))
+    product = [[sum(map(mul, one, other)) for other in columns] for one in zip(*a, strict=True)]
+    try:
+        return factor(product).determinant
+    except Singular:
+        return 0.0
+
+
 def reciprocal_condition(matrix: Matrix) -> float:
     """1 / cond of the equilibrated matrix (rows, then columns, scaled to unit length), in the 1-norm; 0 if singular.
 
-    For a tall matrix that of R in A = QR.
+    For a tall matrix that of R in A = QR, its rows as they are: where one of them vanishes the others carry the block,
+    and what rounding leaves of it must not count.
     """
     m, k = len(matrix), len(matrix[0])
     if m == k == 2:
         return _reciprocal_condition_of_two(matrix)
     rows = []
     for row in matrix:
-        length = sqrt(sum(entry * entry for entry in row))
+        length = 1.0 if m > k else sqrt(sum(entry * entry for entry in row))
         rows.append([entry / length for entry in row] if length > 0.0 else row)
     for j in range(k):
         length = sqrt(sum(row[j] * row[j] for row in rows))

@@ -55,3 +55,12 @@ def test_reciprocal_condition_is_that_of_the_equilibrated_matrix(k: int) -> None
     columns = rows / np.linalg.norm(rows, axis=0, keepdims=True)
     assert reciprocal_condition(a.tolist()) == pytest.approx(1.0 / np.linalg.cond(columns, 1), rel=1e-12)
     assert reciprocal_condition([[1.0] * k for _ in range(k)]) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_row_of_a_tall_matrix_that_vanishes_but_for_rounding_does_not_count_in_its_condition() -> None:
+    a = np.random.default_rng(3).normal(size=(4, 3))
+    a[3] = 0.0
+    without = reciprocal_condition(a.tolist())
+    a[3] = [1e-17, -3e-17, 2e-17]
+    assert reciprocal_condition(a.tolist()) == pytest.approx(without, rel=1e-12)
+    assert without == pytest.approx(1.0 / np.linalg.cond(np.linalg.qr(a[:3] / np.linalg.norm(a[:3], axis=0))[1], 1))

@@ -8,6 +8,8 @@ from dataclasses import replace
 from fractions import Fraction
 from random import Random
 
+import numpy as np
+
 from kinfmu import (
     AngleDriver,
     ConstantSpeed,
@@ -26,6 +28,12 @@ from tests.stress.jets import Exact, Jet, Numbers, Vector, turned
 from tests.stress.loops import Closing, between, in_slot, on_arm, on_level, on_slide
 
 ENDS = (0.0, math.pi)  # of an arm: stretched toward its pivot and away from it
+_HEADINGS = [  # exact directions
+    (x * Fraction(a, c), y * Fraction(b, c))
+    for a, b, c in ((1, 0, 1), (0, 1, 1), (3, 4, 5), (4, 3, 5), (5, 12, 13), (12, 5, 13), (20, 21, 29))
+    for x in (1, -1)
+    for y in (1, -1)
+]
 KINDS = ("double crank", "crank-rocker", "double rocker", "rocker-crank", "triple rocker")
 ORIGIN: tuple[Exact, Exact] = (0, 0)
 Poses = Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
@@ -427,7 +435,10 @@ def geared_five_bars(rng: Draw) -> Sketch:
 
 
 def redundant_parallelograms(rng: Draw) -> Sketch:
-    """Parallel cranks with a third bar, as a distance or as a body, that adds nothing; on one line or beside it."""
+    """Parallel cranks with a third bar, as a distance or as a body, that adds no freedom and takes none.
+
+    Beside the line of the cranks it carries the coupler where they are stretched: no branches cross.
+    """
     g, a = drawn_length(rng, 0.3, 2.0), drawn_length(rng, 0.3, 2.0)
     third = (drawn_length(rng, -2.0, 3.0), Fraction(0) if rng.random() < 0.6 else drawn_length(rng, -1.0, 1.0))
     if third[0] in (0, g):
@@ -435,7 +446,8 @@ def redundant_parallelograms(rng: Draw) -> Sketch:
     is_body = rng.random() < 0.5
 
     def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
-        closing.sines.append(u[0].sin_cos()[0].d0)
+        across = [np.abs(turned(u[0], numbers.number(x), numbers.number(-y)).y.d0) for x, y in ((g, 0), third)]
+        closing.sines.append(np.maximum(*across) if third[1] else across[0])
         moving = {
             "crank": Pose(Vector(0, 0), u[0]),
             "coupler": Pose(turned(u[0], numbers.number(a)), u[0] * numbers.number(0)),
@@ -457,6 +469,66 @@ def redundant_parallelograms(rng: Draw) -> Sketch:
     if is_body:
         points["bar"] = {"B": ORIGIN, "A": (a, 0)}
     return Sketch(points, poses, _turns("crank"), joints, marks=ENDS)
+
+
+def coupled_wheels(rng: Draw) -> Sketch:
+    """Equal wheels in a row, each coupled to the next by two rods whose pins are not in line with the wheel's centre.
+
+    One rod of a pair is redundant, and carries the wheels where the other is in its dead centre: regular everywhere.
+    Rods are bodies or distances; some stand beside an arm with a driver of its own.
+    """
+    pitch, pairs, with_arm = drawn_length(rng, 0.5, 2.0), rng.randrange(1, 4), rng.random() < 0.3
+    points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {}}
+    bars: list[tuple[int, str, tuple[Fraction, Fraction], bool]] = []  # (wheel, name, pin, whether it is a body)
+    for k in range(pairs + 1):
+        points["ground"][f"O{k}"] = (k * pitch, 0)
+        points[f"wheel{k}"] = {f"O{k}": ORIGIN}
+    for k in range(pairs):
+        first, second = (
+            (radius * c, radius * s)
+            for radius, (c, s) in zip(
+                (drawn_length(rng, 0.2, 1.0), drawn_length(rng, 0.2, 1.0)), rng.sample(_HEADINGS, 2), strict=True
+            )
+        )
+        across = abs(first[0] * second[1] - first[1] * second[0])
+        if across**2 < Fraction(1, 16) * (first[0] ** 2 + first[1] ** 2) * (second[0] ** 2 + second[1] ** 2):
+            raise RedrawError  # less than 15 degrees between them
+        for name, pin in (("A", first), ("B", second)):
+            bars.append((k, f"{name}{k}", pin, rng.random() < 0.5))
+            for wheel, letter in ((k, "P"), (k + 1, "Q")):
+                points[f"wheel{wheel}"][f"{letter}{name}{k}"] = pin
+            if bars[-1][-1]:
+                points[f"rod{name}{k}"] = {f"P{name}{k}": ORIGIN, f"Q{name}{k}": (pitch, 0)}
+    if with_arm:
+        points["ground"]["S"] = (0, drawn_length(rng, 1.0, 2.0))
+        points["arm"] = {"S": ORIGIN}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = {f"wheel{k}": Pose(standing(numbers, k * pitch, 0, u[0]), u[0]) for k in range(pairs + 1)}
+        heights = []
+        for wheel, name, pin, is_body in bars:
+            at = turned(u[0], *map(numbers.number, pin))
+            heights.append(np.abs(at.y.d0))  # 0 at the rod's dead centre
+            if is_body:
+                moving[f"rod{name}"] = Pose(at + standing(numbers, wheel * pitch, 0, u[0]), u[0] * numbers.number(0))
+        closing.sines += [np.maximum(*pair) for pair in zip(heights[::2], heights[1::2], strict=True)]
+        if with_arm:
+            moving["arm"] = Pose(standing(numbers, *points["ground"]["S"], u[1]), u[1])
+        return moving
+
+    def joints(frame: Frame) -> tuple[Joint, ...]:
+        return tuple(
+            Distance(name, (f"wheel{wheel}.P{name}", f"wheel{wheel + 1}.Q{name}"), frame.length(pitch))
+            for wheel, name, _, is_body in bars
+            if not is_body
+        )
+
+    def drivers(_: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        bodies = ("wheel0", "arm") if with_arm else ("wheel0",)
+        pairs = zip(bodies, start, strict=True)
+        return tuple(AngleDriver(f"drive_{body}", body, ConstantSpeed(value, 1.0)) for body, value in pairs)
+
+    return Sketch(points, poses, drivers, joints, kinds=("angle", "angle") if with_arm else ("angle",))
 
 
 # ------------------------------------------------------------------------------------- cylinders, several drivers
@@ -581,7 +653,7 @@ def starts_anywhere(rng: Draw) -> Sketch:
 
 FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often of a hundred
     "four-bars": (four_bars, 16),
-    "change points": (change_points, 14),
+    "change points": (change_points, 10),
     "near change points": (near_change_points, 9),
     "slider-cranks": (slider_cranks, 8),
     "crank = rod": (crank_and_rod, 9),
@@ -592,6 +664,7 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "chains": (chains, 6),
     "geared five-bars": (geared_five_bars, 4),
     "redundant parallelograms": (redundant_parallelograms, 5),
+    "coupled wheels": (coupled_wheels, 4),
     "five-bars": (five_bars, 4),
     "robots": (robots, 4),
     "cylinders": (cylinders, 4),

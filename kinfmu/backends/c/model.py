@@ -61,6 +61,7 @@ def _sizes(parts: Parts) -> str:
         "PARAMETERS": len(plan.parameters),
         "DERIVED": len(parts.derived),
         "CONSTANTS": len(plan.law_constants),
+        "TALL": int(any(len(block.residuals) > len(block.unknowns) for block in solved)),
         "LARGEST_BLOCK": max((len(block.residuals) * len(block.unknowns) for block in solved), default=0),
     }
     offset = max(map(abs, plan.origin)) / plan.size

@@ -61,6 +61,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"BLOCKS = {tuple(places(solved))!r}",
         f"ANCHOR = {(anchor_u, anchor_z)!r}",
         f"ROW_SCALES = {scales!r}",
+        f"TALL = {tuple(k for k, b in enumerate(solved) if len(b.residuals) > len(b.unknowns))!r}",
         *([f"ROWS = {rows!r}"] if plan.parameters else []),
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",

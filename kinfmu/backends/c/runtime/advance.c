@@ -9,6 +9,28 @@
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
 #define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
 
+/* True if the columns of a block's J change their orientation from a pose to another, det(J^T J') <= 0.
+ *
+ * The determinant of a block of more rows than unknowns has no sign by which a crossing in between could be seen.
+ */
+static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose *trial)
+{
+    double here[KF_ROOM(KF_LARGEST_BLOCK)], there[KF_ROOM(KF_LARGEST_BLOCK)];
+    int block, first = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
+        if (rows > columns) {
+            kf_jacobian(model, &pose->found, block, here);
+            kf_jacobian(model, &trial->found, block, there);
+            if (kf_orientation(rows, columns, here, there) <= 0.0) {
+                return true;
+            }
+        }
+        first = kf_block_ends[block];
+    }
+    return false;
+}
+
 /* One step of predict and correct; false if it cannot be trusted to stay on the branch. */
 inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial)
@@ -39,6 +61,9 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
         if (before > 0.0 ? after < KF_FALL * before : after > KF_FALL * before) {
             return false;
         }
+    }
+    if (KF_TALL && turns_over(model, pose, trial)) {
+        return false;
     }
     for (k = 0; trial->found.moved > UNDOUBTED && k < KF_UNKNOWNS; ++k) {
         if (fabs(x2[k]) * s * s > 2.0 * BENT * kf_unknown_scales[k]) {

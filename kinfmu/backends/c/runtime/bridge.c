@@ -206,6 +206,12 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
     return false;
 }
 
+/* True for a block of more rows than unknowns: its determinant is never negative, and falls to a crossing too. */
+static bool is_tall(int block)
+{
+    return kf_block_rows[block] > kf_block_ends[block] - (block > 0 ? kf_block_ends[block - 1] : 0);
+}
+
 /* Poses at 1, 2, 4 half widths on the far side: each extrapolated from the last known ones, then corrected. */
 static bool cross(kf_solver *solver, kf_span *span, double side, int block)
 {
@@ -237,7 +243,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
         }
         kf_span_node(span, node, pose, &solver->model);
     }
-    return determinants[0][block] * determinants[1][block] < 0.0; /* else touched and not crossed */
+    return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else touched and not crossed */
 }
 
 /* A span of one width over the zero of a block's determinant, from the side that the pose is on. */

@@ -126,6 +126,7 @@ bool kf_qr(int m, int k, const double *matrix, double *factors, double *determin
 void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x);
 double kf_row_part(int k, const double *matrix, const double *usual);
 double kf_column_part(int m, int k, const double *matrix, const double *usual);
+double kf_orientation(int m, int k, const double *a, const double *b);
 double kf_reciprocal_condition(int m, int k, double *matrix);
 
 #endif

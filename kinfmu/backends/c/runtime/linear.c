@@ -228,8 +228,26 @@ static double reciprocal_condition_of_two(const double *matrix)
     return fabs(a * d - b * c) / (norm * inverse_norm);
 }
 
+/* det(A^T B) of two tall matrices over the lengths of its rows: negative if their columns turn the other way. */
+double kf_orientation(int m, int k, const double *a, const double *b)
+{
+    double product[KF_ROOM(KF_LARGEST_BLOCK)], factors[3 * KF_ROOM(KF_LARGEST_BLOCK)], determinant;
+    int i, j, row;
+    for (i = 0; i < k; ++i) {
+        for (j = 0; j < k; ++j) {
+            double sum = 0.0;
+            for (row = 0; row < m; ++row) {
+                sum += a[row * k + i] * b[row * k + j];
+            }
+            product[i * k + j] = sum;
+        }
+    }
+    return kf_lu(k, product, factors, &determinant) ? determinant : 0.0;
+}
+
 /* 1 / cond of the equilibrated A (m, k) (rows, then columns, scaled to unit length), in the 1-norm; 0 if it is
- * singular. For a tall matrix that of R in A = QR. A is overwritten.
+ * singular. For a tall matrix that of R in A = QR, its rows as they are: where one of them vanishes the others carry
+ * the block, and what rounding leaves of it must not count. A is overwritten.
  */
 double kf_reciprocal_condition(int m, int k, double *matrix)
 {
@@ -240,7 +258,7 @@ double kf_reciprocal_condition(int m, int k, double *matrix)
         return reciprocal_condition_of_two(matrix);
     }
     for (i = 0; i < m; ++i) {
-        const double length = sqrt(dot(k, matrix + i * k, matrix + i * k));
+        const double length = m > k ? 1.0 : sqrt(dot(k, matrix + i * k, matrix + i * k));
         for (j = 0; length > 0.0 && j < k; ++j) {
             matrix[i * k + j] /= length;
         }

@@ -1,0 +1,104 @@
+"""Redundant rows that carry a mechanism where the kept rows alone would be singular."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism
+from kinfmu.plan import SolvePlan, compile_plan
+from tests.mechanisms import reference_fourbar, wheels
+
+QUARTER = math.pi / 2
+LOCOMOTIVE = {"A": (0, 1, 0.0), "B": (0, 1, QUARTER)}
+IN_LINE = {"A": (0, 1, 0.0), "B": (0, 1, math.pi)}
+ROW = {f"{name}{k}": (k, k + 1, turn + 0.035 * k) for k in range(3) for name, turn in (("A", 0.0), ("B", QUARTER))}
+# A and C are in their dead centres together: B then carries the last wheel, and nothing the middle one
+MIDDLE_LOOSE = {"A": (0, 1, 0.0), "C": (1, 2, 0.0), "B": (0, 2, QUARTER)}
+ANGLES = np.radians(np.arange(-40.0, 400.0, 2.5))
+AT_ENDS = np.array([k * math.pi + off for k in (0, 1, 2) for off in (-1e-3, -1e-7, 0.0, 1e-12, 1e-5)])
+
+
+def _tall(plan: SolvePlan) -> list[tuple[int, int]]:
+    sizes = [(len(block.residuals), len(block.unknowns)) for block in plan.blocks]
+    return [(rows, unknowns) for rows, unknowns in sizes if rows > unknowns]
+
+
+@pytest.mark.parametrize(("rods", "tall"), [(LOCOMOTIVE, [(4, 3)]), (ROW, 3 * [(4, 3)]), (MIDDLE_LOOSE, [(6, 5)])])
+def test_a_rod_that_carries_joins_the_loops_that_it_is_redundant_to(
+    rods: dict[str, tuple[int, int, float]], tall: list[tuple[int, int]]
+) -> None:
+    assert _tall(compile_plan(wheels(rods))) == tall
+
+
+@pytest.mark.parametrize("mechanism", [reference_fourbar(), kinfmu.load("parallel_jaw"), kinfmu.load("fourbar_chain")])
+def test_a_redundant_row_that_is_singular_where_the_others_are_is_only_watched(mechanism: Mechanism) -> None:
+    assert _tall(compile_plan(mechanism)) == []
+
+
+def test_rods_in_line_keep_their_change_points() -> None:
+    report = kinfmu.check(wheels(IN_LINE))
+    assert [point.kind for point in report.singular] == ["change point", "change point"]
+
+
+@pytest.mark.parametrize("rods", [LOCOMOTIVE, ROW])
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("second", [False, True])
+def test_coupled_wheels_turn_alike_at_every_angle(
+    rods: dict[str, tuple[int, int, float]], engine: str, second: bool
+) -> None:
+    """Closed form: every wheel turns as the first, every rod stays parallel to itself."""
+    angles = np.concatenate([ANGLES, AT_ENDS])
+    inputs = {"crank_angle": angles, "crank_speed": 2.0, "crank_acceleration": -3.0}
+    inputs |= {"arm_angle": 0.3 * angles} if second else {}
+    run = kinfmu.solve(wheels(rods, second=second), engine=engine, **inputs)
+    assert (run.status == 0).all()
+    assert run.margin.min() > 0.2
+    for name in run.names:
+        body, _, axis = name.partition(".")
+        if axis == "phi" and body != "arm":
+            turns = body.startswith("wheel")
+            assert run[name] == pytest.approx(angles if turns else 0.0 * angles, abs=1e-14)
+            assert run[f"{body}.omega"] == pytest.approx(2.0 if turns else 0.0, abs=1e-13)
+            assert run[f"{body}.alpha"] == pytest.approx(-3.0 if turns else 0.0, abs=1e-12)
+
+
+def test_check_sees_no_singular_point_where_the_second_rod_carries() -> None:
+    assert kinfmu.check(wheels(LOCOMOTIVE)).singular == ()
+
+
+@pytest.mark.parametrize("start", [0.0, math.pi, -0.25 * math.pi])
+def test_a_start_in_the_dead_centre_of_one_rod_is_an_ordinary_start(start: float) -> None:
+    run = kinfmu.solve(wheels(LOCOMOTIVE, start=start), crank_angle=start + np.linspace(0.0, 6.3, 64))
+    assert (run.status == 0).all()
+    assert run["wheel1.phi"] == pytest.approx(run["wheel0.phi"], abs=1e-14)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_crossing_of_a_block_with_a_companion_is_bridged(engine: str) -> None:
+    """Its determinant has no sign: that steps do not pass over it unseen is judged by the columns' orientation."""
+    run = kinfmu.solve(wheels(MIDDLE_LOOSE), engine=engine, crank_angle=ANGLES)
+    assert set(run.status.tolist()) == {0, 2}
+    assert run["wheel1.phi"] == pytest.approx(ANGLES, abs=1e-12)
+    assert run["wheel1.omega"] == pytest.approx(1.0, abs=1e-10)
+    there_and_back = kinfmu.solve(wheels(MIDDLE_LOOSE), engine=engine, crank_angle=[0.5, 5.9, 3.2, -1.0, math.pi, 0.5])
+    assert there_and_back["wheel1.phi"] == pytest.approx(there_and_back["wheel0.phi"], abs=1e-12)
+
+
+def test_check_names_the_crossing_of_a_block_with_a_companion() -> None:
+    points = kinfmu.check(wheels(MIDDLE_LOOSE)).singular
+    assert [point.kind for point in points] == ["change point", "change point"]
+    assert [point.value for point in points] == pytest.approx([0.0, math.pi], abs=1e-9)
+
+
+@pytest.mark.parametrize(("flavour", "fmi"), [("python", 2), ("native", 2), ("native", 3)])
+def test_fmus_of_coupled_wheels_are_regular_at_every_angle(tmp_path: Path, flavour: str, fmi: int) -> None:
+    fmu = kinfmu.build(wheels(LOCOMOTIVE), tmp_path / "wheels.fmu", flavour=flavour, fmi=fmi)
+    run = kinfmu.simulate(fmu, stop=6.5, step=0.05)
+    assert (run.status == 0).all()
+    assert run["wheel1.phi"] == pytest.approx(run["wheel0.phi"], abs=1e-14)
+    assert run["wheel1.alpha"] == pytest.approx(0.0, abs=1e-12)
