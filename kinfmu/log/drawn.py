@@ -78,7 +78,8 @@ class LinkTopic:
             nothing = np.zeros_like(x)
             place = [metres * x, metres * y, nothing]
             numbers.append(np.column_stack([*place, nothing, nothing, np.sin(phi / 2), np.cos(phi / 2)]))
-        rows = np.flatnonzero(run.good & np.isfinite(sum(table.sum(axis=1) for table in numbers)))
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers of others may be as large as they get
+            rows = np.flatnonzero(run.good & np.isfinite(sum(table.sum(axis=1) for table in numbers)))
         at = stamps[rows]
         if len(rows) < len(run):
             numbers = [table[rows] for table in numbers]

@@ -60,7 +60,8 @@ _WORDS = (
     "solver model bound drive values rates residual tolerance unknowns margin errors status counts _ __ _0 CON "
     "NUL aux "
 )
-IDENTIFIERS = [*_WORDS.split(), "n" * 100]
+_NODES = "coupler_x coupler_y coupler_phi rocker_phi sin_coupler_phi cos_coupler_phi sin_rocker_phi t4 t5 t10"
+IDENTIFIERS = [*_WORDS.split(), *_NODES.split(), "n" * 100]
 
 
 def hostile(drawn: random.Random) -> str:
