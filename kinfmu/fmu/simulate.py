@@ -182,7 +182,7 @@ def _rates(value: float | str | bool, where: str) -> str:
     for name, mode in names.items():
         if str(value).lower() == name or (not isinstance(value, str) and value == mode):
             return name
-    raise RequestError(f"{where}: rates = {value!r} must be {listed(names)}")
+    raise RequestError(f"{where}: rates = {value!r} must be auto, estimated or wired")
 
 
 def _check_range(variable: Variable, value: float, where: str) -> None:

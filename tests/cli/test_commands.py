@@ -163,7 +163,7 @@ def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str]) -> Non
 def test_simulate_tells_of_the_mechanism_and_not_of_an_fmu_on_the_way(refuses: Callable[..., str]) -> None:
     assert refuses("simulate", "fourbar", "--set", "crank.sped=1") == (
         "--set crank.sped=1: fourbar has no parameter 'crank.sped'; did you mean 'crank.speed'?; "
-        "parameters: crank.start, crank.speed, solver.tolerance, driven_by_time"
+        "parameters: crank.start, crank.speed, solver.tolerance, driven_by_time, rates"
     )
     assert refuses("simulate", "fourbar", "--step", "0") == (
         "start = 0 s, stop = 180 s, step = 0 s: a run needs finite times, start <= stop and a positive step"
@@ -342,6 +342,8 @@ def test_what_belongs_to_a_run_is_not_set_elsewhere(slider: Path, refuses: Calla
         "simulate take it; parameters: crank"
     )
     assert "simulate takes it, build --drive chooses" in refuses("build", slider, "--set", "driven_by_time=false")
+    assert "simulate takes it, as auto, estimated or wired" in refuses("check", slider, "--set", "rates=wired")
+    assert "rates = 'wire' must be auto, estimated or wired" in refuses("simulate", slider, "--set", "rates=wire")
     for call in (("solve", slider, "-o", "run.csv"), ("simulate", slider)):
         for value in ("fine", "-1", "nan"):
             told = refuses(*call, "--set", f"solver.tolerance={value}")

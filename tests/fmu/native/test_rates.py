@@ -175,7 +175,7 @@ def test_simulate_takes_the_choice_by_name(paths: Callable[[str, str], Path], fl
         for rates in ("wired", "estimated", "auto", 2)
     }
     assert omega == {"wired": 0.0, "estimated": pytest.approx(1.0), "auto": pytest.approx(1.0), 2: 0.0}
-    with pytest.raises(RequestError, match=r"rates = 'wire' must be auto, estimated, wired"):
+    with pytest.raises(RequestError, match=r"rates = 'wire' must be auto, estimated or wired"):
         simulate(path, inputs=table, parameters={"rates": "wire"})
 
 
