@@ -23,10 +23,10 @@ kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char 
     return answer;
 }
 
-/* Error if one of two arrays of a call is NULL although it has elements. */
+/* An array of a call is NULL: Error if it should have elements. */
 kf_answer kf_no_array(const kf_instance *instance, size_t count)
 {
-    return kf_answered(instance, KF_ERROR, "a call with %zu elements has NULL for an array", count);
+    return count ? kf_answered(instance, KF_ERROR, "a call with %zu elements has NULL for an array", count) : KF_DONE;
 }
 
 /* Of the categories named, or of all if none is. */

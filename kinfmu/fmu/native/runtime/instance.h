@@ -185,7 +185,7 @@ static inline kf_answer kf_check(const kf_instance *instance, const void *refere
     if (instance == NULL) {
         return KF_ERROR;
     }
-    return count && (references == NULL || values == NULL) ? kf_no_array(instance, count) : KF_DONE;
+    return references == NULL || values == NULL ? kf_no_array(instance, count) : KF_DONE;
 }
 
 /* The pose asked for, good or not. */
