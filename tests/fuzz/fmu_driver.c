@@ -247,13 +247,13 @@ static component made(host *h, bool model_exchange, const char *token)
 #endif
 }
 
-static int enter(host *h, slot *s, double t)
+static int enter(host *h, slot *s, double t, bool stops)
 {
 #if FMI == 2
-    const int answer = fmi2SetupExperiment(s->c, one_in(h, 2), number(h), t, fmi2False, 0.0);
+    const int answer = fmi2SetupExperiment(s->c, one_in(h, 2), number(h), t, stops, t + number(h));
     return answer == OK ? (int)fmi2EnterInitializationMode(s->c) : answer;
 #else
-    return fmi3EnterInitializationMode(s->c, one_in(h, 2), number(h), t, false, 0.0);
+    return fmi3EnterInitializationMode(s->c, one_in(h, 2), number(h), t, stops, t + number(h));
 #endif
 }
 
@@ -299,7 +299,7 @@ static int step(slot *s, double t, double size)
 static void begin(host *h, slot *s)
 {
     const double t = one_in(h, 10) ? number(h) : one_in(h, 2) ? 0.0 : uniform(h, -1.0, 1.0);
-    if (answered(h, enter(h, s, t)) == OK) {
+    if (answered(h, enter(h, s, t, one_in(h, 9))) == OK) {
         s->t = t;
         s->running = answered(h, CALL(ExitInitializationMode)(s->c)) == OK;
         if (s->running && s->model_exchange) {
@@ -360,7 +360,7 @@ static void check_reset(host *h, slot *s)
     memset(inputs, 0, sizeof inputs);
     inputs[0] = uniform(h, -3.0, 3.0);
     for (k = 0; k < 2; ++k) {
-        enter(h, both[k], 0.0);
+        enter(h, both[k], 0.0, false);
         CALL(ExitInitializationMode)(both[k]->c);
         for (i = 0; i < 3; ++i) {
             set_inputs(both[k], inputs);
@@ -470,27 +470,35 @@ static void do_step(host *h, slot *s)
 
 /* Integer, Boolean, String and all other types. */
 #if FMI == 2
-#define TYPED(word)                                                                                                    \
+#define TYPED(word, most)                                                                                              \
     do {                                                                                                               \
         fmi2##word *const v = room(n, sizeof *v);                                                                      \
+        size_t k;                                                                                                      \
+        for (k = 0; (most) && k < n; ++k) {                                                                            \
+            v[k] = (fmi2##word)(intptr_t)below(h, (most) + 1u);                                                        \
+        }                                                                                                              \
         void *const into = or_null(h, v, &wrong);                                                                      \
-        answer = gets ? fmi2Get##word(s->c, given, n, into) : fmi2Set##word(s->c, given, n, into);                      \
+        answer = gets ? fmi2Get##word(s->c, given, n, into) : fmi2Set##word(s->c, given, n, into);                     \
         free(v);                                                                                                       \
     } while (0)
 #else
-#define TYPED(word)                                                                                                    \
+#define TYPED(word, most)                                                                                              \
     do {                                                                                                               \
         fmi3##word *const v = room(n, sizeof *v);                                                                      \
+        size_t k;                                                                                                      \
+        for (k = 0; (most) && k < n; ++k) {                                                                            \
+            v[k] = (fmi3##word)(intptr_t)below(h, (most) + 1u);                                                        \
+        }                                                                                                              \
         void *const into = or_null(h, v, &wrong);                                                                      \
         const size_t nv = other_count(h, n, &miscounted);                                                              \
-        answer = gets ? fmi3Get##word(s->c, given, n, into, nv) : fmi3Set##word(s->c, given, n, into, nv);              \
+        answer = gets ? fmi3Get##word(s->c, given, n, into, nv) : fmi3Set##word(s->c, given, n, into, nv);             \
         free(v);                                                                                                       \
     } while (0)
 #endif
 
 static void typed(host *h, slot *s)
 {
-    static const unsigned special[] = {KF_STATUS, KF_ITERATIONS, KF_DRIVEN_BY_TIME, KF_MESSAGE_TEXT};
+    static const unsigned special[] = {KF_STATUS, KF_ITERATIONS, KF_DRIVEN_BY_TIME, KF_MESSAGE_TEXT, KF_RATES, KF_SOLVER_OK};
     const size_t n = a_count(h);
     bool wrong = false, miscounted = false;
     (void)miscounted;
@@ -499,27 +507,27 @@ static void typed(host *h, slot *s)
     const bool gets = !one_in(h, 3);
     int answer = OK;
     if (n == 1) {
-        *r = special[below(h, 4)];
+        *r = special[below(h, 6)];
     }
 #if FMI == 2
     switch (below(h, 3)) {
-    case 0: TYPED(Integer); break;
-    case 1: TYPED(Boolean); break;
-    default: TYPED(String); break;
+    case 0: TYPED(Integer, 5); break;
+    case 1: TYPED(Boolean, 1); break;
+    default: TYPED(String, 0); break;
     }
 #else
     switch (below(h, 12)) {
-    case 0: TYPED(Float32); break;
-    case 1: TYPED(Int8); break;
-    case 2: TYPED(UInt8); break;
-    case 3: TYPED(Int16); break;
-    case 4: TYPED(UInt16); break;
-    case 5: TYPED(Int32); break;
-    case 6: TYPED(UInt32); break;
-    case 7: TYPED(Int64); break;
-    case 8: TYPED(UInt64); break;
-    case 9: TYPED(Boolean); break;
-    case 10: TYPED(String); break;
+    case 0: TYPED(Float32, 5); break;
+    case 1: TYPED(Int8, 5); break;
+    case 2: TYPED(UInt8, 5); break;
+    case 3: TYPED(Int16, 5); break;
+    case 4: TYPED(UInt16, 5); break;
+    case 5: TYPED(Int32, 5); break;
+    case 6: TYPED(UInt32, 5); break;
+    case 7: TYPED(Int64, 5); break;
+    case 8: TYPED(UInt64, 5); break;
+    case 9: TYPED(Boolean, 1); break;
+    case 10: TYPED(String, 0); break;
     default: {
         double intervals[1];
         fmi3UInt64 counters[1];
@@ -740,7 +748,7 @@ static void modes(host *h, slot *s)
     switch (below(h, 16)) {
     case 0: begin(h, s); break;
     case 1:
-        if (answered(h, enter(h, s, number(h))) == OK) {
+        if (answered(h, enter(h, s, number(h), one_in(h, 9))) == OK) {
             s->t = 0.0;
         }
         break;
