@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism.decimal_number import decimal
 from kinfmu.mechanism.quoted import quoted
+from kinfmu.run import MOST_SAMPLES
 from kinfmu.short_way import short_way
 from kinfmu.units import Quantity, factors, quantity_in
 
@@ -98,11 +100,41 @@ def _from_arrays(inputs: Mapping[str, ArrayLike], known: Sequence[str]) -> Input
     for name, column in columns.items():
         if column.shape != (rows,):
             raise FmuError(f"inputs: '{name}' has shape {column.shape}, 'time' has {rows} values")
-    return _checked("inputs", columns, [f"sample {k}" for k in range(rows)])
+    return _checked("inputs", columns, lambda k: f"sample {k}")
 
 
 def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) -> InputTable:
     known = tuple(quantities)
+    rows = _rows(path)
+    _, first = next(rows, (0, []))
+    if not first:
+        raise FmuError(f"{path}: is empty; its first line must name the columns: {listed((TIME, *known))}")
+    titles = [_title(name) for name in first]
+    header = [name for name, _ in titles]
+    _check_names(str(path), header, known)
+    units = {TIME: Quantity("time")} | dict(quantities)
+    into = [_factor(str(path), name, unit, factors(units[name], length_unit)) for name, unit in titles]
+    columns = [array("d") for _ in header]  # 8 bytes a number: a table may be long
+    lines = array("q")
+    for line, row in rows:
+        if len(row) != len(header):
+            raise FmuError(f"{path}, line {line}: {len(row)} values, the header names {len(header)} columns")
+        for name, cell, factor, column in zip(header, row, into, columns, strict=True):
+            try:
+                column.append(decimal(cell) * factor)
+            except ValueError:
+                point = "; decimals are written with a point" if "," in cell else ""
+                raise FmuError(f"{path}, line {line}: {name} = {quoted(cell.strip())} is not a number{point}") from None
+        lines.append(line)
+        if len(lines) > MOST_SAMPLES:
+            raise FmuError(f"{path}, line {line}: more than {MOST_SAMPLES} rows")
+    arrays = {name: np.array(column) for name, column in zip(header, columns, strict=True)}
+    table = _checked(str(path), arrays, lambda k: f"line {lines[k]}")
+    return replace(table, unitless=tuple(name for name, unit in titles if not unit))
+
+
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a CSV file that hold anything, each with its line."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             first = next((line for line in file if line.strip()), "")
@@ -110,33 +142,15 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             file.seek(0)
             reader = csv.reader(file, delimiter=delimiter)
             try:
-                rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+                for row in reader:
+                    if any(map(str.strip, row)):
+                        yield reader.line_num, row
             except csv.Error as error:
                 raise FmuError(f"{path}, line {reader.line_num}: {error}") from None
     except UnicodeDecodeError:
         raise FmuError(f"{path}: is not a text file") from None
     except OSError as error:
         raise RequestError(f"{path}: cannot be read ({error.strerror})") from None
-    if not rows:
-        raise FmuError(f"{path}: is empty; its first line must name the columns: {listed((TIME, *known))}")
-    titles = [_title(name) for name in rows[0][1]]
-    header = [name for name, _ in titles]
-    _check_names(str(path), header, known)
-    units = {TIME: Quantity("time")} | dict(quantities)
-    into = [_factor(str(path), name, unit, factors(units[name], length_unit)) for name, unit in titles]
-    columns: dict[str, list[float]] = {name: [] for name in header}
-    for line, row in rows[1:]:
-        if len(row) != len(header):
-            raise FmuError(f"{path}, line {line}: {len(row)} values, the header names {len(header)} columns")
-        for name, cell, factor in zip(header, row, into, strict=True):
-            try:
-                columns[name].append(decimal(cell) * factor)
-            except ValueError:
-                point = "; decimals are written with a point" if "," in cell else ""
-                raise FmuError(f"{path}, line {line}: {name} = {quoted(cell.strip())} is not a number{point}") from None
-    arrays = {name: np.array(values) for name, values in columns.items()}
-    table = _checked(str(path), arrays, [f"line {line}" for line, _ in rows[1:]])
-    return replace(table, unitless=tuple(name for name, unit in titles if not unit))
 
 
 def _title(cell: str) -> tuple[str, str]:
@@ -187,18 +201,18 @@ def _meant(title: str, known: Sequence[str]) -> str:
     return "; the first line must name the columns"
 
 
-def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], rows: Sequence[str]) -> InputTable:
-    """The table, if it holds at least one row, finite numbers only and increasing times."""
+def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], place: Callable[[int], str]) -> InputTable:
+    """The table, if it holds at least one row, finite numbers only and increasing times; place: names a row."""
     t = columns[TIME]
     if not len(t):
         raise FmuError(f"{where}: holds no samples")
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
-            raise FmuError(f"{where}, {rows[bad[0]]}: {name} = {column[bad[0]]!s} is not a finite number")
+            raise FmuError(f"{where}, {place(bad[0])}: {name} = {column[bad[0]]!s} is not a finite number")
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if len(back):
         k = back[0] + 1
-        raise FmuError(f"{where}, {rows[k]}: time = {t[k]:g} s does not lie after {t[k - 1]:g} s; time must increase")
+        raise FmuError(f"{where}, {place(k)}: time = {t[k]:g} s does not lie after {t[k - 1]:g} s; time must increase")
     names = tuple(name for name in columns if name != TIME)
     return InputTable(t, names, np.column_stack([columns[name] for name in names]), where)

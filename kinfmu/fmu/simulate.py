@@ -22,7 +22,7 @@ from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.interrupt import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
-from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST, MECHANISM, text_in, unpacked
+from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Run
@@ -80,7 +80,7 @@ def simulate(
     interrupted = Interruption()
     try:
         with unpacked(path) as folder:
-            xml = text_in(path, folder, DESCRIPTION, LARGEST)
+            xml = text_in(path, folder, DESCRIPTION, LARGEST_DESCRIPTION)
             about = description.read(xml.encode(), str(path))
             interface = about.interface
             if wrap and inputs is None:

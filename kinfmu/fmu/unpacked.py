@@ -16,6 +16,7 @@ from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.toml_file import LARGEST_FILE
 
 LARGEST = 2**29  # [bytes] unpacked; the largest of our own take a tenth of it
+LARGEST_DESCRIPTION = 2**27  # [bytes]; of a chain of thousands of links
 MOST_FILES = 10_000
 DESCRIPTION, MECHANISM = "modelDescription.xml", "resources/mechanism.toml"
 _ENCRYPTED = 1  # of the flags of a file in a zip archive

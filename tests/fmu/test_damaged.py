@@ -13,8 +13,9 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import KinfmuError
-from kinfmu.fmu import description
+from kinfmu.fmu import description, input_table
 from kinfmu.fmu import unpacked as unpacking
+from kinfmu.fmu.description.description import MOST_TAGS
 from kinfmu.fmu.unpacked import DESCRIPTION, MECHANISM, unpacked
 
 FLIPS = 150
@@ -184,6 +185,22 @@ def test_a_damaged_description_is_one_line(whole: bytes, tmp_path: Path, case: s
     text = content_of(whole, DESCRIPTION)
     assert change(text) != text
     assert words in told(with_file(whole, DESCRIPTION, change(text).encode()), tmp_path)
+
+
+def test_a_description_of_millions_of_tags_is_not_read(whole: bytes, tmp_path: Path) -> None:
+    tags = content_of(whole, DESCRIPTION).replace("<ModelVariables>", f"<ModelVariables>{'<a/>' * MOST_TAGS}")
+    told_of = told(with_file(whole, DESCRIPTION, tags.encode()), tmp_path)
+    assert told_of == f"modelDescription.xml has more than {MOST_TAGS} tags"
+
+
+def test_a_table_of_inputs_has_as_many_rows_as_a_run_has_samples(
+    whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(input_table, "MOST_SAMPLES", 3)
+    (tmp_path / "a.fmu").write_bytes(whole)
+    (tmp_path / "in.csv").write_text("time,crank_angle\n0,1\n1,1\n\n2,1\n3,1\n")
+    with pytest.raises(KinfmuError, match=r"in.csv, line 6: more than 3 rows$"):
+        kinfmu.simulate(tmp_path / "a.fmu", stop=0.1, step=0.05, inputs=tmp_path / "in.csv")
 
 
 INPUTS = {

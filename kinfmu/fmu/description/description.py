@@ -18,6 +18,7 @@ from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_name
 
 FmiVersion = Literal["2.0", "3.0"]
+MOST_TAGS = 2**22
 _VERSIONS: dict[FmiVersion, Any] = {"2.0": fmi2, "3.0": fmi3}
 
 
@@ -60,6 +61,8 @@ def write(description: Description, kinds: Mapping[str, Mapping[str, float | boo
 
 def read(data: bytes, where: str) -> Description:
     """The description in modelDescription.xml of one of our FMUs; `where` names the file in messages."""
+    if data.count(b"<") > MOST_TAGS:  # a tree takes hundred times the memory of its shortest tags
+        raise FmuError(f"{where}: modelDescription.xml has more than {MOST_TAGS} tags")
     try:
         root = ET.fromstring(data)  # noqa: S314  # the stdlib parser loads no external entities
     except ET.ParseError as error:
