@@ -15,7 +15,7 @@ from kinfmu.run import Event, Run
 from kinfmu.sink import Sink
 from kinfmu.solver.status import Status
 
-PIECE = 512 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
+PIECE = 1024 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
 FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own
 PERIOD = 0.5  # [s] by the clock
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster

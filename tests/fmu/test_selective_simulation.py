@@ -104,14 +104,14 @@ class Listing:
         self.calls.append(f"end {len(run)} {reason}")
 
 
-def test_a_sink_gets_every_sample_once_in_pieces_of_half_a_megabyte(fourbar: Path) -> None:
+def test_a_sink_gets_every_sample_once_in_pieces_of_a_mebibyte(fourbar: Path) -> None:
     sink = Listing()
-    run = simulate(fourbar, step=0.04, sink=sink)
-    assert sink.rows == len(run) == 4501
+    run = simulate(fourbar, step=0.02, sink=sink)
+    assert sink.rows == len(run) == 9001
     assert sink.calls[0] == "begin 0"
-    assert sink.calls[-1] == "end 4501 "
+    assert sink.calls[-1] == "end 9001 "
     columns = len(list(run.columns()))
-    assert len(sink.calls) - 2 >= 4501 * 8 * columns // PIECE
+    assert len(sink.calls) - 2 >= 9001 * 8 * columns // PIECE
 
 
 def test_a_sink_that_fails_ends_the_run_and_is_not_called_again(fourbar: Path) -> None:

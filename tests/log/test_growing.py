@@ -204,7 +204,10 @@ def test_what_holds_no_run_cannot_be_recovered(run: Run, tmp_path: Path) -> None
 KILLED = """
 import os, signal, sys
 import kinfmu
+from kinfmu.fmu import samples
 from kinfmu.log import McapLog
+
+samples.PIECE = 64 * 1024
 
 class KilledLog(McapLog):
     "Kills its process as it gets its fourth piece."
