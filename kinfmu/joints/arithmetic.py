@@ -58,6 +58,41 @@ def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  it de
     return math.atan2(y, x)
 
 
+def without_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]:
+    """Return how many whole periods lie between begin and x, and x without them, exact after millions of them.
+
+        n = floor((x - begin) / p),   rest = x - n p,   p = the sum of `period`
+
+    Sum and product are each formed as two numbers, the rounded one and what it leaves (Knuth's sum, Dekker's product);
+    n p, rounded, would lose as many digits as n has. The rest has the derivative of x.
+
+    Args:
+        x: What is reduced.
+        begin: Where a period begins.
+        period: Parts of the period, which may have a rounded sum.
+
+    """
+    whole: Value = 0.0
+    small: Value = 0.0
+    for part in period:
+        total = whole + part
+        back = total - whole
+        small = small + ((whole - (total - back)) + (part - back))
+        whole = total
+    times = floor((x - begin) / whole)
+    product = times * whole
+    (n, n_small), (p, p_small) = _halves(times), _halves(whole)
+    rounded = ((n * p - product) + n * p_small + n_small * p) + n_small * p_small
+    return times, (x - product) - rounded - times * small
+
+
+def _halves(x: Value) -> tuple[Value, Value]:
+    """Two numbers of 26 bits whose sum is x (Dekker): products of such halves are exact."""
+    scaled = 134217729.0 * x  # 2^27 + 1
+    high = scaled - (scaled - x)
+    return high, x - high
+
+
 sin.register(complex, cmath.sin)
 cos.register(complex, cmath.cos)
 sqrt.register(complex, cmath.sqrt)

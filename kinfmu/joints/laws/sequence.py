@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.arithmetic import Value, curve, floor, sqrt
+from kinfmu.joints.arithmetic import Value, curve, sqrt, without_periods
 from kinfmu.joints.laws.cycloidal import Cycloidal
 from kinfmu.joints.laws.jumps import Jumps, jumping_breaks
 from kinfmu.joints.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
@@ -84,12 +84,12 @@ class MotionSequence(Law):
         numbered = list(enumerate(self.segments, start=1))
         rises = {k: constants[f"rise_{k}"] for k, segment in numbered if segment.law != DWELL}
         durations = {k: constants[f"duration_{k}"] for k, _ in numbered}
-        value, since = constants["start"], x - constants["begin"]
+        value, begin = constants["start"], constants["begin"]
         if self.repeat:
-            whole = sum(durations.values())
-            times = floor(since / whole)
-            value, since = value + sum(rises.values()) * times, since - whole * times
-        begin: Value = 0.0
+            times, x = without_periods(x, begin, *durations.values())
+            value = value + sum(rises.values()) * times
+        since = x - begin
+        begin = 0.0
         for k, segment in numbered:
             if k in rises:
                 value = value + rises[k] * curve((since - begin) / durations[k], _SHAPES[segment.law])

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.arithmetic import Value, curve, floor
+from kinfmu.joints.arithmetic import Value, curve, without_periods
 from kinfmu.joints.laws.jumps import Jumps, jumping_breaks
 from kinfmu.joints.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
 from kinfmu.joints.placement import Reference
@@ -65,7 +65,7 @@ class Spline(Law):
     def target(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
         if self.ends == PERIODIC:
             first, last = self.points[0][0], self.points[-1][0]
-            x = x - (last - first) * floor((x - first) / (last - first))
+            x = without_periods(x, first, last, -first)[1]
         return curve(x, self.data)
 
     def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
