@@ -36,6 +36,8 @@ _SHORTEST = 1e-5  # the same; where steps get shorter a limit lies between
 _STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is not believed
 _TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: so far off lie branches
 _PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches beside a singular start pose are sought
+_NEARBY_STARTS = 6  # poses tried beside a start that does not close by a little
+_SPREAD = 0.3  # [rad, sizes]; how far they lie from the start pose
 _NEARLY = 0.01  # residual of a pose that may close beside the start
 _CORRECTION = 0.02  # [rad, sizes]; a prediction that is corrected by more may have left the branch
 _SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
@@ -331,28 +333,43 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
             there, at = _followed(system, q, u, u + side * BESIDE * _reaches(system), trust=_TRUST)
             beside.append(Assembled(there, at, margin(system, there)))
             continue
-        for part in _PARTS:
-            at = u + side * part * BESIDE * _reaches(system)
-            near = next(iter(branches(system, q, at)), None)
-            if near is not None:
-                beside.append(Assembled(near, at, margin(system, near)))
-                break
+        near = _beside(system, found, side)
+        beside += [] if near is None else [near]
     return max([found, *beside], key=lambda pose: pose.margin)
 
 
-def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
-    """Return the most regular pose a little beside the start from which the start is reached; None if there is none.
+def closes_beside(system: System, singular: Assembled) -> bool:
+    """True if a mechanism closes a little beside a singular pose."""
+    return any(_beside(system, singular, side) is not None for side in (1.0, -1.0))
 
-    Near a change point a rough pose may lie between the branches, where all rows are open by a little.
+
+def _beside(system: System, singular: Assembled, side: float) -> Assembled | None:
+    """Return the nearest closed pose on one side of a singular one, as far from it as there is one."""
+    for part in _PARTS:
+        u = singular.u + side * part * BESIDE * _reaches(system)
+        near = next(iter(branches(system, singular.q, u)), None)
+        if near is not None:
+            return Assembled(near, u, margin(system, near))
+    return None
+
+
+def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
+    """Return the pose nearest to the start poses, a little beside them, from which the start is reached, if any.
+
+    Near a change point a rough pose may lie between the branches, where all rows are open by a little; so poses near it
+    are tried too.
     """
-    beside = []
-    for side in (1.0, -1.0):
-        u = start.u + side * BESIDE * _reaches(system)
-        q, gap = close(system, start.q, u)
-        if gap <= CLOSED:
-            near = Assembled(q, u, margin(system, q))
-            beside += [near] if near.margin > SINGULAR and _is_reached(system, near, start.u) else []
-    return max(beside, key=lambda pose: pose.margin, default=None)
+    rng = np.random.default_rng(1989)
+    beside: list[tuple[float, Assembled]] = []
+    for trial in range(_NEARBY_STARTS):
+        spread = _SPREAD * system.column_scales * rng.uniform(-1.0, 1.0, len(start.q)) if trial else 0.0
+        for side in (1.0, -1.0):
+            u = start.u + side * BESIDE * _reaches(system)
+            q, gap = close(system, start.q + spread, u)
+            near = Assembled(q, u, margin(system, q) if gap <= CLOSED else 0.0)
+            if near.margin > SINGULAR and _is_reached(system, near, start.u):
+                beside.append((_off(system, start, near), near))
+    return min(beside, key=lambda pose: pose[0])[1] if beside else None
 
 
 def comfortable(system: System) -> float:

@@ -12,6 +12,7 @@ from kinfmu.equations.assembly import (
     assemble,
     branches,
     close,
+    closes_beside,
     margin,
     rough_start,
     start_targets,
@@ -32,6 +33,11 @@ def find_anchor(system: System) -> Assembled:
         raise _does_not_close(system)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
+        if not closes_beside(system, found):
+            raise AssemblyError(
+                f"the start pose is singular ({_at(system, found.u)}), and the mechanism does not close on either side "
+                f"of it: start {names} elsewhere, or check the lengths"
+            )
         raise MobilityError(
             f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too"
         )

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 
@@ -121,6 +122,38 @@ def test_two_drivers_on_one_freedom_are_refused() -> None:
     five = five_bar()
     with pytest.raises(MobilityError, match="a, b do not determine the motion"):
         compile_plan(Mechanism("m", five.bodies, five.joints, [AngleDriver("a", "left"), AngleDriver("b", "left")]))
+
+
+@pytest.mark.parametrize(
+    ("coupler", "told"),
+    [
+        (
+            1.0,
+            r"the start pose is singular \(crank = 0 rad .*does not close on either side of it: start crank elsewhere",
+        ),
+        (1.0 - 1e-8, r"does not close near its start pose .* stays open by 1e-08 m"),
+    ],
+)
+def test_a_start_that_closes_at_a_single_pose_or_misses_it_is_told_so(coupler: float, told: str) -> None:
+    """Three bars stretched over the fourth: that they do not determine the motion would not be the reason."""
+    mechanism = Mechanism(
+        "stretched",
+        [
+            Body("ground", {"O": (0, 0), "C": (4, 0)}),
+            Body("crank", {"O": (0, 0), "P": (1, 0)}, (0, 0, 0)),
+            Body("coupler", {"P": (0, 0), "Q": (coupler, 0)}, (1, 0, 0)),
+            Body("rocker", {"C": (0, 0), "Q": (2, 0)}, (4, 0, math.pi)),
+        ],
+        [
+            Revolute("O", ("ground.O", "crank.O")),
+            Revolute("P", ("crank.P", "coupler.P")),
+            Revolute("Q", ("coupler.Q", "rocker.Q")),
+            Revolute("C", ("ground.C", "rocker.C")),
+        ],
+        [AngleDriver("crank", "crank", ConstantSpeed(0.0, 1.0))],
+    )
+    with pytest.raises(AssemblyError, match=told):
+        compile_plan(mechanism)
 
 
 def test_a_rough_start_pose_is_assembled() -> None:

@@ -154,9 +154,10 @@ class Trial:
         unit = float(self.drawn.frame.scale)
         for name in run.outputs if len(which) else ():
             k = which[0]
-            off = float(run[name][k]) - float(np.broadcast_to(exact.columns[name].d0, sines.shape)[k])
+            there = float(np.broadcast_to(exact.columns[name].d0, sines.shape)[k])
             if name.endswith(".phi"):
-                off = float(run[name][k]) - expected.angles[name][k]
+                there += TURN * round((float(expected.angles[name][k]) - there) / TURN)
+            off = float(run[name][k]) - there
             if abs(off) > SAME * (1.0 if name.endswith(".phi") else unit):
                 return False
         return True
