@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,19 @@ GOLDEN = Path(__file__).parent / "golden"
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=60)
 settings.load_profile("kinfmu")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def python_fmus() -> Iterator[None]:
+    """FMUs are of the python flavour where a test names none and native is not required: a compiler takes seconds."""
+    module = import_module("kinfmu.fmu.build")
+
+    def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
+        return "python" if (fmi, platforms) == (2, "host") else "native"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "default_flavour", default_flavour)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -24,7 +24,7 @@ ROUNDS = 60
 def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
     """A table: processor time of a step (set 1, step, get 15) of the mechanism's FMU and of the toy, their ratio."""
     with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
-        ours = build(mechanism, Path(folder) / "ours.fmu", drive="inputs")
+        ours = build(mechanism, Path(folder) / "ours.fmu", flavour="python", drive="inputs")
         toy = _toy(Path(folder))
         body = mechanism.drivers[0].inputs()[0]
         with _stepper(ours, body, _fifteen(ours)) as step_ours, _stepper(toy, "u", None) as step_toy:

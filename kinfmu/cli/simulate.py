@@ -126,7 +126,8 @@ def _fmu(
     given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
     with about(model):
         mech = given.mechanism()
-        fmu = build(mech, folder, drive="inputs" if has_inputs else default_drive(mech))
+        drive = "inputs" if has_inputs else default_drive(mech)
+        fmu = build(mech, folder, flavour="python", drive=drive)  # stepped here and now: a compiler would take longer
     return fmu, dict(given.of_run)
 
 

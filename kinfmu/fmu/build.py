@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
-from kinfmu.errors import FmuError, RequestError, listed, suggestion
+from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.joints.laws import External
@@ -23,7 +25,7 @@ def build(
     mechanism: Mechanism,
     path: str | Path | None = None,
     *,
-    flavour: str = "python",
+    flavour: str | None = None,
     drive: Drive | None = None,
     outputs: Sequence[str] | None = None,
     fmi: int = 2,
@@ -32,12 +34,13 @@ def build(
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
-    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. flavour: 'python' (through
-    pythonfmu, for hosts that are Python processes) or 'native' (C, for all hosts). drive: what drives at first, 'time'
-    (the law in the file) or 'inputs'; if nothing is said time, unless a driver's law is external. outputs: coordinates
-    such as 'coupler.x' that the FMU shall have, all if nothing is said; what no output needs is not solved. fmi: 2 or
-    3; the python flavour is FMI 2.0 only. platforms: of the native flavour, 'host' (by the system's compiler) or 'all'
-    (by zig). progress: called with (platforms done, platforms in all) while they compile.
+    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. flavour: 'native' (C, for all
+    hosts) or 'python' (through pythonfmu, for hosts that are Python processes); default: native where a C compiler is
+    found, else python. drive: what drives at first, 'time' (the law in the file) or 'inputs'; if nothing is said time,
+    unless a driver's law is external. outputs: coordinates such as 'coupler.x' that the FMU shall have, all if nothing
+    is said; what no output needs is not solved. fmi: 2 or 3; the python flavour is FMI 2.0 only. platforms: of the
+    native flavour, 'host' (by the system's compiler) or 'all' (by zig). progress: called with (platforms done,
+    platforms in all) while they compile.
 
     The same mechanism, compiled by the same compiler, gives the same bytes. Raises a RequestError for choices that are
     not there or not together, a MechanismError or AssemblyError for a mechanism that cannot be solved, a CompilerError
@@ -45,6 +48,7 @@ def build(
     """
     refuse_other(mechanism, "build")
     drive = default_drive(mechanism) if drive is None else drive
+    flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
     from kinfmu import VERSION
     from kinfmu.plan import compile_plan
@@ -85,6 +89,33 @@ def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
 def default_drive(mechanism: Mechanism) -> Drive:
     """'inputs' if a driver's law is external, else 'time'."""
     return "inputs" if any(isinstance(driver.law, External) for driver in mechanism.drivers) else "time"
+
+
+def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
+    """Return 'native' where a C compiler is found or the choices need it, else 'python'."""
+    return "native" if (fmi, platforms) != (2, "host") or not native_obstacle() else "python"
+
+
+def native_obstacle() -> str:
+    """Return why no native FMU can be built for this machine; nothing if one can."""
+    from kinfmu.backends.c import compiler
+    from kinfmu.fmu.native.platforms import host
+
+    try:
+        host()
+        compiler.command()
+    except (CompilerError, FmuError) as error:
+        return str(error)
+    return "" if find_spec("fmpy") else "the headers of FMI, which fmpy carries, are missing; pip install fmpy"
+
+
+def platforms_of(path: Path) -> tuple[str, ...]:
+    """Return the platforms that an FMU holds binaries for, such as 'x86_64-linux'."""
+    from kinfmu.fmu.native.platforms import PLATFORMS as NATIVE_PLATFORMS
+
+    with zipfile.ZipFile(path) as zipped:
+        folders = {name.split("/")[1] for name in zipped.namelist() if name.startswith("binaries/")}
+    return tuple(one.name for one in NATIVE_PLATFORMS if folders & {one.name, one.fmi2})
 
 
 def _file(path: str | Path | None, name: str) -> Path:

@@ -32,7 +32,7 @@ from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 
 CAPABILITIES = {
-    "needsExecutionTool": False,
+    "needsExecutionTool": True,  # Python, in the process of the host
     "canHandleVariableCommunicationStepSize": True,
     "canInterpolateInputs": False,  # pythonfmu's binary refuses input derivatives
     "canBeInstantiatedOnlyOncePerProcess": False,
@@ -44,6 +44,16 @@ CAPABILITIES = {
 RUN_TIME = ("slave.py", "layout.py", "fetch.py", "estimated_rates.py", "hold.py")  # of this room
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source")
+
+EXTERNAL_DEPENDENCIES = """\
+This FMU runs Python code in the process of its host. It needs:
+
+- a host process that holds Python 3.11 or newer, such as fmpy, libcosimpy or ecospy; other hosts cannot load it
+- Linux (glibc 2.32 or newer) or Windows, on x86-64
+
+It needs no Python packages: what it imports is the standard library and the modules in resources/.
+An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native
+"""
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
@@ -96,10 +106,19 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
     contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
     contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
     contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
-    licence = distribution("pythonfmu").read_text("licenses/LICENSE")
-    if licence:
-        contents["documentation/licenses/pythonfmu.txt"] = licence.encode()
+    contents |= _documents()
     return dict(sorted(contents.items()))
+
+
+def _documents() -> dict[str, bytes]:
+    """What the FMU needs from outside, and the licences of what is in it."""
+    return {
+        "documentation/externalDependencies.txt": EXTERNAL_DEPENDENCIES.encode(),
+        "documentation/licenses/license.txt": documentation.licence("pythonfmu, in pythonfmu.txt").encode(),
+        "documentation/licenses/pythonfmu.txt": (
+            distribution("pythonfmu").read_text("licenses/LICENSE") or "MIT, https://github.com/NTNU-IHB/PythonFMU\n"
+        ).encode(),
+    }
 
 
 def _binaries(identifier: str) -> dict[str, bytes]:

@@ -19,6 +19,7 @@ import kinfmu
 from kinfmu import gallery, log
 from kinfmu.cli import main
 from kinfmu.cli.group import ORDER
+from kinfmu.fmu.native.platforms import host
 from tests.cli.conftest import Command, read_csv
 from tests.log.runs import fourbar
 
@@ -79,7 +80,11 @@ def test_new_tells_what_it_cannot_write(fails: Callable[..., str], refuses: Call
 def test_build_and_simulate_step_an_fmu_into_logs(command: Command, tmp_path: Path) -> None:
     built = command("build", "fourbar", "-o", "four.fmu")
     assert built.exit_code == 0
-    assert re.fullmatch(r"four\.fmu: \d+ kB, FMI 2\.0 co-simulation, driven by time\n", built.stdout)
+    assert re.fullmatch(
+        r"four\.fmu: \d+ kB, python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, "
+        r"FMI 2\.0 co-simulation, driven by time\n",
+        built.stdout,
+    )
     logs = ("--mcap", "four.mcap", "--rrd", "four.rrd")
     result = command("simulate", "four.fmu", "--start", "20", "--stop", "30", "--step", "5", *logs)
     assert result.exit_code == 0
@@ -354,7 +359,9 @@ def test_what_belongs_to_a_run_is_not_set_elsewhere(slider: Path, refuses: Calla
 def test_native_fmus_are_built_and_simulated(command: Command, tmp_path: Path, fmi: str) -> None:
     built = command("build", "fourbar", "--flavour", "native", "--fmi", fmi, "-o", "four.fmu")
     assert re.fullmatch(
-        rf"four\.fmu: \d+ kB, FMI {fmi}\.0 co-simulation and model exchange, driven by time\n", built.stdout
+        rf"four\.fmu: \d+ kB, native FMU for {host().name}, FMI {fmi}\.0 co-simulation and model exchange, "
+        r"driven by time\n",
+        built.stdout,
     )
     logs = ("--mcap", "four.mcap", "--rrd", "four.rrd")
     result = command("simulate", "four.fmu", "--start", "20", "--stop", "21", *logs)
@@ -364,8 +371,13 @@ def test_native_fmus_are_built_and_simulated(command: Command, tmp_path: Path, f
 
 
 def test_the_python_flavour_refuses_what_only_the_native_one_has(refuses: Callable[..., str]) -> None:
-    assert refuses("build", "fourbar", "--fmi", "3") == "--fmi 3 needs --flavour native; the python flavour has --fmi 2"
-    assert refuses("build", "fourbar", "--platforms", "all").startswith("--platforms all needs --flavour native")
+    assert (
+        refuses("build", "fourbar", "--flavour", "python", "--fmi", "3")
+        == "--fmi 3 needs --flavour native; the python flavour has --fmi 2"
+    )
+    assert refuses("build", "fourbar", "--flavour", "python", "--platforms", "all").startswith(
+        "--platforms all needs --flavour native"
+    )
 
 
 def test_an_fmu_goes_into_a_folder_of_the_gallery_only_for_a_name_of_the_gallery(

@@ -19,7 +19,7 @@ BUILD = """
 import sys
 from kinfmu.fmu import build
 from kinfmu.mechanism import toml_file
-build(toml_file.read(sys.argv[1]), sys.argv[2])
+build(toml_file.read(sys.argv[1]), sys.argv[2], flavour="python")
 """
 STEP = """
 import sys
@@ -77,6 +77,18 @@ def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_a
     assert all(name.startswith((f"resources/{package}/", f"resources/{package}_slave.py")) for name in modules)
 
 
+def test_the_documents_inside_tell_what_it_needs_and_under_what_licences_it_is(fourbar: Path) -> None:
+    with zipfile.ZipFile(fourbar) as zipped:
+        needs = zipped.read("documentation/externalDependencies.txt").decode()
+        licence = zipped.read("documentation/licenses/license.txt").decode()
+        other = zipped.read("documentation/licenses/pythonfmu.txt").decode()
+    assert "a host process that holds Python" in needs
+    assert "no Python packages" in needs
+    assert (ROOT / "LICENSE").read_text("utf-8") in licence
+    assert "pythonfmu, in pythonfmu.txt" in licence
+    assert "MIT" in other
+
+
 def test_token_changes_with_the_content(fourbar: Path, tmp_path: Path) -> None:
     from fmpy import read_model_description
 
@@ -96,8 +108,8 @@ def test_outputs_can_be_chosen(tmp_path: Path) -> None:
     [
         ({"flavour": "natve"}, "flavour 'natve' is not known; did you mean 'native'.*flavours: python, native"),
         ({"drive": "input"}, "drive = 'input' is not known; did you mean 'inputs'"),
-        ({"fmi": 3}, "fmi = 3 needs flavour = 'native'; the python flavour is FMI 2.0"),
-        ({"platforms": "all"}, "platforms = 'all' needs flavour = 'native'"),
+        ({"fmi": 3, "flavour": "python"}, "fmi = 3 needs flavour = 'native'; the python flavour is FMI 2.0"),
+        ({"platforms": "all", "flavour": "python"}, "platforms = 'all' needs flavour = 'native'"),
         ({"path": "fourbar.zip"}, r"fourbar\.zip: is no folder, and the file of an FMU ends in \.fmu"),
     ],
 )

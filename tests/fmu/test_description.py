@@ -130,7 +130,7 @@ def test_root_has_no_date_or_a_legal_one_and_a_c_identifier(root: ET.Element) ->
     simulation = root.find("CoSimulation")
     assert simulation is not None
     assert re.fullmatch(r"[A-Za-z_]\w*", simulation.get("modelIdentifier", ""))
-    assert simulation.get("needsExecutionTool") == "false"
+    assert simulation.get("needsExecutionTool") == "true"  # Python
     experiment = root.find("DefaultExperiment")
     assert experiment is not None
     assert float(experiment.get("stopTime", "nan")) > float(experiment.get("startTime", "nan"))

@@ -86,6 +86,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersi
     contents = {
         "modelDescription.xml": description.write(about, CAPABILITIES[fmi]),
         "documentation/index.html": documentation.page(variables).encode(),
+        "documentation/licenses/license.txt": documentation.licence().encode(),
         "resources/mechanism.toml": toml_text.text(plan.mechanism).encode(),
     }
     if fmi == "3.0":

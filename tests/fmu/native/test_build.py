@@ -74,6 +74,8 @@ def test_archive_holds_binary_sources_documentation_and_mechanism(built_native: 
     assert names[0] == "modelDescription.xml"
     assert wanted <= set(names)
     assert ("sources/buildDescription.xml" in names) == (fmi == 3)
+    assert "documentation/licenses/license.txt" in names
+    assert "documentation/externalDependencies.txt" not in names  # it has none
     assert not [name for name in names if name.endswith((".pdb", ".lib", ".o", f"fmi{5 - fmi}.c"))]
 
 

@@ -1,0 +1,91 @@
+"""The flavour that people get who name none: native where it can be built, and told which."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import kinfmu
+from kinfmu.backends.c import compiler
+from kinfmu.cli import main
+from kinfmu.errors import CompilerError
+from kinfmu.fmu.build import default_flavour
+from kinfmu.fmu.native.platforms import host
+
+module = import_module("kinfmu.fmu.build")
+
+
+@pytest.fixture(autouse=True)
+def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As outside of the tests, but compiled quickly and in a folder of its own."""
+    monkeypatch.setattr(module, "default_flavour", default_flavour)
+    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "cache"))
+    for one in (compiler, import_module("kinfmu.fmu.native.archive")):
+        monkeypatch.setattr(one, "FLAGS", ["-O0" if flag.startswith("-O") else flag for flag in one.FLAGS])
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    def command() -> tuple[str, ...]:
+        raise CompilerError("no C compiler: neither cc, gcc nor clang is there")
+
+    monkeypatch.setattr(compiler, "command", command)
+
+
+def _is_native(path: Path) -> bool:
+    with zipfile.ZipFile(path) as zipped:
+        return "sources/model.c" in zipped.namelist()
+
+
+def test_with_a_compiler_it_is_native_and_the_command_tells_for_which_platforms(tmp_path: Path) -> None:
+    assert default_flavour() == "native"
+    result = CliRunner().invoke(main, ["build", "fourbar"])
+    assert result.exit_code == 0, result.output
+    told = rf"fourbar\.fmu: \d+ kB, native FMU for {host().name}, FMI 2\.0 co-simulation and model exchange, "
+    assert re.match(told, result.stdout)
+    assert _is_native(tmp_path / "fourbar.fmu")
+    assert _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "again.fmu"))
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_it_is_python_and_the_command_tells_why(tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["build", "fourbar"])
+    assert result.exit_code == 0, result.output
+    assert ", python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, " in result.stdout
+    assert result.stderr == (
+        "a native FMU, which every host can load, is not possible here: "
+        "no C compiler: neither cc, gcc nor clang is there\n"
+    )
+    assert not _is_native(tmp_path / "fourbar.fmu")
+    assert not _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "again.fmu"))
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_what_only_native_fmus_have_is_refused_without_a_compiler(tmp_path: Path) -> None:
+    assert default_flavour(3) == default_flavour(2, "all") == "native"
+    with pytest.raises(CompilerError, match="no C compiler"):
+        kinfmu.build(kinfmu.load("fourbar"), tmp_path / "three.fmu", fmi=3)
+
+
+def test_the_python_flavour_stays_a_choice_and_platforms_without_a_name_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert not _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "py.fmu", flavour="python"))
+    monkeypatch.setattr("platform.machine", lambda: "s390x")
+    assert default_flavour() == "python"
+    assert "no native FMUs are built for s390x" in module.native_obstacle()
+
+
+def test_simulate_of_a_mechanism_starts_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compiled(*_: object) -> None:
+        raise AssertionError("a compiler ran")
+
+    monkeypatch.setattr(compiler, "compiled", compiled)
+    result = CliRunner().invoke(main, ["simulate", "fourbar", "--stop", "3"])
+    assert result.exit_code == 0, result.output
