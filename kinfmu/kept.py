@@ -24,7 +24,9 @@ class Kept:
 
     def add(self, pose: Pose) -> None:
         """The next sample's pose."""
-        self._found.append(None if not pose.good else pose.z if pose.bridge is None else pose)
+        self._found.append(
+            None if not pose.good else pose if pose.is_bridged or (pose.tracks and pose.status) else pose.z
+        )
 
     def margins(self) -> FloatArray:
         """(n,) margin of each sample, NaN where it holds no numbers."""

@@ -176,6 +176,34 @@ def with_arm(linkage: Mechanism) -> Mechanism:
     )
 
 
+def with_second(linkage: Mechanism) -> Mechanism:
+    """A four-bar and the same once more beside it, with a driver of its own: `second`, of `crank2`."""
+    ground, *bodies = linkage.bodies
+    pins = {f"{name}2": (point.x + 9.0, point.y) for name, point in ground.points.items()}
+    copies = [
+        Body(
+            f"{body.name}2",
+            {f"{name}2": point for name, point in body.points.items()},
+            (body.start.x + 9.0, body.start.y, body.start.phi),
+        )
+        for body in bodies
+    ]
+    joints = [
+        Revolute(
+            f"{joint.name}2",
+            tuple(f"{end.replace('.', '2.') if end[:6] != 'ground' else end}2" for end in joint.between),
+        )
+        for joint in linkage.joints
+    ]
+    (driver,) = linkage.drivers
+    return replace(
+        linkage,
+        bodies=(Body("ground", {**ground.points, **pins}), *bodies, *copies),
+        joints=(*linkage.joints, *joints),
+        drivers=(driver, AngleDriver("second", "crank2", driver.law)),
+    )
+
+
 def bar_linkage() -> Mechanism:
     """A four-bar whose coupler is only a distance: one unknown."""
     return Mechanism(

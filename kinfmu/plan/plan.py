@@ -159,6 +159,25 @@ class SolvePlan:
         behind = self._behind[output]
         return tuple(k for k, driver in enumerate(self.drivers) if driver.inputs[0] in behind)
 
+    @cached_property
+    def block_drivers(self) -> tuple[int, ...]:
+        """The driver (by position) that each solved block depends on, itself and through others; -1: several.
+
+        Structurally. A block that depends on none counts as one of the first driver's.
+        """
+        found = []
+        for block in self.blocks:
+            if block.unknowns:
+                behind = self._behind_coordinates[block.unknowns[0]]
+                drivers = [k for k, driver in enumerate(self.drivers) if driver.inputs[0] in behind]
+                found.append(-1 if len(drivers) > 1 else drivers[0] if drivers else 0)
+        return tuple(found)
+
+    @property
+    def has_tracks(self) -> bool:
+        """True with several drivers if each solved block depends on one alone."""
+        return len(self.drivers) > 1 and bool(self.block_drivers) and min(self.block_drivers) >= 0
+
     def parameters_of(self, name: str) -> tuple[str, ...]:
         """Parameters on which an output or a fixed coordinate depends structurally, in file order."""
         behind = self._behind[name]
@@ -167,18 +186,24 @@ class SolvePlan:
     @cached_property
     def _behind(self) -> dict[str, frozenset[str]]:
         """Inputs and parameters, by the names of their symbols, behind each output and each fixed coordinate."""
+        behind = self._behind_coordinates
+        told = {motion.name: _behind_all([motion.position], behind) for motion in self.outputs_motion}
+        return told | {name: _behind_all([node], behind) for name, node in self.fixed_nodes.items()}
+
+    @cached_property
+    def _behind_coordinates(self) -> dict[str, frozenset[str]]:
+        """The same behind each coordinate that moves."""
         behind: dict[str, frozenset[str]] = {}
-
-        def of(nodes: Sequence[Node]) -> frozenset[str]:
-            names = {symbol.name for symbol in symbols(nodes)}
-            return frozenset().union(*(behind.get(name, frozenset((name,))) for name in names))
-
         for block in self.blocks:
             own = set(block.coordinates)
-            found = frozenset(of(_nodes(block)[: _position_count(block)]) - own)
+            found = frozenset(_behind_all(_nodes(block)[: _position_count(block)], behind) - own)
             behind |= dict.fromkeys(own, found)
-        told = {motion.name: of([motion.position]) for motion in self.outputs_motion}
-        return told | {name: of([node]) for name, node in self.fixed_nodes.items()}
+        return behind
+
+
+def _behind_all(nodes: Sequence[Node], behind: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    names = {symbol.name for symbol in symbols(nodes)}
+    return frozenset().union(*(behind.get(name, frozenset((name,))) for name in names))
 
 
 def _nodes(block: Block) -> list[Node]:

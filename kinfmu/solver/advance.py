@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
@@ -47,7 +48,7 @@ def advance(model: Model, start: Pose, target: Vector, road: Road | None = None)
     With one driver, singular points on the way are bridged.
     """
     one = len(target) == 1
-    direction, distance = (ALONE, 0.0) if one else _course(model, start.u, target)
+    direction, distance = (ALONE, 0.0) if one else course(model, start.u, target)
     longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
     pose = start if road is None or road is start.road else on_road(start, road)
     step, iterations = longest, 0
@@ -114,10 +115,12 @@ def _arrived(pose: Pose, regular: Pose, iterations: int) -> Pose:
     return pose
 
 
-def _course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:
+def course(model: Model, start: Vector, target: Vector) -> tuple[Vector, float]:
     """Direction and length of a straight way of several drivers, measured by the driver that has most to go."""
     ways = [(b - a) / reach for a, b, reach in zip(start, target, model.REACH, strict=True)]
     length = max(map(abs, ways))
+    if not 0.0 < length < inf:
+        return start, length
     return tuple((b - a) / length for a, b in zip(start, target, strict=True)), length
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
 from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Model, Pose, Vector, evaluated, tangent_of
+from .tracks import Track, held_blocks, rates_in_time
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest count for all
@@ -69,6 +70,7 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         sources = _sources(model, pose, drive, rates)
         if pose.bridge is not None:
             sources.append(_of_bridge(model, pose, drive, rates))
+        sources += [_of_track(track, own, drive, rates) for track, own in pose.tracks if own.bridge is not None]
         for source in sources:
             values, first, second = _moved(model, pose, drive, rates, source)
             q, qd, qdd = _differences(model, model.motion(values, ud, udd, first, second), here)
@@ -89,6 +91,10 @@ def _is_at_a_crossing(model: Model, pose: Pose, rates: Rates) -> bool:
 
     There the rates stay as they are while the determinant falls; right before a dead centre they are steep.
     """
+    if any(
+        _is_at_a_crossing(track, own, _rates(track, own, _drive(own, ALONE, AT_REST))) for track, own in pose.tracks
+    ):
+        return True
     one = len(pose.u) == 1 and pose.bridge is None
     return one and pose.margin < UNDECIDED and rates.speed * model.REACH[0] < STEEP
 
@@ -148,7 +154,7 @@ def _largest(model: Model, there: Vector, here: Vector) -> float:
 
 
 def _drive(pose: Pose, ud: Vector, udd: Vector) -> Drive:
-    held = 0 if pose.bridge is None else pose.bridge.span.held
+    held = held_blocks(pose)
     return Drive(ALONE, AT_REST, held) if len(ud) == 1 else Drive(ud, udd, held)
 
 
@@ -157,8 +163,7 @@ def _rates(model: Model, pose: Pose, drive: Drive) -> Rates:
     if len(drive.ud) == 1:
         first, second = tangent_of(model, pose)
     else:
-        first = tuple(model.velocity(pose.values, drive.ud))
-        second = tuple(model.acceleration(pose.values, drive.ud, drive.udd, first))
+        first, second = rates_in_time(model, pose, drive.ud, drive.udd)
     for rate, bend, scale in zip(first, second, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all
         speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
     for rate, bend, scale in zip(drive.ud, drive.udd, model.REACH):  # noqa: B905  one a driver, all
@@ -267,6 +272,26 @@ def _of_bridge(model: Model, pose: Pose, drive: Drive, rates: Rates) -> Source:
     first = tuple([a + b for a, b in zip(rates.first, given[1])])  # noqa: B905
     second = tuple([a + b for a, b in zip(rates.second, given[2])])  # noqa: B905
     return Source(moved, none, none, first, second)
+
+
+def _of_track(track: Track, own: Pose, drive: Drive, rates: Rates) -> Source:
+    """What a bridge of one track adds, in time."""
+    alone = _drive(own, ALONE, AT_REST)
+    along = _rates(track, own, alone)
+    off = _of_bridge(track, own, alone, along)
+    v, a = drive.ud[track.driver], drive.udd[track.driver]
+    still = (0.0,) * len(rates.first)
+    one = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one an unknown, all
+    two = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
+    first = track.put([v * x for x in one], still)
+    second = track.put([v * v * y + a * x for x, y in zip(one, two)], still)  # noqa: B905
+    return Source(
+        track.put(off.z, still),
+        still,
+        still,
+        tuple([x + y for x, y in zip(rates.first, first)]),  # noqa: B905
+        tuple([x + y for x, y in zip(rates.second, second)]),  # noqa: B905
+    )
 
 
 def _of_node(model: Model, node: Pose, half: float) -> Vector:

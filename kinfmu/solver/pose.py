@@ -40,6 +40,7 @@ class Pose:
         "road",
         "status",
         "tangent",
+        "tracks",
         "u",
         "values",
         "watch",
@@ -63,7 +64,13 @@ class Pose:
         self.base: Pose | None = None  # where to go on from, if not from here: see advance
         self.status: int = 0
         self.message = ""
+        self.tracks: tuple[tuple[Any, Pose], ...] = ()  # with several drivers: each track, and its pose
         self.tangent: tuple[Vector, Vector] | None = None  # of a single driver: see tangent_of
+
+    @property
+    def is_bridged(self) -> bool:
+        """True if unknowns of the pose are interpolated."""
+        return self.bridge is not None or any(own.bridge is not None for _, own in self.tracks)
 
     @property
     def good(self) -> bool:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from .advance import (
     CLOSE,
     LONGEST_STEP,
     NEAR_SINGULAR,
+    NO_BLOCK,
     Limit,
     advance,
+    course,
     keeps_branch,
     limit_message,
     surveyed,
@@ -23,6 +25,7 @@ from .pose import ALONE, Model, Pose, Vector, evaluated, failed, on_road, tangen
 from .road import laid
 from .span import REGULAR
 from .status import Status
+from .tracks import Track, on_track, rates_in_time, tracks_of
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
@@ -41,10 +44,14 @@ class Solver:
         u, z = model.ANCHOR
         self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
         self._one = len(u) == 1
+        tracks = () if self._one else tracks_of(model, u, self.anchor.z)
+        self._tracks = tuple([None if track is None else _solver_of(track, self.anchor) for track in tracks])
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
+        if self._tracks:
+            return self._by_tracks(start, u)
         if start.base is not None and u != start.u:
             start = start.base
         if u == start.u:
@@ -68,6 +75,56 @@ class Solver:
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
         return self._checked(pose)
+
+    def _by_tracks(self, start: Pose, u: Vector) -> Pose:
+        """The pose put together from those of the tracks, each followed along its own driver."""
+        if u == start.u and (start.tracks or start.road):
+            return start
+        if start.margin >= REGULAR and not start.is_bridged:  # most samples: one trusted step of all drivers
+            near = self._near(start, u)
+            if near is not None:
+                return near
+        if not isfinite(sum(u)):
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
+        known = {track.driver: own for track, own in start.tracks}
+        z, parts = start.z, []
+        for k, solver in enumerate(self._tracks):
+            if solver is None:
+                continue
+            own = solver.solve(known.get(k) or on_track(solver.model, start), (u[k],))
+            if not own.good:
+                return failed(start, u, Status(own.status), own.message)
+            z = solver.model.put(own.z, z)
+            parts.append((solver.model, own))
+        try:
+            pose = Pose(u, evaluated(self.model, u, z))
+        except (ArithmeticError, ValueError):  # a coordinate that is given outright has no value there
+            return failed(start, u, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), u))
+        pose.tracks = tuple(parts)
+        roads = {track.driver: own.road for track, own in parts}
+        pose.road = tuple([roads.get(k) for k in range(len(u))])
+        pose.iterations = sum([own.iterations for _, own in parts])
+        statuses = [own.status for _, own in parts]
+        if Status.NEAR_SINGULAR in statuses:
+            pose.status = Status.NEAR_SINGULAR
+        elif Status.BRIDGED in statuses:
+            pose.status = Status.BRIDGED
+        return self._checked(pose)
+
+    def _near(self, start: Pose, u: Vector) -> Pose | None:
+        """The pose one trusted step away, if it and the step are far from all that is singular."""
+        direction, distance = course(self.model, start.u, u)
+        if not 0.0 < distance <= LONGEST_STEP:
+            return None
+        if start.road is not None:
+            for road, value in zip(start.road, u, strict=True):
+                if road is not None and not road.low <= value <= road.high:
+                    return None
+        near = trusted_step(self.model, start, direction, distance, u)
+        if near is None or near.margin < REGULAR or not near.watch <= self.tolerance >= near.residual:
+            return None
+        near.road = start.road or (None,) * len(u)
+        return near
 
     def _again(self, start: Pose) -> Pose:
         """The pose at the driver values of `start`: `start` itself, unless nothing has judged it yet, as the anchor."""
@@ -109,14 +166,17 @@ class Solver:
         """What the model's rates start from: z' = dz/du with one driver, else zd."""
         if self._one:
             return tangent_of(self.model, pose)[0]
-        return tuple(self.model.velocity(pose.values, ud))
+        return (
+            self._both(pose, ud, (0.0,) * len(ud))[0]
+            if pose.is_bridged
+            else tuple(self.model.velocity(pose.values, ud))
+        )
 
     def _both(self, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
         """What the model's accelerations start from: z' and z'' with one driver, else zd and zdd."""
         if self._one:
             return tangent_of(self.model, pose)
-        zd = self._first(pose, ud)
-        return zd, tuple(self.model.acceleration(pose.values, ud, udd, zd))
+        return rates_in_time(self.model, pose, ud, udd)
 
     def outputs(self, pose: Pose) -> Vector:
         """Positions of the model's OUTPUTS."""
@@ -168,6 +228,10 @@ class Solver:
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
+        if self._tracks:
+            roads = None if pose.road is None else [None if road is None else road.dump() for road in pose.road]
+            parts = [self._tracks[track.driver].dump(own) for track, own in pose.tracks]
+            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, roads, parts]
         road = None if pose.road is None else pose.road.dump()
         standing = -1 if pose.bridge is None else pose.road.bridges.index(pose.bridge)
         base = None if pose.base is None else self.dump(pose.base)
@@ -175,6 +239,8 @@ class Solver:
 
     def restore(self, data: list[Any]) -> Pose:
         """The pose that was dumped."""
+        if self._tracks:
+            return self._restored(*data)
         u, z, iterations, status, message, dumped, standing, base = data
         road = None if dumped is None else laid(self.model, dumped)
         if road is not None and standing >= 0:
@@ -185,3 +251,27 @@ class Solver:
         pose.iterations, pose.status, pose.message = iterations, status, message
         pose.base = None if base is None else self.restore(base)
         return pose
+
+    def _restored(
+        self, u: list[float], z: list[float], iterations: int, status: int, message: str, roads: Any, parts: list[Any]
+    ) -> Pose:
+        """The same of a pose that is put together from tracks."""
+        pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
+        pose.iterations, pose.status, pose.message = iterations, status, message
+        solvers = [solver for solver in self._tracks if solver is not None]
+        if parts:
+            pose.tracks = tuple([(s.model, s.restore(own)) for s, own in zip(solvers, parts, strict=True)])
+        if roads is not None:
+            models = [None if solver is None else solver.model for solver in self._tracks]
+            pose.road = tuple(
+                [
+                    None if data is None else laid(model, data).around(value)
+                    for model, data, value in zip(models, roads, u, strict=True)
+                ]
+            )
+        return pose
+
+
+def _solver_of(track: Track, anchor: Pose) -> Solver:
+    """A solver of a track alone; the whole is what counts for the tolerance."""
+    return Solver(track, inf, on_track(track, anchor))

@@ -32,6 +32,7 @@ from tests.backends.native import STRICT, Native
 from tests.fmu.test_parameters import geared, linkage
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar, slider_crank, tight_jaw
 from tests.solver.change_points import two_loops
+from tests.stress.trial import trial
 
 HEADERS = ("way.h", "solver.h")
 PARTS = {"advance": ("advance.c", "limit.c", "survey.c"), "estimate": ("estimate.c", "softness.c")}  # else by one name
@@ -191,6 +192,15 @@ CHANGES: dict[Callable[[], Mechanism], list[dict[str, float]]] = {
     ],
     geared: [{"rod": 3.6}, {"rod": -3.5}, {"teeth": 0.0}, {"teeth": 31.0}, {"pace": -2.0}, {"pace": 0.0}],
 }
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_c_and_python_are_the_same_where_each_driver_has_singular_points_of_its_own(seed: int) -> None:
+    """Two machines in one file, over crossings and to limits of each."""
+    mechanism = trial(seed, "two machines").drawn.mechanism
+    ways = [wander(driver.law.start, 2.0, [0.0, math.pi], k) for k, driver in enumerate(mechanism.drivers)]
+    samples = [tuple(u for (u,) in each) for each in zip(*ways, strict=True)]
+    assert {Status.OK, Status.BRIDGED} <= set(assert_same(compile_plan(mechanism), samples))
 
 
 @pytest.mark.parametrize("mechanism", CHANGES)

@@ -183,7 +183,7 @@ def test_a_run_is_never_poisoned_by_samples_outside() -> None:
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", [("4", "1", "3", "2"), ("2", "1", "2", "1")])
-def test_with_several_drivers_a_crossing_is_a_limit_and_no_way_to_the_other_branch(
+def test_a_crossing_that_depends_on_one_driver_is_bridged_whatever_the_others_do(
     lengths: tuple[str, str, str, str], branch: int
 ) -> None:
     case = fourbar(*lengths, branch=branch)
@@ -196,9 +196,7 @@ def test_with_several_drivers_a_crossing_is_a_limit_and_no_way_to_the_other_bran
             u.append(u[-1] + rng.uniform(0.5, 1.5) * (step if k < 50 else -step))
         arm = [rng.uniform(0.0, 1.0) for _ in u]
         run = kinfmu.solve(mechanism, crank_angle=u, arm_angle=arm, arm_speed=0.0)
-        assert run.good[0]
-        assert set(run.status.tolist()) <= {Status.OK, Status.NEAR_SINGULAR, Status.OUTSIDE}
-        assert run.good.all() or "where branches of coupler.phi, rocker.phi cross" in run.events[0].text
+        assert set(run.status.tolist()) <= {Status.OK, Status.BRIDGED}
         exact = case.motion(np.array(u, dtype=np.longdouble))
         for name, columns in exact.items():
             for order, table in enumerate((run.values, run.rates, run.accelerations)):

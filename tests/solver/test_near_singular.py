@@ -17,7 +17,7 @@ from kinfmu.plan import compile_plan
 from kinfmu.solver import Pose, Solver, Status
 from tests.fmu.host import Host as PythonHost
 from tests.fmu.native.host import Host as NativeHost
-from tests.mechanisms import with_arm
+from tests.mechanisms import with_arm, with_second
 from tests.solver.change_points import fourbar
 
 Engine = Literal["python", "native"]
@@ -144,3 +144,96 @@ def test_near_a_singular_pose_newton_leaves_no_residual_that_another_step_would_
         left_over.append((pose.residual, residual))
     before, after = np.mean(left_over, axis=0)
     assert before <= 1.1 * after
+
+
+# ---------------------------------------------------------------------------------- each driver its own singular points
+
+
+def test_both_drivers_pass_a_crossing_of_their_own_in_one_step() -> None:
+    mechanism = with_second(fourbar("4", "1", "3", "2").mechanism)
+    alone = [fourbar("4", "1", "3", "2").run([1.0, 5.0]), fourbar("4", "1", "3", "2").run([1.0, -2.0])]
+    run = kinfmu.solve(mechanism, crank_angle=[1.0, 5.0], second_angle=[1.0, -2.0])
+    assert run.status.tolist() == [Status.OK, Status.OK]
+    for name in ("coupler.phi", "rocker.phi"):
+        assert abs(run[name] - alone[0][name]).max() <= 1e-12
+        assert abs(run[f"{name.split('.')[0]}2.phi"] - alone[1][name]).max() <= 1e-12
+
+
+def test_in_the_windows_of_two_crossings_rates_and_estimates_are_those_of_each() -> None:
+    case, speeds, accelerations = fourbar("4", "1", "3", "2"), (0.7, -1.3), (0.4, 0.9)
+    u = [math.pi - 0.013, math.pi + 0.004]
+    run = kinfmu.solve(
+        with_second(case.mechanism),
+        crank_angle=u[:1],
+        second_angle=u[1:],
+        crank_speed=speeds[0],
+        second_speed=speeds[1],
+        crank_acceleration=accelerations[0],
+        second_acceleration=accelerations[1],
+    )
+    assert run.status.tolist() == [Status.BRIDGED]
+    exact = case.motion(np.array(u, dtype=np.longdouble))
+    for k, (v, a, number) in enumerate(zip(speeds, accelerations, ("", "2"), strict=True)):
+        for name in ("coupler", "rocker"):
+            q, first, second = (float(table[k]) for table in exact[f"{name}.phi"])
+            found = [run[f"{name}{number}.{letter}"][0] for letter in ("phi", "omega", "alpha")]
+            gaps = np.abs(np.array(found) - [q, v * first, v * v * second + a * first])
+            assert (gaps <= np.maximum(run.error[0], 1e-13)).all()
+            assert run.error[0].max() <= 1e-8
+
+
+def test_a_limit_of_one_driver_names_that_driver_alone() -> None:
+    limited = fourbar("2", "1", "1.5", "1").mechanism
+    run = kinfmu.solve(with_second(limited), crank_angle=[1.0, 2.5], second_angle=[1.0, 1.2])
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert run.events[0].text.startswith("crank = 2.5 rad")
+    assert "second" not in run.events[0].text
+    assert run.events[0].text.endswith("where coupler.phi, rocker.phi would part")
+
+
+def test_a_pose_of_two_bridges_comes_back_from_its_numbers_to_the_bit() -> None:
+    solver = Solver(load_model(compile_plan(with_second(fourbar("4", "1", "3", "2").mechanism))))
+    pose = solver.solve(solver.anchor, (math.pi + 0.01, math.pi - 0.02))
+    again = solver.restore(solver.dump(pose))
+    ud, udd = (0.3, 0.4), (0.1, -0.2)
+    assert solver.motion(again, ud, udd) == solver.motion(pose, ud, udd)
+    assert solver.errors(again, ud, udd) == solver.errors(pose, ud, udd)
+    ahead, same = (solver.solve(start, (4.0, 4.4)) for start in (pose, again))
+    assert ahead.z == same.z
+    assert solver.restore(solver.dump(ahead)).z == ahead.z
+    far = solver.solve(solver.restore(solver.dump(ahead)), (3.0, 3.3))
+    assert far.z == solver.solve(ahead, (3.0, 3.3)).z
+
+
+@pytest.mark.parametrize("flavour", ["python", "native 3"])
+def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str, tmp_path: Path) -> None:
+    name, _, fmi = flavour.partition(" ")
+    case = fourbar("4", "1", "3", "2")
+    path = kinfmu.build(
+        with_second(case.mechanism),
+        tmp_path / "two.fmu",
+        flavour=name,  # type: ignore[arg-type]  # one of the two
+        fmi=int(fmi or 2),  # type: ignore[arg-type]
+        drive="inputs",
+    )
+    host = (PythonHost if name == "python" else NativeHost)(path, tmp_path / "unpacked")
+    ways = [(1.0, 1.0), (3.1, 3.16), (3.18, 2.0), (5.0, -1.0)]
+    try:
+        host.initialize(0.0)
+        fmu = host.slave if name == "python" else host.fmu
+        taken = fmu.getFMUstate() if name == "python" else fmu.getFMUState()
+        runs = []
+        for _ in range(2):
+            found = []
+            for k, (first, second) in enumerate(ways):
+                host.set({"crank_angle": first, "second_angle": second})
+                found.append([host.status(), *host.get("rocker.phi", "rocker2.phi")])
+                assert host.step(0.1 * k, 0.1) == (name == "python")  # True, or fmi3OK
+            runs.append(found)
+            (fmu.setFMUstate if name == "python" else fmu.setFMUState)(taken)
+    finally:
+        host.free()
+    assert runs[0] == runs[1]
+    assert [int(row[0]) for row in runs[0]] == [0, 2, 2, 0]
+    exact = case.motion(np.array(ways, dtype=np.longdouble).ravel())["rocker.phi"][0].astype(float).reshape(-1, 2)
+    assert np.abs(np.array(runs[0])[:, 1:] - exact).max() <= 1e-11

@@ -257,7 +257,7 @@ class Walk:
 
     drawn: Drawn
     magnitudes: Magnitudes
-    marks: tuple[float, ...] = ()  # none are known
+    marks: tuple[float, ...] = ()  # of each driver that is an angle
 
     def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:
         """For samples (n, d): each way begins at the sample before that can be reached; good: where kinfmu has numbers,
@@ -331,12 +331,10 @@ def walk(drawn: Drawn) -> Walk:
     for one_way in exact:
         angles = {name: np.asarray(c.d0, dtype=float) for name, c in one_way.columns.items() if name.endswith(".phi")}
         found.append(_magnitudes(drawn, one_way.columns, angles, regular))
-    return Walk(
-        drawn,
-        Magnitudes(
-            *({name: max(table[name], other[name]) for name in table} for table, other in zip(*found, strict=True))
-        ),
+    magnitudes = Magnitudes(
+        *({name: max(table[name], other[name]) for name in table} for table, other in zip(*found, strict=True))
     )
+    return Walk(drawn, magnitudes, tuple(_marks(drawn, -TURN, 2.0 * TURN)) if drawn.sketch.marks else ())
 
 
 def branch_of(drawn: Drawn) -> Interval | Walk:

@@ -601,6 +601,45 @@ def robots(rng: Draw) -> Sketch:
     return Sketch(points, poses, drivers, kinds=("angle",) * 3)
 
 
+def two_machines(rng: Draw) -> Sketch:
+    """A linkage and a four-bar beside it, each with a driver of its own; at times an arm on the linkage with a third.
+
+    Each may have change points, which depend on its own driver alone.
+    """
+    first = rng.choice((change_points, change_points, four_bars, near_change_points, crank_and_rod, watt_six_bars))(rng)
+    other = fourbar(changing(rng) if rng.random() < 0.6 else grashof(rng, rng.choice(KINDS)), _driven(rng), _side(rng))
+    if first.kinds != ("angle",):
+        raise RedrawError
+    aside, has_arm = (drawn_length(rng, 3.0, 6.0), drawn_length(rng, -2.0, 2.0)), rng.random() < 0.5
+    carrier, wrist = "rod" if "rod" in first.points else "coupler", (drawn_length(rng, 0.2, 1.0), Fraction(0))
+    points = {body: dict(given) for body, given in first.points.items()}
+    for body, given in other.points.items():
+        if body == "ground":
+            points[body] |= {f"{name}2": (x + aside[0], y + aside[1]) for name, (x, y) in given.items()}
+        else:
+            points[f"{body}2"] = {f"{name}2": point for name, point in given.items()}
+    if has_arm:
+        points[carrier]["W"] = wrist
+        points["arm"] = {"W": ORIGIN}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = first.poses(numbers, u[:1], closing)
+        moved = standing(numbers, *aside, u[1])
+        for body, pose in other.poses(numbers, u[1:2], closing).items():
+            moving[f"{body}2"] = Pose(pose.at + moved, pose.phi)
+        if has_arm:
+            moving["arm"] = Pose(world(numbers, moving[carrier], wrist), u[2])
+        return moving
+
+    def drivers(frame: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        (one,), (two,) = first.drivers(frame, start[:1]), other.drivers(frame, start[1:2])
+        found = (one, AngleDriver("drive2", f"{two.of}2", ConstantSpeed(start[1], 1.0)))
+        return (*found, AngleDriver("wrist", "arm", ConstantSpeed(start[2], 1.0))) if has_arm else found
+
+    kinds = ("angle",) * (3 if has_arm else 2)
+    return Sketch(points, poses, drivers, first.joints, kinds, tuple({*first.marks, *other.marks}))
+
+
 def cylinders(rng: Draw) -> Sketch:
     """A boom raised by a cylinder; at times with a stick on it, moved by a second one."""
     has_stick = rng.random() < 0.5
@@ -667,6 +706,7 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "coupled wheels": (coupled_wheels, 4),
     "five-bars": (five_bars, 4),
     "robots": (robots, 4),
+    "two machines": (two_machines, 4),
     "cylinders": (cylinders, 4),
     STARTS_ANYWHERE: (starts_anywhere, 5),
 }

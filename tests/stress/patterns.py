@@ -130,7 +130,10 @@ PATTERNS: dict[str, Callable[[Random, Interval], Values]] = {
 def drawn_steps(rng: Random, branch: Interval | Walk) -> tuple[list[str], Floats]:
     """Names of three patterns, and their driver values (n, d) one after the other."""
     if isinstance(branch, Walk):
-        return ["ways", "to limits and back"], np.concatenate([_ways(rng, branch), _to_limits(rng, branch)])
+        names, steps = ["ways", "to limits and back"], [_ways(rng, branch), _to_limits(rng, branch)]
+        if branch.marks:
+            names, steps = [*names, "over change points"], [*steps, _over_marks(rng, branch)]
+        return names, np.concatenate(steps)
     names = rng.sample(sorted(PATTERNS), 3)
     steps: list[float] = []
     outside = 0
@@ -179,3 +182,22 @@ def _to_limits(rng: Random, branch: Walk) -> Floats:
         found += [here + (limit - gap) * direction for gap in [*gaps, *back] if gap < limit]
         found.append(here)
     return np.array(found)
+
+
+def _over_marks(rng: Random, branch: Walk) -> Floats:
+    """Of several drivers: even steps of each there and back, in order or not; and close to change points of some."""
+    generator = np.random.default_rng(rng.getrandbits(64))
+    start = np.array(branch.drawn.start)
+    steps = np.radians(10.0 ** generator.uniform(-1.0, 1.5, len(start))) * generator.choice((-1.0, 1.0), len(start))
+    ahead = start + steps * np.arange(1, 25)[:, None]
+    if generator.uniform() < 0.3:
+        generator.shuffle(ahead)
+    beside = []
+    for _ in range(8):
+        place = start + generator.uniform(-0.5, 0.5, len(start))
+        for k in range(len(start)):
+            if generator.uniform() < 0.6:
+                off = generator.choice((-1.0, 0.0, 1.0)) * 10.0 ** -generator.uniform(1.0, 12.0)
+                place[k] = generator.choice(branch.marks) + off
+        beside.append(place)
+    return np.concatenate([ahead, ahead[::-2], np.array(beside), [start]])

@@ -50,6 +50,7 @@ def _sizes(parts: Parts) -> str:
     plan, solved = parts.plan, parts.solved
     counts = {
         "DRIVERS": len(plan.drivers),
+        "TRACKS": int(plan.has_tracks),
         "UNKNOWNS": len(plan.unknowns),
         "COORDINATES": len(parts.order),
         "BLOCKS": len(solved),

@@ -23,6 +23,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
         *array("double kf_reach", [1.0 if kind == "angle" else plan.size for kind in kinds]),
         *array("int kf_block_ends", ends),
         *array("int kf_block_rows", [len(block.residuals) for block in solved]),
+        *(array("int kf_block_drivers", plan.block_drivers) if plan.has_tracks else []),
         *array("double kf_row_scales", [scale for block in solved for scale in block.row_scales]),
         *array("double kf_determinant_factors", [1.0 / block.determinant_scale for block in solved]),
         *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),

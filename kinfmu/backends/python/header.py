@@ -59,6 +59,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"UNKNOWNS = {plan.unknowns!r}",
         f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
         f"BLOCKS = {tuple(places(solved))!r}",
+        *([f"BLOCK_DRIVERS = {plan.block_drivers!r}"] if len(plan.drivers) > 1 else []),
         f"ANCHOR = {(anchor_u, anchor_z)!r}",
         f"ROW_SCALES = {scales!r}",
         f"TALL = {tuple(k for k, b in enumerate(solved) if len(b.residuals) > len(b.unknowns))!r}",

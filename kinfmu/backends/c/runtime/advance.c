@@ -39,15 +39,15 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
     const double *x1 = pose->x1, *x2 = pose->x2;
     double needed;
     int k;
-    if (KF_DRIVERS == 1) {
+    if (KF_IS_ONE(solver)) {
         if (pose->derivatives < 2) {
             kf_tangent(model, pose);
         }
     } else {
         x1 = solver->scratch.x1;
         x2 = solver->scratch.x2;
-        kf_velocity(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
-        kf_acceleration(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
+        kf_rates(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
+        kf_second_rates(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
     }
     if (kf_position(model, u, pose->found.x, x1, x2, s, NULL, &trial->found) >= 0) { /* singular, or diverged */
         return false;
@@ -89,13 +89,13 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
     if (pose->found.margin < KF_UNDECIDED && trial->found.margin > pose->found.margin) {
         return false;
     }
-    if (KF_DRIVERS == 1) {
+    if (KF_IS_ONE(solver)) {
         kf_tangent(model, pose);
         kf_tangent(model, trial);
     } else {
         x1 = solver->scratch.x1; /* of the step from the pose to the trial */
         x2 = solver->scratch.x2;
-        kf_velocity(model, &trial->found, direction, NULL, NULL, trial->x1);
+        kf_rates(model, &trial->found, direction, NULL, NULL, trial->x1);
     }
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         largest = fmax(largest, fabs(there[k]) / kf_unknown_scales[k]);
@@ -109,19 +109,22 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
  */
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u)
 {
-    const double longest = KF_LONGEST_STEP * kf_reach[0];
+    const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)];
     kf_pose *const walk = solver->scratch.walk, *pose = start;
     double step = longest;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
     int k;
     for (k = 0; k < MOST_WALKED; ++k) {
-        const double here = KF_POSE_U(pose)[0], distance = u - here;
+        const double here = KF_HERE(solver, pose), distance = u - here;
         const bool whole = -step <= distance && distance <= step;
         const double s = whole ? distance : distance > 0.0 ? step : -step, there = whole ? u : here + s;
         kf_pose *const trial = pose == &walk[0] ? &walk[1] : &walk[0];
         if (here == u) {
             return pose;
         }
-        if (kf_trusted_step(solver, pose, kf_alone, s, &there, trial)) {
+        if (kf_trusted_step(solver, pose, KF_SPEEDS(&solver->model), s, KF_AT(&solver->model, &there, room), trial)) {
             pose = trial;
             continue;
         }
@@ -134,7 +137,7 @@ kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u)
 }
 
 /* Direction and length of a straight way of several drivers, measured by the driver that has most to go. */
-static double course(const double *start, const double *target, double *direction)
+double kf_course(const double *start, const double *target, double *direction)
 {
     double length = 0.0;
     int k;
@@ -183,7 +186,7 @@ static kf_pose *on_road(kf_solver *solver, const kf_pose *pose, int road, kf_pos
     if (place != pose) {
         *place = *pose;
     }
-    kf_stretch(solver, road, KF_POSE_U(place)[0], &place->low, &place->high);
+    kf_stretch(solver, road, KF_HERE(solver, place), &place->low, &place->high);
     place->road = road;
     place->bridge = -1;
     place->status = KF_OK;
@@ -200,13 +203,14 @@ static kf_pose *on_road(kf_solver *solver, const kf_pose *pose, int road, kf_pos
  */
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit)
 {
-    const bool one = KF_DRIVERS == 1;
-    const double longest = one ? KF_LONGEST_STEP * kf_reach[0] : KF_LONGEST_STEP;
+    const bool one = KF_IS_FOLLOWED;
+    const double longest = one ? KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)] : KF_LONGEST_STEP;
     kf_pose *pose = start, *before = start, *regular = start, *trial;
-    double direction[KF_DRIVERS] = {1.0}, u[KF_DRIVERS], distance, step = longest;
+    double direction[KF_DRIVERS], u[KF_DRIVERS], distance, step = longest;
     int iterations = 0, turn, k;
     bool is_limited = false;
-    distance = one ? target[0] - KF_POSE_U(start)[0] : course(KF_POSE_U(start), target, direction);
+    memcpy(direction, KF_SPEEDS(&solver->model), sizeof direction);
+    distance = one ? target[KF_ALONG(solver)] - KF_HERE(solver, start) : kf_course(KF_POSE_U(start), target, direction);
     memcpy(limit->u, KF_POSE_U(start), sizeof limit->u);
     limit->block = KF_TOO_FAR;
     limit->crosses = false;
@@ -223,24 +227,24 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *t
         if (one) {
             kf_needed(solver, start->road, pose->road, regular->road);
             road = pose->road;
-            if (!(pose->low <= target[0] && target[0] <= pose->high)) {
+            if (!(pose->low <= target[KF_ALONG(solver)] && target[KF_ALONG(solver)] <= pose->high)) {
                 const int bridge =
-                    pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, road, KF_POSE_U(pose)[0], target[0]);
-                if (kf_covers(&solver->bridges[bridge], target[0])) {
+                    pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, road, KF_HERE(solver, pose), target[KF_ALONG(solver)]);
+                if (kf_covers(&KF_MAP(solver)->bridges[bridge], target[KF_ALONG(solver)])) {
                     if (!kf_bridge_pose(solver, bridge, target, trial)) { /* a block not interpolated ends there */
                         memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
                         limit->block = KF_NO_BLOCK;
                         return NULL;
                     }
-                    kf_stretch(solver, road, target[0], &trial->low, &trial->high);
+                    kf_stretch(solver, road, target[KF_ALONG(solver)], &trial->low, &trial->high);
                     trial->road = road;
                     return trial;
                 }
-                kf_bridge_exit(solver, bridge, target[0], trial);
+                kf_bridge_exit(solver, bridge, target[KF_ALONG(solver)], trial);
                 pose = on_road(solver, trial, road, trial);
                 continue;
             }
-            distance = target[0] - KF_POSE_U(pose)[0];
+            distance = target[KF_ALONG(solver)] - KF_HERE(solver, pose);
             if (distance == 0.0) { /* a node, or a step that ended there by rounding */
                 return arrived(pose, regular, iterations);
             }

@@ -38,7 +38,7 @@ static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
 /* A span whole turns on; `raised` tells the turns of the unknowns. */
 static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
 {
-    const kf_span *const from = &solver->spans[span];
+    const kf_span *const from = &KF_MAP(solver)->spans[span];
     int k;
     bridge->span = span;
     bridge->turns = turns;
@@ -52,20 +52,25 @@ static void make(kf_bridge *bridge, const kf_solver *solver, int span, double tu
 /* The pose at a node. */
 static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pose *pose)
 {
-    const double *const z = solver->spans[bridge->span].z[node];
+    const double *const z = KF_MAP(solver)->spans[bridge->span].z[node];
     double *const there = solver->scratch.z;
+    const double *u;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    u = KF_AT(&solver->model, &bridge->u[node], room);
     kf_fresh(pose, -1, -INFINITY, INFINITY);
     if (bridge->turns == 0.0) { /* as it was found */
-        return kf_evaluated_as_given(&solver->model, &bridge->u[node], z, &pose->found);
+        return kf_evaluated_as_given(&solver->model, u, z, &pose->found);
     }
     turn_on(bridge, z, there);
-    return kf_evaluated(&solver->model, &bridge->u[node], there, NULL, &pose->found);
+    return kf_evaluated(&solver->model, u, there, NULL, &pose->found);
 }
 
 /* The farthest node on the target's side that does not lie beyond the target. */
 bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
 {
-    const kf_bridge *const bridge = &solver->bridges[number];
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
     const int near = target > bridge->centre ? 3 : 2, far = target > bridge->centre ? 4 : 1;
     const bool passed = fabs(target - bridge->centre) >= fabs(bridge->u[far] - bridge->centre);
     return at_node(solver, bridge, passed ? far : near, pose);
@@ -75,10 +80,10 @@ bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
 bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose)
 {
     const kf_model *const model = &solver->model;
-    const kf_bridge *const bridge = &solver->bridges[number];
-    const kf_span *const span = &solver->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
     double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
-    kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[0]), z, zd, zdd);
+    kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[KF_ALONG(solver)]), z, zd, zdd);
     turn_on(bridge, z, z);
     kf_fresh(pose, -1, INFINITY, -INFINITY);
     if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
@@ -86,8 +91,8 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     }
     pose->bridge = number;
     pose->status = KF_BRIDGED;
-    kf_velocity(model, &pose->found, kf_alone, zd, span->held, pose->x1);
-    kf_acceleration(model, &pose->found, kf_at_rest, pose->x1, zdd, span->held, pose->x2);
+    kf_rates(model, &pose->found, KF_SPEEDS(model), zd, span->held, pose->x1);
+    kf_second_rates(model, &pose->found, kf_at_rest, pose->x1, zdd, span->held, pose->x2);
     pose->derivatives = 2;
     return true;
 }
@@ -95,24 +100,29 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
 /* True if the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
 static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
 {
-    const kf_span *const span = &solver->spans[bridge->span];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
     double *const z = solver->scratch.z;
-    double largest = fabs(bridge->centre) / kf_reach[0];
-    int k;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    double largest = fabs(bridge->centre) / kf_reach[KF_ALONG(solver)];
+    int block, k = 0;
     kf_span_middle(span, z);
     turn_on(bridge, z, z);
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        largest = fmax(largest, fabs(z[k]) / kf_unknown_scales[k]);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            largest = kf_is_outside(&solver->model, block) ? largest : fmax(largest, fabs(z[k]) / kf_unknown_scales[k]);
+        }
     }
-    return kf_evaluated(&solver->model, &bridge->centre, z, span->held, found)
+    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, room), z, span->held, found)
            && found->residual <= CLOSED + 4.0 * KF_EPS * largest;
 }
 
 /* What the wider span says less than the one used, in z and its two derivatives: the error estimate. */
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd)
 {
-    const kf_bridge *const bridge = &solver->bridges[number];
-    const kf_span *const span = &solver->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
     kf_span_difference(span, inner_of(solver, bridge), place(bridge, span, u), z, zd, zdd);
 }
 
@@ -123,13 +133,13 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
  */
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
 {
-    const kf_bridge *const bridge = &solver->bridges[number];
-    const kf_span *const span = &solver->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
     const double turns = kf_whole_turns(u - span->centre), there = kf_turned(u, -turns);
-    const double here = kf_turned(KF_POSE_U(pose)[0], -turns);
+    const double here = kf_turned(KF_HERE(solver, pose), -turns);
     const int first = here > span->centre ? 3 : 0;
     const int made = kf_spare_bridge(solver);
-    kf_bridge *const other = &solver->bridges[made];
+    kf_bridge *const other = &KF_MAP(solver)->bridges[made];
     const kf_pose *arrived;
     int node = first, k;
     if (turns == bridge->turns || !(span->u[0] <= there && there <= span->u[KF_NODES - 1])) {
@@ -172,11 +182,11 @@ bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
  */
 static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
 {
-    const double least = 0.1 * NARROWEST * kf_reach[0];
-    double step = 0.5 * (*zero - KF_POSE_U(pose)[0]);
+    const double least = 0.1 * NARROWEST * kf_reach[KF_ALONG(solver)];
+    double step = 0.5 * (*zero - KF_HERE(solver, pose));
     bool whole = false; /* the first estimate may stem from the same two places */
     while (fabs(step) > least) {
-        const double here = KF_POSE_U(pose)[0];
+        const double here = KF_HERE(solver, pose);
         kf_pose *const ahead = kf_plainly(solver, pose, here + step);
         double of_here, of_ahead, better, left, change;
         if (ahead == NULL) {
@@ -186,22 +196,22 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
         }
         of_here = pose->found.determinants[block];
         of_ahead = ahead->found.determinants[block];
-        if (!kf_secant_zero(here, of_here, KF_POSE_U(ahead)[0], of_ahead, &better)) {
+        if (!kf_secant_zero(here, of_here, KF_HERE(solver, ahead), of_ahead, &better)) {
             return false;
         }
-        left = better - KF_POSE_U(ahead)[0];
+        left = better - KF_HERE(solver, ahead);
         if (left * step <= 0.0) {
             return false;
         }
         change = fabs(better - *zero);
         *zero = better;
-        if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[0]) {
+        if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
             return true;
         }
         solver->scratch.located = *ahead; /* walks from here may fail */
         pose = &solver->scratch.located;
         whole = true;
-        step = 0.5 * (better - KF_POSE_U(pose)[0]);
+        step = 0.5 * (better - KF_HERE(solver, pose));
     }
     return false;
 }
@@ -220,6 +230,9 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
     double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
     kf_pose *const pose = &solver->scratch.walk[0];
     double *const last = determinants[2];
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
     int node, k;
     for (node = 3; node < KF_NODES; ++node) {
         const int first = node == 5 ? 1 : 0, count = node - first;
@@ -228,7 +241,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
         kf_weights(count, places + first, places[node], weights);
         kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
         kf_fresh(pose, -1, -INFINITY, INFINITY);
-        if (!kf_evaluated(&solver->model, &u, solver->scratch.z, NULL, &pose->found)
+        if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, room), solver->scratch.z, NULL, &pose->found)
             || pose->found.moved > STEADY * pose->found.margin) {
             return false;
         }
@@ -249,7 +262,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
 /* A span of one width over the zero of a block's determinant, from the side that the pose is on. */
 static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block, double centre, double half)
 {
-    const double side = centre > KF_POSE_U(pose)[0] ? 1.0 : -1.0;
+    const double side = centre > KF_HERE(solver, pose) ? 1.0 : -1.0;
     double distance = 4.0;
     int node;
     span->centre = centre;
@@ -281,7 +294,7 @@ static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block
  */
 int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
 {
-    const double reach = kf_reach[0];
+    const double reach = kf_reach[KF_ALONG(solver)];
     double half, apart = AGREED;
     int best = -1;
     if (!locate(solver, pose, block, &zero)) {
@@ -289,7 +302,7 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     }
     for (half = KF_HALF_WIDTH * reach; half >= NARROWEST * reach && apart > FINE; half *= 0.5) {
         const int number = kf_spare_span(solver, best);
-        kf_span *const span = &solver->spans[number < 0 ? 0 : number];
+        kf_span *const span = &KF_MAP(solver)->spans[number < 0 ? 0 : number];
         if (number >= 0 && span_over(solver, span, pose, block, zero, half) && kf_span_apart(span) < apart) {
             best = number;
             apart = kf_span_apart(span);
@@ -297,7 +310,7 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     }
     if (best >= 0) {
         const int number = kf_spare_bridge(solver);
-        kf_bridge *const bridge = &solver->bridges[number];
+        kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
         int k;
         for (k = 0; k < KF_UNKNOWNS; ++k) {
             bridge->raised[k] = 0.0;

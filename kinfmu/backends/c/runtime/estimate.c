@@ -19,18 +19,17 @@ typedef struct {
 } kf_driven;
 
 /* How a pose is driven; its derivatives are formed. */
-static kf_driven drive_of(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
+static kf_driven drive_of(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
 {
-    const bool one = KF_DRIVERS == 1;
+    const bool one = KF_IS_ONE(solver);
     kf_driven drive;
-    drive.ud = one ? kf_alone : ud;
+    drive.ud = one ? KF_SPEEDS(&solver->model) : ud;
     drive.udd = one ? kf_at_rest : udd;
-    drive.held = pose->bridge < 0 ? NULL : solver->spans[solver->bridges[pose->bridge].span].held;
+    drive.held = pose->bridge < 0 ? NULL : KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span].held;
     if (one) {
         kf_tangent(&solver->model, pose);
     } else {
-        kf_velocity(&solver->model, &pose->found, ud, NULL, NULL, pose->x1);
-        kf_acceleration(&solver->model, &pose->found, udd, pose->x1, NULL, NULL, pose->x2);
+        drive.held = kf_rates_in_time(&solver->model, pose, ud, udd);
     }
     drive.speed = kf_larger(kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales), KF_DRIVERS, drive.ud, kf_reach);
     drive.curve = kf_larger(drive.speed * drive.speed, KF_UNKNOWNS, pose->x2, kf_unknown_scales);
@@ -55,7 +54,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
         given[k] = 0.0;
     }
     kf_soften(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
-    kf_velocity(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
+    kf_rates(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         source->z[k] = weight * c * all_of[k];
         source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
@@ -93,14 +92,14 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
     if (!kf_evaluated(model, KF_POSE_U(pose), z, all, &there->found)) {
         return false;
     }
-    kf_velocity(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
+    kf_rates(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
                 there->x1);
     add(there->x1, pose->x1, source->first, z);
-    kf_velocity(model, &there->found, drive->ud, z, all, there->x1);
-    kf_acceleration(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
+    kf_rates(model, &there->found, drive->ud, z, all, there->x1);
+    kf_second_rates(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
                     drive->held, there->x2);
     add(there->x2, pose->x2, source->second, z);
-    kf_acceleration(model, &there->found, drive->udd, there->x1, z, all, there->x2);
+    kf_second_rates(model, &there->found, drive->udd, there->x1, z, all, there->x2);
     return true;
 }
 
@@ -116,10 +115,13 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     double weight;
     kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
-    if (!kf_evaluated_as_given(&solver->model, &span->u[place], span->z[place], &node->found)) {
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    if (!kf_evaluated_as_given(&solver->model, KF_AT(&solver->model, &span->u[place], room), span->z[place], &node->found)) {
         return false;
     }
-    drive = drive_of(solver, node, kf_alone, kf_at_rest);
+    drive = drive_of(solver, node, KF_SPEEDS(&solver->model), kf_at_rest);
     count = kf_worst_blocks(&solver->model, &node->found, NULL, worst, &weight);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         squares[k] = 0.0;
@@ -151,7 +153,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
 {
     kf_scratch *const scratch = &solver->scratch;
     kf_source *const source = &scratch->source;
-    const kf_span *const span = &solver->spans[solver->bridges[pose->bridge].span];
+    const kf_span *const span = &KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span];
     double *const rounding = scratch->x2; /* of the unknowns */
     const double half = span->half;
     int k;
@@ -161,18 +163,50 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
     if (!round_node(solver, span, 2, rounding) || !round_node(solver, span, 3, rounding)) {
         return false;
     }
-    kf_bridge_difference(solver, pose->bridge, KF_POSE_U(pose)[0], scratch->z, scratch->zd, scratch->zdd);
+    kf_bridge_difference(solver, pose->bridge, KF_HERE(solver, pose), scratch->z, scratch->zd, scratch->zdd);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         scratch->z[k] = away(scratch->z[k], rounding[k]);
         source->given_first[k] = pose->x1[k] + away(scratch->zd[k], 1.0 / half * rounding[k]);
         source->given_second[k] = pose->x2[k] + away(scratch->zdd[k], 1.0 / (half * half) * rounding[k]);
         source->first[k] = source->second[k] = 0.0;
     }
-    kf_velocity(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
+    kf_rates(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
     memcpy(source->z, scratch->x1, KF_UNKNOWNS * sizeof(double));
     source->is_given = true;
     return true;
 }
+
+#if KF_TRACKS
+
+/* What the bridge of one track adds, in time. */
+static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int driver)
+{
+    kf_source *const source = &solver->scratch.source;
+    const double v = drive->ud[driver], a = drive->udd[driver];
+    kf_pose *own;
+    bool is_made;
+    int block, k = 0;
+    kf_enter_track(solver, driver);
+    own = kf_own_pose(solver, pose, driver);
+    {
+        const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
+        is_made = make_source_of_bridge(solver, own, &along);
+    }
+    kf_leave_track(solver);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const bool is_own = kf_block_drivers[block] == driver;
+        for (; k < kf_block_ends[block]; ++k) {
+            const double one = is_own ? source->given_first[k] - own->x1[k] : 0.0;
+            const double two = is_own ? source->given_second[k] - own->x2[k] : 0.0;
+            source->z[k] = is_own ? source->z[k] : 0.0;
+            source->given_first[k] = pose->x1[k] + v * one;
+            source->given_second[k] = pose->x2[k] + (v * v * two + a * one);
+        }
+    }
+    return is_made;
+}
+
+#endif
 
 /* The largest difference of two rows of outputs, in radians and sizes. */
 static double largest_gap(const double *there, const double *here)
@@ -198,10 +232,20 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
     int worst[KF_MOST_SOURCES], i, order;
     double weight;
     const int count = kf_worst_blocks(&solver->model, &pose->found, drive->held, worst, &weight);
+    const int most = pose->bridge >= 0 ? 1 : KF_TRACKS ? KF_DRIVERS : 0;
     kf_outputs_of(&solver->model, pose, ud, udd, rows[0][0], rows[0][1], rows[0][2]);
-    for (i = 0; i < count + (pose->bridge >= 0 ? 1 : 0); ++i) {
+    for (i = 0; i < count + most; ++i) {
         if (i < count) {
             make_source(solver, pose, drive, worst[i], weight);
+#if KF_TRACKS
+        } else if (!KF_IS_ONE(solver)) {
+            if (!pose->has_tracks || pose->own[i - count].bridge < 0) {
+                continue;
+            }
+            if (!make_source_of_track(solver, pose, drive, i - count)) {
+                return false;
+            }
+#endif
         } else if (!make_source_of_bridge(solver, pose, drive)) {
             return false;
         }
@@ -218,10 +262,34 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
 }
 
 /* True where branches cross and no bridge holds: whose rates these are is not known. */
-static bool is_at_a_crossing(const kf_pose *pose, const kf_driven *drive)
+static bool is_at_a_crossing(const kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
 {
-    return KF_DRIVERS == 1 && pose->bridge < 0 && pose->found.margin < KF_UNDECIDED
-        && drive->speed * kf_reach[0] < KF_STEEP;
+    (void)solver;
+    return KF_IS_ONE(solver) && pose->bridge < 0 && pose->found.margin < KF_UNDECIDED
+        && drive->speed * kf_reach[KF_ALONG(solver)] < KF_STEEP;
+}
+
+/* The same of one of the tracks. */
+static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
+{
+    bool is_there = false;
+#if KF_TRACKS
+    int driver;
+    for (driver = 0; pose->has_tracks && pose->found.margin < KF_UNDECIDED && driver < KF_DRIVERS; ++driver) {
+        kf_pose *own;
+        kf_enter_track(solver, driver);
+        own = kf_own_pose(solver, pose, driver);
+        if (own->found.margin < KF_UNDECIDED) {
+            const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
+            is_there = is_there || is_at_a_crossing(solver, own, &along);
+        }
+        kf_leave_track(solver);
+    }
+#else
+    (void)solver;
+    (void)pose;
+#endif
+    return is_there;
 }
 
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
@@ -231,7 +299,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     const double *const outputs = solver->scratch.rows[0][0];
     int k;
     if (KF_DRIVERS == 1) {
-        const double r = kf_reach[0], v = fabs(ud[0]) / r, a = fabs(udd[0]) / r;
+        const double r = kf_reach[KF_ALONG(solver)], v = fabs(ud[0]) / r, a = fabs(udd[0]) / r;
         speed = drive.speed * r * v;
         curve = drive.curve * r * r * v * v + drive.speed * r * a;
     }
@@ -245,7 +313,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
-    if (is_at_a_crossing(pose, &drive)) {
+    if (is_at_a_crossing(solver, pose, &drive) || is_a_track_at_a_crossing(solver, pose)) {
         errors[1] = errors[2] = INFINITY;
     }
 }

@@ -26,6 +26,12 @@
 typedef struct {
     double parameters[KF_ROOM(KF_PARAMETERS)];
     double derived[KF_ROOM(KF_DERIVED)];
+#if KF_TRACKS
+    int track; /* 0: the whole model; else the number of a driver, from 1, with the blocks that depend on it alone */
+    bool outside[KF_BLOCKS]; /* blocks of other drivers */
+    double along[KF_DRIVERS], rest[KF_DRIVERS]; /* speeds of the drivers, and their values */
+    double kept[KF_UNKNOWNS]; /* unknowns of those blocks */
+#endif
 } kf_model;
 
 /* A pose: x holds the unknowns first, then the coordinates that are given outright, then the driver values.
@@ -72,6 +78,9 @@ double kf_curve_at(const kf_curve *curve, int order, double x);
 extern const double kf_anchor_u[KF_DRIVERS];
 extern const double kf_anchor_z[KF_ROOM(KF_UNKNOWNS)];
 extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];
+#if KF_TRACKS
+extern const int kf_block_drivers[KF_BLOCKS]; /* the driver that each block depends on */
+#endif
 extern const double kf_reach[KF_DRIVERS]; /* what counts as a step of one */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
@@ -98,6 +107,7 @@ extern const int kf_accelerations_places[KF_ROOM(KF_OUTPUTS)];
 
 bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room);
 void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
+bool kf_is_outside(const kf_model *model, int block); /* true for a block that is not of the track that is followed */
 int kf_solve_blocks(const kf_model *model, const double *z, const bool *held, kf_found *found,
                     kf_newton *newton); /* x of all blocks from what x predicts; -1, or the block that failed */
 void kf_velocity(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,

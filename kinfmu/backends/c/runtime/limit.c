@@ -20,15 +20,15 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     for (k = 1; k < KF_BLOCKS; ++k) {
         limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
     }
-    if (KF_DRIVERS == 1) {
+    if (KF_IS_FOLLOWED) {
         kf_tangent(&solver->model, pose);
     } else {
-        kf_velocity(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
+        kf_rates(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
     }
     for (k = kf_first_of(limit->block); k < kf_block_ends[limit->block]; ++k) {
         steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
     }
-    limit->crosses = steepest * (KF_DRIVERS == 1 ? kf_reach[0] : 1.0) < KF_STEEP;
+    limit->crosses = steepest * (KF_IS_FOLLOWED ? kf_reach[KF_ALONG(solver)] : 1.0) < KF_STEEP;
     near = fabs(determinants[limit->block]);
     far = fabs(before->found.determinants[limit->block]);
     if (!limit->crosses) {
@@ -55,23 +55,23 @@ bool kf_is_beyond(const double *target, const double *limit, const double *direc
 }
 
 /* Why a target cannot be reached, in one line. */
-void kf_say_limit(char *message, const kf_limit *limit, const double *target)
+void kf_say_limit(char *message, const kf_limit *limit, const double *target, int driver)
 {
     int k;
     if (limit->block == KF_TOO_FAR) {
-        kf_say_place(message, target, KF_ROUGHLY);
+        kf_say_place(message, target, KF_ROUGHLY, driver);
         kf_say(message, " is too far from ");
-        kf_say_place(message, limit->u, KF_ROUGHLY);
+        kf_say_place(message, limit->u, KF_ROUGHLY, driver);
         kf_say(message, ": more than %d steps on one way", KF_MOST_STEPS);
         return;
     }
     if (!kf_differs(target, limit->u, KF_LOCATED)) {
-        kf_say_place(message, target, KF_LOCATED);
+        kf_say_place(message, target, KF_LOCATED, driver);
         kf_say(message, " cannot be reached: to these digits it is the limit");
     } else {
-        kf_say_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED);
+        kf_say_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED, driver);
         kf_say(message, " cannot be reached: the limit is ");
-        kf_say_place(message, limit->u, KF_LOCATED);
+        kf_say_place(message, limit->u, KF_LOCATED, driver);
     }
     kf_say(message, limit->crosses ? ", where branches of " : ", where ");
     if (limit->block == KF_NO_BLOCK) {

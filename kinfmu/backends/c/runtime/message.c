@@ -51,14 +51,17 @@ static void say_decimals(char *message, int count, double value)
     }
 }
 
-/* "crank = 1.047198 rad (60 deg)": driver values; angles to so many decimals, lengths to so many digits. */
-void kf_say_place(char *message, const double *u, int digits)
+/* "crank = 1.047198 rad (60 deg)": driver values, of one driver or of all; angles to so many decimals, lengths to so many digits. */
+void kf_say_place(char *message, const double *u, int digits, int driver)
 {
     char format[16];
     int k;
     snprintf(format, sizeof format, "%%.%dg", digits);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        kf_say(message, "%s%s = ", k > 0 ? ", " : "", kf_driver_names[k]);
+        if (driver >= 0 && k != driver) {
+            continue;
+        }
+        kf_say(message, "%s%s = ", k > 0 && driver < 0 ? ", " : "", kf_driver_names[k]);
         if (kf_driver_is_angle[k]) {
             say_decimals(message, digits, u[k]);
             kf_say(message, " rad (");

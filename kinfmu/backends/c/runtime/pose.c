@@ -14,6 +14,9 @@ inline void kf_fresh(kf_pose *pose, int road, double low, double high)
     pose->road = road;
     pose->bridge = -1;
     pose->has_base = false;
+#if KF_TRACKS
+    pose->has_tracks = pose->is_held = false;
+#endif
 }
 
 /* What kf_position gives for unknowns that are known: held blocks are not solved for. s = -0.0 at rest leaves z as it
@@ -36,10 +39,90 @@ bool kf_evaluated_as_given(const kf_model *model, const double *u, const double 
 inline void kf_tangent(const kf_model *model, kf_pose *pose)
 {
     if (pose->derivatives < 1) {
-        kf_velocity(model, &pose->found, kf_alone, NULL, NULL, pose->x1);
+        kf_rates(model, &pose->found, KF_SPEEDS(model), NULL, NULL, pose->x1);
     }
     if (pose->derivatives < 2) {
-        kf_acceleration(model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+        kf_second_rates(model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
         pose->derivatives = 2;
     }
 }
+
+#if KF_TRACKS
+
+/* The model of a track: of the blocks that depend on one driver alone. All others stay as the anchor has them. */
+void kf_enter_track(kf_solver *solver, int driver)
+{
+    kf_model *const model = &solver->model;
+    int k;
+    model->track = driver + 1;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        model->outside[k] = kf_block_drivers[k] != driver;
+    }
+    memcpy(model->kept, solver->anchor.found.x, sizeof model->kept);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        model->along[k] = k == driver ? 1.0 : 0.0;
+        model->rest[k] = kf_anchor_u[k];
+    }
+}
+
+/* The whole model again. */
+void kf_leave_track(kf_solver *solver)
+{
+    solver->model.track = 0;
+}
+
+/* Driver values of which one is given and the others rest. */
+const double *kf_driven_at(const kf_model *model, const double *value, double *room)
+{
+    memcpy(room, model->rest, KF_DRIVERS * sizeof(double));
+    room[KF_ALONG_OF(model)] = *value;
+    return room;
+}
+
+/* Blocks whose unknowns are given: those that are held, and those outside a track. */
+static const bool *given_blocks(const kf_model *model, const bool *held, bool *room)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        room[k] = model->outside[k] || (held != NULL && held[k]);
+    }
+    return room;
+}
+
+/* What is given of the unknowns: outside a track they rest. */
+static const double *given_rates(const kf_model *model, const double *given, double *room)
+{
+    int block, k = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            room[k] = model->outside[block] || given == NULL ? 0.0 : given[k];
+        }
+    }
+    return room;
+}
+
+void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
+              double *x1)
+{
+    bool blocks[KF_ROOM(KF_BLOCKS)];
+    double rates[KF_ROOM(KF_UNKNOWNS)];
+    if (model->track > 0) {
+        held = given_blocks(model, held, blocks);
+        given = given_rates(model, given, rates);
+    }
+    kf_velocity(model, found, ud, given, held, x1);
+}
+
+void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
+                     const double *given, const bool *held, double *x2)
+{
+    bool blocks[KF_ROOM(KF_BLOCKS)];
+    double rates[KF_ROOM(KF_UNKNOWNS)];
+    if (model->track > 0) {
+        held = given_blocks(model, held, blocks);
+        given = given_rates(model, given, rates);
+    }
+    kf_acceleration(model, found, udd, x1, given, held, x2);
+}
+
+#endif

@@ -20,6 +20,18 @@ static inline double watched(const kf_model *model, const kf_found *found)
     return total < INFINITY ? largest : total;
 }
 
+/* True for a block that is not of the track that is followed. */
+inline bool kf_is_outside(const kf_model *model, int block)
+{
+#if KF_TRACKS
+    return model->track > 0 && model->outside[block];
+#else
+    (void)model;
+    (void)block;
+    return false;
+#endif
+}
+
 /* Newton from a prediction, and its determinants, in a model's unit; -1, or the block that failed. */
 static inline int solved(const kf_model *model, const double *z, const bool *held, double enough, kf_found *found)
 {
@@ -31,9 +43,13 @@ static inline int solved(const kf_model *model, const double *z, const bool *hel
         found->residual = sqrt(newton.failed);
         return failed;
     }
-    found->margin = 1.0;
+    found->margin = KF_BLOCKS > 0 ? INFINITY : 1.0;
     for (k = 0; k < KF_BLOCKS; ++k) {
         double size;
+        if (kf_is_outside(model, k)) {
+            found->determinants[k] = 1.0;
+            continue;
+        }
         found->determinants[k] *= kf_determinant_factors[k];
         size = fabs(found->determinants[k]);
         found->margin = k == 0 || size < found->margin ? size : found->margin;
@@ -66,6 +82,19 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     for (k = 0; k < KF_DRIVERS; ++k) {
         x[KF_COORDINATES - KF_DRIVERS + k] = u[k];
     }
+#if KF_TRACKS
+    bool given[KF_BLOCKS];
+    if (model->track > 0) {
+        int place = 0;
+        for (k = 0; k < KF_BLOCKS; ++k) {
+            given[k] = model->outside[k] || (held != NULL && held[k]);
+            for (; place < kf_block_ends[k]; ++place) {
+                predicted[place] = x[place] = model->outside[k] ? model->kept[place] : x[place];
+            }
+        }
+        held = given;
+    }
+#endif
     failed = solved(model, z, held, KF_ROUND_OFF * KF_ROUND_OFF, found);
     if (failed >= 0) {
         return failed;
@@ -78,6 +107,12 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     if (found->margin < KF_POLISHED) {
         polish(model, held, found);
     }
+#if KF_TRACKS
+    if (model->track > 0) {
+        found->watch = 0.0; /* rows set aside are of the whole */
+        return -1;
+    }
+#endif
     found->watch = watched(model, found);
     return -1;
 }

@@ -25,8 +25,8 @@ int kf_spare_bridge(const kf_solver *solver)
     bool held[KF_BRIDGES] = {false};
     int i, k;
     for (i = 0; i < KF_ROADS; ++i) {
-        for (k = 0; is_needed(solver, i) && k < solver->roads[i].bridges; ++k) {
-            held[solver->roads[i].bridge[k]] = true;
+        for (k = 0; is_needed(solver, i) && k < KF_MAP(solver)->roads[i].bridges; ++k) {
+            held[KF_MAP(solver)->roads[i].bridge[k]] = true;
         }
     }
     for (k = 0; k < KF_BRIDGES - 1 && held[k]; ++k) {
@@ -40,8 +40,8 @@ int kf_spare_span(const kf_solver *solver, int other)
     bool held[KF_SPANS] = {false};
     int i, k;
     for (i = 0; i < KF_ROADS; ++i) {
-        for (k = 0; is_needed(solver, i) && k < solver->roads[i].bridges; ++k) {
-            held[solver->bridges[solver->roads[i].bridge[k]].span] = true;
+        for (k = 0; is_needed(solver, i) && k < KF_MAP(solver)->roads[i].bridges; ++k) {
+            held[KF_MAP(solver)->bridges[KF_MAP(solver)->roads[i].bridge[k]].span] = true;
         }
     }
     for (k = 0; k < KF_SPANS; ++k) {
@@ -63,9 +63,9 @@ static int copied(kf_solver *solver, int road)
         ++number;
     }
     if (road >= 0) {
-        solver->roads[number] = solver->roads[road];
+        KF_MAP(solver)->roads[number] = KF_MAP(solver)->roads[road];
     } else {
-        solver->roads[number].bridges = solver->roads[number].stretches = 0;
+        KF_MAP(solver)->roads[number].bridges = KF_MAP(solver)->roads[number].stretches = 0;
     }
     return number;
 }
@@ -76,8 +76,8 @@ void kf_stretch(const kf_solver *solver, int road, double u, double *low, double
     int k;
     *low = -INFINITY;
     *high = INFINITY;
-    for (k = 0; road >= 0 && k < solver->roads[road].bridges; ++k) {
-        const kf_bridge *const bridge = &solver->bridges[solver->roads[road].bridge[k]];
+    for (k = 0; road >= 0 && k < KF_MAP(solver)->roads[road].bridges; ++k) {
+        const kf_bridge *const bridge = &KF_MAP(solver)->bridges[KF_MAP(solver)->roads[road].bridge[k]];
         if (kf_covers(bridge, u)) {
             *low = INFINITY;
             *high = -INFINITY;
@@ -95,10 +95,10 @@ void kf_stretch(const kf_solver *solver, int road, double u, double *low, double
 int kf_with_bridge(kf_solver *solver, int road, int bridge)
 {
     const int number = copied(solver, road);
-    kf_road *const made = &solver->roads[number];
+    kf_road *const made = &KF_MAP(solver)->roads[number];
     int k, count = 0;
     for (k = 0; k < made->bridges; ++k) {
-        if (solver->bridges[made->bridge[k]].span != solver->bridges[bridge].span) {
+        if (KF_MAP(solver)->bridges[made->bridge[k]].span != KF_MAP(solver)->bridges[bridge].span) {
             made->bridge[count++] = made->bridge[k];
         }
     }
@@ -115,7 +115,7 @@ int kf_with_bridge(kf_solver *solver, int road, int bridge)
 int kf_with_searched(kf_solver *solver, int road, kf_searched stretch)
 {
     const int number = copied(solver, road);
-    kf_road *const made = &solver->roads[number];
+    kf_road *const made = &KF_MAP(solver)->roads[number];
     if (made->stretches == KF_SEARCHED) {
         --made->stretches;
         memmove(made->searched, made->searched + 1, (KF_SEARCHED - 1) * sizeof made->searched[0]);
@@ -133,14 +133,14 @@ bool kf_knows(const kf_solver *solver, int road, double u, int block)
     if (road < 0) {
         return false;
     }
-    for (k = 0; k < solver->roads[road].bridges; ++k) {
-        const kf_bridge *const bridge = &solver->bridges[solver->roads[road].bridge[k]];
+    for (k = 0; k < KF_MAP(solver)->roads[road].bridges; ++k) {
+        const kf_bridge *const bridge = &KF_MAP(solver)->bridges[KF_MAP(solver)->roads[road].bridge[k]];
         if (bridge->u[0] <= u && u <= bridge->u[KF_NODES - 1]) {
             return true;
         }
     }
-    for (k = 0; k < solver->roads[road].stretches; ++k) {
-        const kf_searched *const stretch = &solver->roads[road].searched[k];
+    for (k = 0; k < KF_MAP(solver)->roads[road].stretches; ++k) {
+        const kf_searched *const stretch = &KF_MAP(solver)->roads[road].searched[k];
         if (stretch->block == block && stretch->low <= u && u <= stretch->high) {
             return true;
         }
@@ -151,11 +151,11 @@ bool kf_knows(const kf_solver *solver, int road, double u, int block)
 /* The bridge whose window holds `here`, or the one that ends the stretch around it on the target's side. */
 int kf_next_bridge(const kf_solver *solver, int road, double here, double target)
 {
-    const kf_road *const along = &solver->roads[road];
+    const kf_road *const along = &KF_MAP(solver)->roads[road];
     double least = INFINITY;
     int k, next = along->bridge[0];
     for (k = 0; k < along->bridges; ++k) {
-        const kf_bridge *const bridge = &solver->bridges[along->bridge[k]];
+        const kf_bridge *const bridge = &KF_MAP(solver)->bridges[along->bridge[k]];
         if (kf_covers(bridge, here)) {
             return along->bridge[k];
         }

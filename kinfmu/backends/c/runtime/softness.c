@@ -91,7 +91,7 @@ int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *he
         const int first = kf_first_of(block), k = kf_block_ends[block] - first;
         double moved;
         int place;
-        if (held != NULL && held[block]) {
+        if ((held != NULL && held[block]) || kf_is_outside(model, block)) {
             continue;
         }
         if (!kf_soften(model, found, block, rows, softness)) {

@@ -8,6 +8,9 @@ void kf_solver_start(kf_solver *solver)
     int k;
     kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
     solver->tolerance = TOLERANCE;
+#if KF_TRACKS
+    solver->model.track = solver->scratch.ahead.track = 0;
+#endif
     solver->stuck = false;
     for (k = 0; k < KF_INNERS; ++k) {
         solver->scratch.inner[k].half = 0.0; /* nothing was read */
@@ -17,7 +20,7 @@ void kf_solver_start(kf_solver *solver)
     kf_evaluated(&solver->model, kf_anchor_u, kf_anchor_z, NULL, &solver->anchor.found);
 }
 
-static KF_RARE kf_status failed(kf_pose *pose, kf_status status)
+KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status)
 {
     kf_fresh(pose, -1, -INFINITY, INFINITY);
     pose->status = status;
@@ -30,7 +33,7 @@ static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
     char *const message = solver->message;
     double watches[KF_ROOM(KF_WATCHES)];
     int k, most = 0;
-    kf_say_place(message, KF_POSE_U(pose), KF_ROUGHLY);
+    kf_say_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_TOLD(solver));
     if (!(pose->found.residual <= solver->tolerance)) {
         kf_say(message, ": residual ");
         kf_say_number(message, "%.2g", pose->found.residual);
@@ -76,9 +79,9 @@ static inline bool is_same(const double *a, const double *b)
 /* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
 static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *road)
 {
-    const double longest = KF_LONGEST_STEP * kf_reach[0], s = u[0] - KF_POSE_U(start)[0];
-    if (!(-longest <= s && s <= longest && start->low <= u[0] && u[0] <= start->high)
-        || !kf_trusted_step(solver, start, kf_alone, s, u, pose)
+    const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)], s = u[KF_ALONG(solver)] - KF_HERE(solver, start);
+    if (!(-longest <= s && s <= longest && start->low <= u[KF_ALONG(solver)] && u[KF_ALONG(solver)] <= start->high)
+        || !kf_trusted_step(solver, start, KF_SPEEDS(&solver->model), s, u, pose)
         || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)) {
         return false;
     }
@@ -86,7 +89,7 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
         return true;
     }
     if (pose->found.margin > KF_NEAR
-        && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, kf_alone, s))) {
+        && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, KF_SPEEDS(&solver->model), s))) {
         kf_needed(solver, start->road, start->road, start->road);
         *road = kf_surveyed(solver, start, pose);
         return *road == pose->road;
@@ -95,7 +98,7 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
 }
 
 /* The pose, rejected if its rows do not close or the rows set aside as redundant do not hold. */
-static kf_status checked(kf_solver *solver, kf_pose *pose)
+kf_status kf_checked(kf_solver *solver, kf_pose *pose)
 {
     if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
         solver->message[0] = '\0';
@@ -111,7 +114,7 @@ static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
     if (start->found.margin < KF_REGULAR && start->status == KF_OK && start->road < 0) {
         kf_limit limit;
         int road = -1;
-        if (KF_DRIVERS == 1) {
+        if (KF_IS_FOLLOWED) {
             kf_needed(solver, start->road, start->road, start->road);
             road = kf_surveyed(solver, start, start);
         }
@@ -121,17 +124,21 @@ static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
     if (pose->status == KF_OK && pose->found.margin < KF_NEAR) {
         pose->status = KF_NEAR_SINGULAR;
     }
-    return checked(solver, pose);
+    return kf_checked(solver, pose);
 }
 
-inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+#if !KF_TRACKS
+#define kf_solve_along kf_solve
+#endif
+
+inline kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     kf_pose *found;
     kf_limit limit;
     double sum = 0.0;
     int road, k;
     if (solver->stuck) {
-        return failed(pose, KF_INCONSISTENT);
+        return kf_failed(pose, KF_INCONSISTENT);
     }
     if (start->has_base && !is_same(u, KF_POSE_U(start))) {
         start = base_of(solver, start);
@@ -143,22 +150,22 @@ inline kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf
         sum += u[k];
     }
     road = start->road;
-    if (KF_DRIVERS == 1 && is_near(solver, start, u, pose, &road)) { /* most samples */
+    if (KF_IS_FOLLOWED && is_near(solver, start, u, pose, &road)) { /* most samples */
         return KF_OK;
     }
     solver->message[0] = '\0';
     if (!(sum - sum == 0.0)) {
-        kf_say_place(solver->message, u, KF_ROUGHLY);
+        kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
         kf_say(solver->message, " is not a finite number");
-        return failed(pose, KF_OUTSIDE);
+        return kf_failed(pose, KF_OUTSIDE);
     }
     found = kf_advance(solver, start, road, u, &limit);
     if (found == NULL) {
-        kf_say_limit(solver->message, &limit, u);
-        return failed(pose, KF_OUTSIDE);
+        kf_say_limit(solver->message, &limit, u, KF_TOLD(solver));
+        return kf_failed(pose, KF_OUTSIDE);
     }
     *pose = *found;
-    return checked(solver, pose);
+    return kf_checked(solver, pose);
 }
 
 /* Outputs, rates and accelerations from the derivatives that the pose holds: those with respect to the only driver, or
@@ -183,12 +190,19 @@ inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, 
 {
     const kf_model *const model = &solver->model;
     const bool one = KF_DRIVERS == 1;
+#if KF_TRACKS
+    if (pose->is_held && (rates != NULL || accelerations != NULL)) {
+        kf_rates_in_time(model, pose, ud, udd);
+        kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);
+        return;
+    }
+#endif
     if ((rates != NULL || accelerations != NULL) && pose->derivatives < 1) {
-        kf_velocity(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
+        kf_rates(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
         pose->derivatives = one ? 1 : 0; /* of the single driver they stay true */
     }
     if (accelerations != NULL && pose->derivatives < 2) {
-        kf_acceleration(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
+        kf_second_rates(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
         pose->derivatives = one ? 2 : 0;
     }
     kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);

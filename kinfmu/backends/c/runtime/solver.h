@@ -38,6 +38,14 @@ typedef enum {
 
 #define KF_GOOD(status) ((status) <= KF_BRIDGED) /* the pose holds numbers */
 
+/* What a pose of the whole has of one driver's track: where to go on from, and what is known there. */
+typedef struct {
+    kf_status status;
+    int road, bridge, base_bridge;
+    bool has_base;
+    double base_u, base_z[KF_ROOM(KF_UNKNOWNS)];
+} kf_own;
+
 /* A pose that was found. If it is not good, nothing but its status says anything.
  *
  * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
@@ -56,6 +64,12 @@ typedef struct {
     int derivatives;
     int road, bridge, base_bridge;
     bool has_base;
+#if KF_TRACKS
+    bool has_tracks, is_held;
+    kf_own own[KF_DRIVERS];
+    bool held[KF_BLOCKS]; /* blocks that are interpolated, and their derivatives, each over its own driver */
+    double own1[KF_UNKNOWNS], own2[KF_UNKNOWNS];
+#endif
 } kf_pose;
 
 #define KF_POSE_U(pose) ((pose)->found.x + KF_COORDINATES - KF_DRIVERS) /* its driver values */
@@ -104,7 +118,8 @@ typedef struct {
 
 /* What is known of the singular points on the way of a single driver: see kinfmu/solver/road.py. */
 #define KF_KEPT 32 /* of each kind, the latest */
-#define KF_SEARCHED (KF_DRIVERS == 1 ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
+#define KF_IS_FOLLOWED (KF_DRIVERS == 1 || KF_TRACKS) /* along one driver: there are bridges */
+#define KF_SEARCHED (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
 typedef struct {
     int bridges, stretches;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
@@ -115,9 +130,18 @@ typedef struct {
  * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
  * not bridged.
  */
-#define KF_ROADS (KF_DRIVERS == 1 ? 4 : 1)
-#define KF_BRIDGES (KF_DRIVERS == 1 ? 3 * KF_KEPT + 1 : 1)
-#define KF_SPANS (KF_DRIVERS == 1 ? KF_KEPT + 8 : 1)
+#define KF_ROADS (KF_IS_FOLLOWED ? 4 : 1)
+#define KF_BRIDGES (KF_IS_FOLLOWED ? 3 * KF_KEPT + 1 : 1)
+#define KF_SPANS (KF_IS_FOLLOWED ? KF_KEPT + 8 : 1)
+
+/* What is known along one driver. */
+typedef struct {
+    kf_road roads[KF_ROADS];
+    kf_bridge bridges[KF_BRIDGES];
+    kf_span spans[KF_SPANS];
+} kf_map;
+
+#define KF_MAPS (KF_TRACKS ? KF_DRIVERS : 1)
 
 /* What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held. */
 typedef struct {
@@ -132,6 +156,9 @@ typedef struct {
 typedef struct {
     kf_inner inner[KF_INNERS];
     kf_pose base, way[4], walk[2], beside, located;
+#if KF_TRACKS
+    kf_pose track[2];
+#endif
     kf_model ahead;
     kf_source source;
     double rows[2][3][KF_ROOM(KF_OUTPUTS)];
@@ -150,9 +177,7 @@ typedef struct {
     kf_pose anchor;
     bool stuck; /* the parameters cannot be had: every pose fails, and the message says why */
     char message[KF_MESSAGE];
-    kf_road roads[KF_ROADS];
-    kf_bridge bridges[KF_BRIDGES];
-    kf_span spans[KF_SPANS];
+    kf_map maps[KF_MAPS];
     kf_scratch scratch;
 } kf_solver;
 

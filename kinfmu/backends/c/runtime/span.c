@@ -21,7 +21,7 @@ void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model
 {
     const size_t size = KF_UNKNOWNS * sizeof(double);
     kf_tangent(model, node);
-    span->u[place] = KF_POSE_U(node)[0];
+    span->u[place] = KF_POSE_U(node)[KF_ALONG_OF(model)];
     memcpy(span->z[place], node->found.x, size);
     memcpy(span->zd[place], node->x1, size);
     memcpy(span->zdd[place], node->x2, size);

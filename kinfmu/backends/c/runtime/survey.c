@@ -6,7 +6,7 @@ static kf_pose *beside(kf_solver *solver, kf_pose *pose, int block, double dista
 {
     int k;
     for (k = 0; k < 2; ++k) {
-        const kf_pose *const other = kf_plainly(solver, pose, KF_POSE_U(pose)[0] + (k == 0 ? distance : -distance));
+        const kf_pose *const other = kf_plainly(solver, pose, KF_HERE(solver, pose) + (k == 0 ? distance : -distance));
         if (other != NULL && fabs(other->found.determinants[block]) > fabs(pose->found.determinants[block])) {
             solver->scratch.beside = *other; /* walks start from it */
             return &solver->scratch.beside;
@@ -20,7 +20,7 @@ static kf_pose *beside(kf_solver *solver, kf_pose *pose, int block, double dista
  */
 int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
 {
-    const double here = KF_POSE_U(trial)[0], reach = kf_reach[0];
+    const double here = KF_HERE(solver, trial), reach = kf_reach[KF_ALONG(solver)];
     const double *const determinants = trial->found.determinants;
     int road = trial->road, block = 0, k;
     kf_pose *before;
@@ -30,15 +30,15 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
     if (block == KF_BLOCKS) {
         return road;
     }
-    for (k = 0; kf_driver_is_angle[0] && road >= 0 && k < solver->roads[road].bridges; ++k) {
-        const int again = kf_moved(solver, solver->roads[road].bridge[k], pose, here);
+    for (k = 0; kf_driver_is_angle[KF_ALONG(solver)] && road >= 0 && k < KF_MAP(solver)->roads[road].bridges; ++k) {
+        const int again = kf_moved(solver, KF_MAP(solver)->roads[road].bridge[k], pose, here);
         if (again >= 0) {
             return kf_with_bridge(solver, road, again);
         }
     }
-    before = fabs(here - KF_POSE_U(pose)[0]) > 1e-3 * reach ? pose : beside(solver, trial, block, 0.02 * reach);
+    before = fabs(here - KF_HERE(solver, pose)) > 1e-3 * reach ? pose : beside(solver, trial, block, 0.02 * reach);
     for (; before != NULL && block < KF_BLOCKS; ++block) { /* upstream first */
-        const double from = KF_POSE_U(before)[0], of_from = before->found.determinants[block];
+        const double from = KF_HERE(solver, before), of_from = before->found.determinants[block];
         kf_searched searched;
         double zero;
         int bridge;
@@ -52,9 +52,9 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
         if (bridge < 0) {
             searched.low = zero - 2.0 * KF_HALF_WIDTH * reach;
             searched.high = zero + 2.0 * KF_HALF_WIDTH * reach;
-        } else if (kf_knows(solver, road, solver->bridges[bridge].centre, block)) {
-            searched.low = fmin(here, solver->bridges[bridge].centre);
-            searched.high = fmax(here, solver->bridges[bridge].centre);
+        } else if (kf_knows(solver, road, KF_MAP(solver)->bridges[bridge].centre, block)) {
+            searched.low = fmin(here, KF_MAP(solver)->bridges[bridge].centre);
+            searched.high = fmax(here, KF_MAP(solver)->bridges[bridge].centre);
         } else {
             return kf_with_bridge(solver, road, bridge);
         }

@@ -20,6 +20,34 @@
 #define KF_UNDECIDED 1e-6    /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
 #define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 
+/* Models with several drivers whose blocks each depend on one alone are followed along one driver at a time: a track.
+ * KF_ALONG: the number of the driver; KF_SPEEDS: those of the drivers then; KF_AT: values of all drivers of which one is
+ * given.
+ */
+#if KF_TRACKS
+#define KF_ALONG_OF(model) ((model)->track - 1)
+#define KF_SPEEDS(model) ((model)->along)
+void kf_enter_track(kf_solver *solver, int driver);
+void kf_leave_track(kf_solver *solver);
+const double *kf_driven_at(const kf_model *model, const double *value, double *room);
+void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
+              double *x1);
+void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
+                     const double *given, const bool *held, double *x2);
+#define KF_AT(model, value, room) kf_driven_at(model, value, room)
+#else
+#define KF_ALONG_OF(model) 0
+#define KF_SPEEDS(model) kf_alone
+#define kf_rates kf_velocity
+#define kf_second_rates kf_acceleration
+#define KF_AT(model, value, room) (value)
+#endif
+#define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
+#define KF_TOLD(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages tell of; -1: all */
+#define KF_ALONG(solver) KF_ALONG_OF(&(solver)->model)
+#define KF_HERE(solver, pose) (KF_POSE_U(pose)[KF_ALONG(solver)])
+#define KF_MAP(solver) (&(solver)->maps[KF_ALONG(solver)])
+
 /* pose.c */
 extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
 extern const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)];
@@ -76,17 +104,24 @@ typedef struct {
 enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
 void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
-void kf_say_limit(char *message, const kf_limit *limit, const double *target);
+void kf_say_limit(char *message, const kf_limit *limit, const double *target, int driver);
 
 /* advance.c */
 KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit);
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
+double kf_course(const double *start, const double *target, double *direction);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
 
 /* survey.c */
 KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
+
+/* tracks.c */
+#if KF_TRACKS
+kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver);
+#endif
+const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd);
 
 /* softness.c */
 #define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
@@ -98,6 +133,11 @@ double kf_larger(double most, int count, const double *values, const double *sca
 int kf_first_of(int block);
 
 /* solver.c */
+KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status);
+kf_status kf_checked(kf_solver *solver, kf_pose *pose);
+#if KF_TRACKS
+kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
+#endif
 void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd, double *outputs,
                    double *rates, double *accelerations);
 
@@ -105,7 +145,7 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
 enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
 void kf_say(char *message, const char *format, ...);
 void kf_say_number(char *message, const char *format, double value);
-void kf_say_place(char *message, const double *u, int digits);
+void kf_say_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
 bool kf_differs(const double *a, const double *b, int digits);
 
 #endif

@@ -1,0 +1,153 @@
+"""Tracks: what depends on one driver alone is followed along that driver, whatever the other drivers do.
+
+Where every block of a model depends on a single driver, as two machines in one file do, the blocks of each driver are a
+mechanism with one driver: its track. A track has singular points, bridges and limits of its own. A pose of the whole is
+put together from one pose of each track.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+from .linear import Matrix
+from .pose import Found, Model, Pose, Vector, evaluated, tangent_of
+
+
+class Track:
+    """The blocks of a model that depend on one of its drivers, as a model with that driver alone.
+
+    u, z: driver values and unknowns of an assembled pose: there the rest of the model stays.
+    """
+
+    def __init__(self, model: Model, driver: int, u: Vector, z: Vector) -> None:
+        self._model = model
+        self.driver = driver
+        self._u, self._z = u, z
+        self.blocks = tuple([k for k, by in enumerate(model.BLOCK_DRIVERS) if by == driver])
+        self.places = tuple([place for k in self.blocks for place in range(*model.BLOCKS[k])])
+        self._outside = sum([1 << k for k, by in enumerate(model.BLOCK_DRIVERS) if by != driver])
+        self._along = tuple([float(k == driver) for k in range(len(u))])
+        self._rest = (0.0,) * len(u)
+        self.SIZE, self.OFFSET, self.LENGTH_UNIT = model.SIZE, model.OFFSET, model.LENGTH_UNIT
+        self.DRIVERS = (model.DRIVERS[driver],)
+        self.DRIVER_KINDS = (model.DRIVER_KINDS[driver],)
+        self.REACH = (model.REACH[driver],)
+        self.UNKNOWNS = self.of(model.UNKNOWNS)
+        self.UNKNOWN_SCALES = self.of(model.UNKNOWN_SCALES)
+        self.ROW_SCALES = tuple([model.ROW_SCALES[k] for k in self.blocks])
+        self.ANCHOR = (u[driver],), self.of(z)
+        self.WATCHES = ()
+        ends = [0]
+        for k in self.blocks:
+            low, high = model.BLOCKS[k]
+            ends.append(ends[-1] + high - low)
+        self.BLOCKS = tuple(pairwise(ends))
+
+    def of(self, whole: Sequence[Any]) -> tuple[Any, ...]:
+        """What the track has of a row with one item an unknown of the model."""
+        return tuple([whole[k] for k in self.places])
+
+    def put(self, own: Sequence[float], whole: Sequence[float]) -> Vector:
+        """The row with the track's items in it."""
+        values = list(whole)
+        for k, value in zip(self.places, own, strict=True):
+            values[k] = value
+        return tuple(values)
+
+    def mask(self, held: int) -> int:
+        """Bits of the track's blocks as bits of the model's."""
+        return sum([1 << block for k, block in enumerate(self.blocks) if held >> k & 1])
+
+    def position(self, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0, *enough: float) -> Found:
+        """As a model's `position`."""
+        still = (0.0,) * len(self._z)
+        driven = (*self._u[: self.driver], u[0], *self._u[self.driver + 1 :])
+        found = self._model.position(
+            driven,
+            self.put(z, self._z),
+            self.put(zd, still),
+            self.put(zdd, still),
+            s,
+            self._outside | self.mask(held),
+            *enough,
+        )
+        determinants = tuple([found[1][k] for k in self.blocks])
+        return (
+            self.of(found[0]),
+            determinants,
+            min([abs(determinant) for determinant in determinants]),
+            *found[3:6],
+            0.0,
+            found[7],
+        )
+
+    def tangent(self, values: Any) -> tuple[Vector, Vector]:
+        """As a model's `tangent`."""
+        zd = self.velocity(values, self._along)
+        return zd, self.acceleration(values, self._along, self._rest, zd)
+
+    def velocity(self, values: Any, ud: Vector, given: Vector = (), held: int = 0) -> Vector:
+        """As a model's `velocity`."""
+        whole = self.put(given or (0.0,) * len(self.places), (0.0,) * len(self._z))
+        driven = self._driven(ud)
+        return self.of(self._model.velocity(values, driven, whole, self._outside | self.mask(held)))
+
+    def acceleration(
+        self, values: Any, ud: Vector, udd: Vector, zd: Vector, given: Vector = (), held: int = 0
+    ) -> Vector:
+        """As a model's `acceleration`."""
+        still = (0.0,) * len(self._z)
+        first, whole = self.put(zd, still), self.put(given or (0.0,) * len(self.places), still)
+        mask = self._outside | self.mask(held)
+        return self.of(self._model.acceleration(values, self._driven(ud), self._driven(udd), first, whole, mask))
+
+    def _driven(self, rate: Vector) -> Vector:
+        return (*self._rest[: self.driver], rate[0], *self._rest[self.driver + 1 :]) if len(rate) == 1 else rate
+
+    def jacobians(self, values: Any) -> list[Matrix]:
+        """As a model's `jacobians`."""
+        every = self._model.jacobians(values)
+        return [every[k] for k in self.blocks]
+
+
+def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
+    """The track of each driver, None for a driver that no block depends on; none at all if a block mixes drivers."""
+    by = getattr(model, "BLOCK_DRIVERS", ())
+    if not by or min(by) < 0:
+        return ()
+    return tuple([Track(model, k, u, z) if k in by else None for k in range(len(u))])
+
+
+def held_blocks(pose: Pose) -> int:
+    """Bits of the blocks that are interpolated at a pose."""
+    held = 0 if pose.bridge is None else pose.bridge.span.held
+    for track, own in pose.tracks:
+        if own.bridge is not None:
+            held |= track.mask(own.bridge.span.held)
+    return held
+
+
+def on_track(track: Track, pose: Pose) -> Pose:
+    """What a track has of a pose of the whole."""
+    u = (pose.u[track.driver],)
+    road = None if pose.road is None else pose.road[track.driver]
+    return Pose(u, evaluated(track, u, track.of(pose.z)), None if road is None else road.around(u[0]))
+
+
+def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
+    """First and second derivative of the unknowns in time; of blocks that are interpolated by the chain rule."""
+    held = held_blocks(pose)
+    if not held:
+        zd = tuple(model.velocity(pose.values, ud))
+        return zd, tuple(model.acceleration(pose.values, ud, udd, zd))
+    first = second = (0.0,) * len(pose.z)
+    for track, own in pose.tracks:
+        if own.bridge is not None:
+            v, a = ud[track.driver], udd[track.driver]
+            zd, zdd = tangent_of(track, own)
+            first = track.put([v * d for d in zd], first)
+            second = track.put([v * v * dd + a * d for d, dd in zip(zd, zdd, strict=True)], second)
+    zd = tuple(model.velocity(pose.values, ud, first, held))
+    return zd, tuple(model.acceleration(pose.values, ud, udd, zd, second, held))
