@@ -21,7 +21,7 @@ def as_json(report: Report) -> dict[str, Any]:
     drivers, coordinates (q), outputs: names; fixed: value by coordinate.
     redundant, inconsistent: name (joint), row, implied_by (joints), implied_by_rows, gap, tolerance.
     blocks: unknowns, rows, determinant (a short formula or null).
-    start: driver values by name from which runs are followed.
+    start: driver values by name from which the run starts; assembled: those from which runs are followed.
     singular: driver, value, kind ('change point' or 'limit'), block.
     ranges: driver, kind ('angle' or 'length'), low, high, turns (after which the mechanism repeats), reach (values
     looked at), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
@@ -49,7 +49,8 @@ def as_json(report: Report) -> dict[str, Any]:
         "blocks": [
             {"unknowns": list(b.unknowns), "rows": list(b.rows), "determinant": b.determinant} for b in report.blocks
         ],
-        "start": {d.name: float(u) for d, u in zip(mechanism.drivers, plan.anchor.u, strict=True)} if plan else {},
+        "start": {d.name: u for d, u in zip(mechanism.drivers, report.starts, strict=True)} if plan else {},
+        "assembled": {d.name: float(u) for d, u in zip(mechanism.drivers, plan.anchor.u, strict=True)} if plan else {},
         "singular": [
             {"driver": p.driver, "value": p.value, "kind": p.kind, "block": p.block or None} for p in report.singular
         ],

@@ -71,6 +71,11 @@ class Report:
         return self.redundancy.inconsistent
 
     @property
+    def starts(self) -> tuple[float, ...]:
+        """Values of the drivers from which the run starts, by their laws [rad or length]."""
+        return tuple(float(driver.law.at(self.mechanism.run.start)) for driver in self.mechanism.drivers)
+
+    @property
     def range(self) -> DriverRange | None:
         """The range of the only driver; None if there are several, or no plan."""
         return self.ranges[0] if len(self.mechanism.drivers) == 1 and self.ranges else None

@@ -14,6 +14,7 @@ from kinfmu.errors import listed
 if TYPE_CHECKING:
     from kinfmu.analysis.named import NamedLoop
     from kinfmu.analysis.report import Report
+    from kinfmu.drivers import Driver
 
 _MOST_LOOPS = 8  # of which the text tells; JSON has them all
 _END = {
@@ -21,6 +22,7 @@ _END = {
     "change point": "where branches cross and no run goes on",
     "end": "where nothing is left of it",
 }
+_SAME = 1e-9  # [rad or length]; values closer than this are one
 _MOST_NAMES = 24  # in one line; JSON has them all
 
 
@@ -74,8 +76,10 @@ def _plan(report: Report) -> Iterator[str]:
     if plan is None:
         return
     unit = report.mechanism.length_unit
-    starts = zip(report.mechanism.drivers, plan.anchor.u, strict=True)
-    yield _line("start", _names(f"{d.name} = {written(float(u), unit, d.quantity.kind)}" for d, u in starts))
+    drivers, assembled = report.mechanism.drivers, plan.anchor.u.tolist()
+    yield _line("start", _names(_values(drivers, report.starts, unit)))
+    if any(abs(u - start) > _SAME for u, start in zip(assembled, report.starts, strict=True)):
+        yield _line("assembled", _names(_values(drivers, assembled, unit)))
     yield _line("coordinates", _names(plan.coordinates))
     if plan.fixed:
         yield _line("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
@@ -85,6 +89,12 @@ def _plan(report: Report) -> Iterator[str]:
         yield _line(f"block {k}", f"{size}: {listed(block.unknowns)} from {listed(block.rows)}{determinant}")
     if len(report.blocks) > _MOST_NAMES:
         yield _line("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
+
+
+def _values(drivers: Iterable[Driver], values: Iterable[float], unit: str) -> Iterator[str]:
+    """Drivers with values, for people."""
+    for driver, value in zip(drivers, values, strict=True):
+        yield f"{driver.name} = {written(value, unit, driver.quantity.kind)}"
 
 
 def _advice(report: Report) -> Iterator[str]:

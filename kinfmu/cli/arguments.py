@@ -126,10 +126,18 @@ def along(text: str | None, option: str, run: Run) -> float | None:
     axis = axis_of(run)
     kind = "time" if axis.is_time else "angle" if axis.unit in ("deg", "rad") else "length" if axis.unit else "number"
     try:
-        value = _number(text, Quantity(kind), run.length_unit)
+        return driver_value(option, text, Quantity(kind), run.length_unit)
+    except click.UsageError as error:
+        raise click.UsageError(f"{error.message}; the run is over {axis.label}, {axis.range()}") from None
+
+
+def driver_value(option: str, text: str, quantity: Quantity, length_unit: str) -> float:
+    """A value of a driver, or a time [rad, length, s]; a UsageError for a text that is none."""
+    try:
+        value = _number(text, quantity, length_unit)
     except ValueError as error:
-        raise click.UsageError(f"{option} {text}: {error}; the run is over {axis.label}, {axis.range()}") from None
-    if kind == "angle" and like_degrees(value) and is_bare(text):
+        raise click.UsageError(f"{option} {text}: {error}") from None
+    if quantity.kind == "angle" and like_degrees(value) and is_bare(text):
         note(f"{option} {text}: {text} rad, {in_turns(value)}; write {text}deg for degrees")
     return value
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, set_option
+from kinfmu.cli.arguments import MECHANISM, driver_value, set_option
 from kinfmu.cli.files import OutputFile
 from kinfmu.cli.group import about, main
 from kinfmu.cli.settings import settled
-from kinfmu.errors import KinfmuError
+from kinfmu.errors import KinfmuError, listed
 
 if TYPE_CHECKING:
     from kinfmu.analysis import Assemblies, Report
+    from kinfmu.mechanism import Mechanism
 
 FIGURES = (".svg", ".png")
 
@@ -27,6 +28,7 @@ FIGURES = (".svg", ".png")
 @click.option("--matrices", is_flag=True, help="Print the Jacobians at the start pose and at singular points, too.")
 @click.option("--assemblies", is_flag=True, help="List the ways of putting it together, and how to choose one.")
 @click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg or .png.")
+@click.option("--at", metavar="VALUE", help="Value of the driver at which --figure draws it, such as 45deg or 20mm.")
 @set_option
 def check(
     mechanism: str,
@@ -34,6 +36,7 @@ def check(
     matrices: bool,
     assemblies: bool,
     picture: Path | None,
+    at: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
     """Check a mechanism and tell what it can do.
@@ -43,6 +46,7 @@ def check(
     from kinfmu.analysis import check as checked
 
     mech = settled(mechanism, gallery.load(mechanism), settings).mechanism()
+    value = _value(mech, mechanism, at, picture)
     with about(mechanism):
         report = checked(mech)
     if as_json:
@@ -64,7 +68,7 @@ def check(
         if picture is not None:
             from kinfmu.draw import figure
 
-            figure(mech, picture)
+            figure(mech, picture, value)
             if not as_json:
                 click.echo(f"  figure      {picture}")
         if report.problem is not None:
@@ -79,3 +83,16 @@ def _assemblies(report: Report) -> Assemblies | None:
         if report.problem is None:
             raise
         return None
+
+
+def _value(mechanism: Mechanism, name: str, at: str | None, picture: Path | None) -> float | None:
+    """The value of --at [rad or length]; a UsageError for what is none, or where there is no picture or one driver."""
+    if at is None:
+        return None
+    if picture is None:
+        raise click.UsageError(f"--at {at} is the pose of --figure, which is not given")
+    if len(mechanism.drivers) != 1:
+        names = listed(driver.name for driver in mechanism.drivers)
+        raise click.UsageError(f"--at {at} is the value of one driver; {name} has {names}")
+    (driver,) = mechanism.drivers
+    return driver_value("--at", at, driver.quantity, mechanism.length_unit)

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
-from kinfmu.draw.instant import instant
+from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.links import links, shortest
 from kinfmu.draw.mark import Mark
 from kinfmu.draw.motion import motion
@@ -28,17 +28,19 @@ MOST_NAMES = 90  # more would cover the drawing
 _SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture
 
 
-def figure(mechanism: Mechanism, path: str | Path) -> None:
-    """Draw a mechanism into a .svg or .png file, at its start pose or, where links hide one another there, in its run.
+def figure(mechanism: Mechanism, path: str | Path, at: float | None = None) -> None:
+    """Draw a mechanism into a .svg or .png file, where its run starts or, where links hide one another there, later.
+
+    at: value of the only driver at which it is drawn instead [rad or length].
 
     Bodies, joints, drivers and points of interest with their names and the paths of these points over the file's run;
     axes in the mechanism's unit of length, both of one scale. The same mechanism gives the same bytes. A mechanism that
     cannot be solved but closes is drawn too.
 
     Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib,
-    AssemblyError or MechanismError if the mechanism does not close.
+    AssemblyError or MechanismError if the mechanism does not close, FigureError for a value that cannot be reached.
     """
-    write(Path(path), lambda: sheet_of(instant(mechanism)).figure)
+    write(Path(path), lambda: sheet_of(instant(mechanism, at)).figure)
 
 
 def sheet_of(shown: Instant) -> Sheet:
@@ -49,7 +51,7 @@ def sheet_of(shown: Instant) -> Sheet:
     size = float(np.ptp(extent, axis=0).max())
     sheet = Sheet(extent, shortest(marks, size), mechanism.length_unit, mechanism.title or mechanism.name)
     names = [name for mark in marks for name in mark.draw(sheet)]
-    notes = []
+    notes = [pose] if (pose := pose_note(shown)) else []
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:

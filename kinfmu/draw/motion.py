@@ -116,7 +116,7 @@ def motion(shown: Instant) -> list[Mark]:
 
 def _mark(shown: Instant, driver: Driver) -> Mark:
     value, way = shown.value(driver.name), shown.ways[driver.name]
-    text = f"{driver.name} = {_told(shown, driver, value)}"
+    text = f"{driver.name} = {told_value(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
         (shape,) = (one for one in cylinder_shapes(shown) if one.driver == driver.name)
         return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel, shape.rod)
@@ -133,7 +133,7 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
     return Turn(text, centre, way, _heading(shown, body, centre))
 
 
-def _told(shown: Instant, driver: Driver, value: float) -> str:
+def told_value(shown: Instant, driver: Driver, value: float) -> str:
     """A driver's value with its unit, to a tenth of a degree or to four digits of the mechanism's size."""
     if driver.quantity.kind == "angle":
         return f"{round(math.degrees(value), 1) + 0.0:.6g}\N{DEGREE SIGN}"

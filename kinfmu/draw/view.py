@@ -23,6 +23,12 @@ _PIN = 0.05  # what a pin on a link that it does not hold counts
 _MOST_LINKS = 60  # beyond, the start pose is as good as any
 
 
+def is_clear(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> bool:
+    """Return whether links do not hide one another in the only pose (1, 3) of each body."""
+    owners, links = _links(mechanism, poses)
+    return not 1 < len(owners) <= _MOST_LINKS or round(_covered(owners, links[0]), 6) <= ENOUGH
+
+
 def clearest(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
     """Row of poses (n, 3) by body that shows the mechanism best: the first one if it is clear enough."""
     rows = np.unique(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int))

@@ -99,7 +99,7 @@ def test_findings_have_ranges_loops_and_transmission_as_numbers() -> None:
     assert loop["lengths"] == {"ground": 4.0, "crank": 3.0, "coupler": 1.5, "rocker": 1.0}
     assert (loop["kind"], loop["class"], loop["sums"]) == ("four-bar", "triple rocker", [5.0, 4.5])
     assert loop["transmission"][0]["largest"] == math.pi
-    assert findings["start"] == {"crank": pytest.approx(0.2)}
+    assert findings["assembled"] == {"crank": pytest.approx(0.2)}
     assert findings["length_unit"] == "m"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import sys
 from collections.abc import Callable
@@ -14,7 +15,9 @@ import pytest
 import kinfmu
 from kinfmu import Angle, AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
 from kinfmu.draw import figure
+from kinfmu.draw.instant import instant, pose_note
 from kinfmu.errors import AssemblyError, FigureError, MissingPackageError
+from kinfmu.mechanism import toml_file, toml_text
 from tests.mechanisms import fourbar, reference_fourbar
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -211,3 +214,25 @@ def test_check_refuses_another_kind_of_figure_before_it_works(run_cli: Callable[
     status, out, err = run_cli("check", "fourbar", "--figure", "F.pdf")
     assert (status, out) == (2, "")
     assert err.endswith("F.pdf: its name must end in one of .svg, .png\n")
+
+
+def test_a_figure_is_drawn_at_the_drivers_value_that_is_asked_for(tmp_path: Path) -> None:
+    mechanism = kinfmu.load("crank_rocker")
+    figure(mechanism, tmp_path / "at.svg", math.radians(45.0))
+    words = (tmp_path / "at.svg").read_text(encoding="utf-8")
+    assert "crank = 45°" in words
+    assert "the run starts at crank = 0°" in words
+    with pytest.raises(FigureError, match=r"left = 3.490659 rad \(200 deg\) cannot be reached: the limit is"):
+        figure(kinfmu.load("triple_rocker"), tmp_path / "at.svg", math.radians(200.0))
+    with pytest.raises(FigureError, match=r"needs a mechanism with one driver; drivers: left, right$"):
+        figure(kinfmu.load("five_bar"), tmp_path / "at.svg", 1.0)
+
+
+def test_a_figure_shows_where_the_law_starts_or_says_so() -> None:
+    assert pose_note(instant(kinfmu.load("jansen_leg"))) == ""
+    assert pose_note(instant(kinfmu.load("fourbar"))) == "the run starts at crank = 0°"  # there all links lie in line
+    mechanism = kinfmu.load("crank_rocker")
+    text = toml_text.text(mechanism).replace("start = 0.0\nspeed", "start = 60.0\nspeed")
+    shown = instant(toml_file.parse(text, "radians.toml"))
+    assert shown.value("crank") == pytest.approx(60.0)  # radians, not turned back by whole turns
+    assert pose_note(shown) == ""
