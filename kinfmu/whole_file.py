@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,6 +13,8 @@ try:
     import fcntl
 except ImportError:  # Windows, where a file that is open cannot be replaced
     fcntl = None  # type: ignore[assignment]
+
+PATIENCE = 5.0  # [s] to wait for the lock of a folder, which is held for less than a millisecond
 
 
 class BeingWrittenError(OSError):
@@ -82,13 +85,21 @@ def check_is_free(target: Path) -> None:
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """In this block no other process is in such a block for the same folder."""
+    """In this block no other process is in such a block for the same folder, unless one stays there for too long."""
     descriptor = -1
     if fcntl:
         with suppress(OSError):
             descriptor = os.open(folder, os.O_RDONLY)
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
     try:
+        end = time.monotonic() + PATIENCE
+        while descriptor >= 0 and time.monotonic() < end:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(0.005)
+            except OSError:  # a file system without locks
+                break
         yield
     finally:
         if descriptor >= 0:

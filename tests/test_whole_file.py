@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from kinfmu import whole_file
 from kinfmu.whole_file import replacement, write_whole
 
 
@@ -43,6 +44,20 @@ def test_what_is_no_file_is_written_to_and_not_replaced() -> None:
     finally:
         os.close(end)
         os.close(start)
+
+
+@pytest.mark.skipif(whole_file.fcntl is None, reason="Windows has no such locks")
+def test_a_folder_that_another_program_locks_does_not_stop_the_writing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(whole_file, "PATIENCE", 0.05)
+    folder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        whole_file.fcntl.flock(folder, whole_file.fcntl.LOCK_EX)
+        write_whole(tmp_path / "file.txt", b"text")
+    finally:
+        os.close(folder)
+    assert (tmp_path / "file.txt").read_bytes() == b"text"
 
 
 def test_a_long_name_is_no_longer_while_it_is_written(tmp_path: Path) -> None:
