@@ -139,6 +139,53 @@ def test_damaged_states_are_refused_and_the_slave_goes_on(start: Start) -> None:
     assert host.outputs() == before
 
 
+def _call(host: Host, rng: random.Random, states: list[Any]) -> None:
+    """One call of any kind, as a host should or should not make it."""
+    odd = [math.nan, math.inf, -math.inf, 5e-324, -0.0, 1e308, -1e308, 1e99, 1e16, 1e-300]
+
+    def number() -> float:
+        return rng.choice(odd) if rng.random() < 0.2 else rng.uniform(-4.0, 4.0)
+
+    count = len(host.references)
+    references = [rng.choice([0, count + 1, 2**31 - 1, 1 + rng.randrange(count)]) for _ in range(rng.randrange(5))]
+    slave = host.slave
+    kind = rng.randrange(12)
+    if kind < 3:
+        slave.setReal([1, 2, 3], [number(), number(), number()])
+    elif kind < 6:
+        host.step(number() if rng.random() < 0.2 else 0.1, number() if rng.random() < 0.2 else 0.1)
+    elif kind == 6:
+        slave.setReal(references, [number() for _ in references])
+        slave.getReal(references)
+    elif kind == 7:
+        slave.setInteger(references, [rng.choice([0, 1, 2, -7, 2**31 - 1]) for _ in references])
+        slave.setBoolean(references, [rng.random() < 0.5 for _ in references])
+        slave.getInteger(references)
+        slave.getBoolean(references)
+        slave.getString(references)
+    elif kind == 8:
+        states.append(slave.getFMUstate())
+    elif kind == 9 and states:
+        slave.setFMUstate(rng.choice(states))
+    elif kind == 10 and states:
+        data = slave.serializeFMUstate(rng.choice(states))
+        slave.setFMUstate(slave.deSerializeFMUstate(damaged(data, rng) if rng.random() < 0.5 else data))
+    elif kind == 11 and rng.random() < 0.3:
+        rng.choice([slave.terminate, slave.reset, lambda: host.initialize(0.0), lambda: host.initialize(number())])()
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("name", "drive"), [("fourbar", "inputs"), ("crank_rocker", "time"), ("five_bar", "inputs")])
+def test_no_call_by_chance_is_fatal_and_no_output_infinite(start: Start, name: str, drive: str, seed: int) -> None:
+    rng = random.Random(seed)  # noqa: S311  calls by chance
+    host = start(name, drive)
+    states: list[Any] = []
+    for k in range(400):
+        _call(host, rng, states)
+        assert all(math.isfinite(value) for value in host.outputs()), k
+    assert not [text for _, text in host.messages if "defect" in text]
+
+
 FORGED = [{"token": None}, {"inputs": [[]]}, {"inputs": []}, {"history": 7}, {"committed": "x"}, {"tolerance": "x"}]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import tempfile
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 import kinfmu
 from kinfmu.backends.c import compiler
-from kinfmu.fmu.interface import interface
+from kinfmu.fmu.interface import Drive, interface
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import linkage
@@ -18,7 +17,6 @@ from tests.fuzz.summary import Summary, seeds
 
 DRIVER = Path(__file__).with_name("fmu_driver.c")
 TOKEN = "{00000000-0000-0000-0000-000000000000}"  # noqa: S105  a guid
-MECHANISMS = {"fourbar": None, "settable": linkage, "five_bar": None, "double_pendulum": None}
 CALLS = 400  # of a trial, by each thread
 PATIENCE = 120.0  # [s] for one trial
 SANITIZERS = {
@@ -32,15 +30,23 @@ class Variant(NamedTuple):
 
     mechanism: str
     fmi: int
+    drive: Drive
     sanitizer: str
 
     def __str__(self) -> str:
-        return f"{self.mechanism}, FMI {self.fmi}, {self.sanitizer} sanitizer"
+        return f"{self.mechanism}, FMI {self.fmi}, driven by {self.drive}, {self.sanitizer} sanitizer"
 
 
 VARIANTS = [
-    Variant(*chosen)
-    for chosen in zip(itertools.cycle(MECHANISMS), (2, 3, 3, 2, 3, 2, 2, 3), ["address", "thread"] * 4, strict=False)
+    Variant("fourbar", 2, "inputs", "address"),
+    Variant("settable", 3, "inputs", "thread"),
+    Variant("five_bar", 3, "inputs", "address"),
+    Variant("cam_roller", 2, "time", "address"),
+    Variant("five_bar", 2, "time", "thread"),
+    Variant("settable", 2, "time", "address"),
+    Variant("triple_rocker", 3, "time", "thread"),
+    Variant("double_pendulum", 2, "inputs", "address"),
+    Variant("excavator", 3, "time", "address"),
 ]
 
 
@@ -75,11 +81,10 @@ def trial(seed: int, folder: Path, summary: Summary) -> None:
 
 def _program(variant: Variant, folder: Path) -> Path:
     """The program of a variant, compiled when it is first wanted."""
-    path = folder / f"{variant.mechanism}_{variant.fmi}_{variant.sanitizer}"
+    path = folder / "_".join(map(str, variant))
     if not path.exists():
-        make = MECHANISMS[variant.mechanism]
-        plan = compile_plan(make() if make else kinfmu.load(variant.mechanism))
-        variables = interface(plan, "inputs", has_time=variant.fmi == 3)
+        plan = compile_plan(linkage() if variant.mechanism == "settable" else kinfmu.load(variant.mechanism))
+        variables = interface(plan, variant.drive, has_time=variant.fmi == 3)
         version = f"{variant.fmi}.0"
         files = sources(plan, variables, version, TOKEN) | headers(version) | {DRIVER.name: DRIVER.read_text("utf-8")}
         flags = ("-std=c99", "-g", "-O0", "-ffp-contract=off", "-pthread")
