@@ -226,6 +226,22 @@ def test_the_first_samples_have_lower_orders_and_say_that_their_errors_are_unkno
         assert steps(host, t, 0.001)
 
 
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_steps_that_are_taken_back_leave_no_trace_in_estimates(start: Start, repeats: int) -> None:
+    """A master that tries steps of several sizes from one point, without states, in the last digits of its clock."""
+    straight, back = start(), start()
+    for k in range(8):
+        t = 0.1 * k
+        for host in (straight, back):
+            for trial in range(repeats if host is back else 0):
+                host.set({"crank_angle": motion(0, t) + 0.01 * trial})
+                assert steps(host, math.nextafter(t, 9.0 * (trial % 2)), 0.1 / 2**trial)
+            host.set({"crank_angle": motion(0, t)})
+            assert steps(host, t, 0.1)
+        names = ("crank.phi", "crank.omega", "crank.alpha", "rocker.omega", "solver.error_qd", "solver.error_qdd")
+        assert back.get(*names) == pytest.approx(straight.get(*names), rel=1e-9, abs=1e-12)
+
+
 # solver.ok
 
 
