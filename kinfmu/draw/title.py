@@ -14,6 +14,7 @@ _THINNEST = 2.0  # [pt]; a line of i and l alone has no more letters than that
 @lru_cache(maxsize=64)
 def title_lines(title: str, room: float) -> list[str]:
     """The lines of a title, none wider than `room` [pt]; MOST_LINES at most, one if that holds it, none if it is ''."""
+    title = title[: 2 * MOST_LINES * max(int(room / _THINNEST), 1)]  # what follows is in none of the lines
     for count in range(max(min(len(title), int(room / _THINNEST)), 1), 1, -1):
         lines = textwrap.wrap(title, count)
         if len(lines) > MOST_LINES:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,7 +42,8 @@ def house_style(path: Path) -> Iterator[None]:
         import matplotlib as mpl
     except ImportError:
         raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")  # a frame is drawn in its place
         mpl.rcdefaults()
         mpl.rcParams["svg.fonttype"] = "none"  # text as text
         mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time

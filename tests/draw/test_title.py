@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
+from kinfmu import load
+from kinfmu.draw import figure, plot
 from kinfmu.draw.plots import _sheet
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.title import title_lines
@@ -35,6 +39,15 @@ def test_a_long_title_goes_on_in_a_second_line_and_ends_in_an_ellipsis() -> None
     first, second = title_lines("W" * 90, 200.0)
     assert set(first) == {"W"}
     assert second == f"{first}…"
+
+
+@pytest.mark.parametrize("title", ["\U0001f468\ue1ff", "a" * 10_000, "$\\frac{$ {} %s <b>&amp;"])
+def test_any_line_of_text_is_a_title_of_every_picture(title: str, tmp_path: Path) -> None:
+    mechanism = dataclasses.replace(load("fourbar"), title=title)
+    figure(mechanism, tmp_path / "a.svg")
+    plot(titled(title), tmp_path / "b.svg")
+    for name in ("a.svg", "b.svg"):
+        ET.parse(tmp_path / name)  # noqa: S314  # written just now
 
 
 @pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
