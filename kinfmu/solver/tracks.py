@@ -39,6 +39,7 @@ class Track:
         self.ROW_SCALES = tuple([model.ROW_SCALES[k] for k in self.blocks])
         self.ANCHOR = (u[driver],), self.of(z)
         self.WATCHES = ()
+        self.TALL = tuple([k for k, block in enumerate(self.blocks) if block in model.TALL])
         ends = [0]
         for k in self.blocks:
             low, high = model.BLOCKS[k]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
@@ -237,3 +238,14 @@ def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str,
     assert [int(row[0]) for row in runs[0]] == [0, 2, 2, 0]
     exact = case.motion(np.array(ways, dtype=np.longdouble).ravel())["rocker.phi"][0].astype(float).reshape(-1, 2)
     assert np.abs(np.array(runs[0])[:, 1:] - exact).max() <= 1e-11
+
+
+def test_a_track_has_every_constant_of_a_model_that_following_it_reads() -> None:
+    plan = compile_plan(with_second(fourbar("4", "1", "3", "2").mechanism))
+    solver = Solver(load_model(plan))
+    of_the_whole = {"ANGLES", "BLOCK_DRIVERS", "OUTPUTS"}
+    folder = Path(str(import_module("kinfmu.solver").__file__)).parent
+    read = {name for file in folder.glob("*.py") for name in re.findall(r"model\.([A-Z_]+)\b", file.read_text("utf-8"))}
+    pose = solver.solve(solver.anchor, (1.2, 1.3 + math.pi))
+    assert [name for track, _ in pose.tracks for name in sorted(read - of_the_whole) if not hasattr(track, name)] == []
+    assert len(pose.tracks) == 2
