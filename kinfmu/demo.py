@@ -89,7 +89,7 @@ def main() -> int:
     print(
         "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; look at them with\n"
         "  .venv/bin/kinfmu review logs/fourbar.mcap\n"
-        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (no screen needed)"
+        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (no screen: scripts/graphics, once)"
     )
     return 0 if agrees and exact and bool(run.good.all()) else 1
 

@@ -85,6 +85,17 @@ class MissingPackageError(KinfmuError):
 
 
 MOST_LISTED = 100  # names in a message
+OTHER_WORDS = {  # of other programs and of drawings, by what they are called here
+    **dict.fromkeys(("pin", "hinge", "pivot", "rotational", "rotary"), "revolute"),
+    **dict.fromkeys(("prismatic", "slider", "slide", "sliding", "linear"), "translational"),
+    **dict.fromkeys(("weld", "welded", "rigid"), "fixed"),
+    **dict.fromkeys(("inch", "inches", '"'), "in"),
+    **dict.fromkeys(("foot", "feet"), "ft"),
+    **dict.fromkeys(("\N{DEGREE SIGN}", "degree", "degrees"), "deg"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("turn", "turns", "revolution", "revolutions"), "rev"),
+}
 LONGEST_WORD = 200  # characters of a word that may be a misspelt name
 
 
@@ -103,5 +114,6 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     if len(word) > LONGEST_WORD:  # no misspelt name, and slow to compare
         return ""
     known = list(known)
-    near = difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
+    near = [meant for meant in [OTHER_WORDS.get(word.lower())] if meant in known]
+    near = near or difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
     return f"; did you mean '{near[0]}'?" if near else ""

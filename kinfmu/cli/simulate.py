@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -109,7 +110,7 @@ def simulate(
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
     click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}" if record else verdict(run))
     if record:
-        click.echo(f"to look at it: kinfmu review {record}")
+        click.echo(f"to look at it: kinfmu review {quote(str(record))}")
     fail_if_failed(run)
 
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Cursor = dict[str, Any]  # {"duration": seconds}, or {"sequence": number} of recordings without time
 START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
-    "no graphics driver for a picture without a display; on Debian: apt-get install mesa-vulkan-drivers libvulkan1"
+    "no graphics driver for a picture without a display: scripts/graphics of the source tree installs one; on Debian: "
+    "apt-get install mesa-vulkan-drivers libvulkan1"
 )
 _SIGNS_OF_NO_DRIVER = ("No graphics adapter", "render context")  # none at all; one that is too old
 _COLOUR = re.compile("\x1b\\[[0-9;]*m")  # of terminals

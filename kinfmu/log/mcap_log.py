@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
+from shlex import quote
 
 from kinfmu.log.clock import zero_of
 from kinfmu.log.mcap_file import Content
@@ -102,5 +103,5 @@ class McapLog:
             with suppress(OSError):
                 self._file.truncate(self._content.length)
             self.close()
-            kept = f"; it holds the run up to t = {self._content.until:g} s: kinfmu recover {self.path}"
+            kept = f"; it holds the run up to t = {self._content.until:g} s: kinfmu recover {quote(str(self.path))}"
             raise unwritable(self.path, error, kept) from error

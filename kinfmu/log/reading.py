@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ def _unreadable(path: str | Path, error: OSError) -> LogError:
 def _advice(scan: Scan, path: str | Path) -> str:
     """What helps where the first samples of a run are."""
     is_begun = RECORD in scan.metadata and scan.id_of(SAMPLE_TOPIC) is not None
-    return f"; kinfmu recover {path} keeps what is there" if is_begun else ""
+    return f"; kinfmu recover {quote(str(path))} keeps what is there" if is_begun else ""
 
 
 def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:

@@ -29,7 +29,8 @@ def check_names_and_unit(mechanism: Mechanism) -> None:
     """Raise a MechanismError for a unit or a name that cannot be meant: places are found by names."""
     if mechanism.length_unit not in METRES:
         raise MechanismError(
-            f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length; known: {listed(METRES)}"
+            f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length"
+            f"{suggestion(mechanism.length_unit, METRES)}; known: {listed(METRES)}"
         )
     check_name("name =", mechanism.name)
     if len(mechanism.bodies) > MOST_BODIES:

@@ -12,7 +12,7 @@ from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_number, is_number
 from kinfmu.units import Quantity, every_unit, factors, unit_of
 
-_PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*)\s*")  # a number and one word
+_PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*|\N{DEGREE SIGN})\s*")  # number, word
 _WORDS = re.compile(r"\s*+[+-]?\s*+[^\W\d]\w*+(?:[\s-]++\w++)*+\s*+")  # 'y', '-x', 'Y axis', 'x-axis'
 _EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
 

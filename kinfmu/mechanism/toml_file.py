@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from kinfmu.drivers import DRIVERS, Driver
-from kinfmu.errors import MechanismError, listed
+from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.joints.laws import LAWS, External, Law
 from kinfmu.joints.measures import MEASURES, Measure
@@ -138,7 +138,8 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
 def _checked_unit(unit: str) -> str:
     """The unit itself if it is one of length; Mechanism repeats this check for mechanisms written in Python."""
     if unit not in METRES:
-        raise MechanismError(f"[units] length = {quoted(unit)} is not a unit of length; known: {listed(METRES)}")
+        near = suggestion(unit, METRES) if isinstance(unit, str) else ""
+        raise MechanismError(f"[units] length = {quoted(unit)} is not a unit of length{near}; known: {listed(METRES)}")
     return unit
 
 
