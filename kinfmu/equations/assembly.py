@@ -29,6 +29,7 @@ _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zer
 _LOOKS = 4  # random poses at which the structure of the rows is seen
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
+_SLOW, _SLOW_STEPS = 0.9, 4  # a residual that falls no further in so many steps close by does not close
 _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
@@ -53,12 +54,14 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
     """
     part = Part(part) if isinstance(part, System) else part
     best, residual = _straight(part, q, u)
-    damping, too_far = 1e-3, False
+    damping, too_far, slow = 1e-3, False, 0
+    jacobian = None
     for _ in range(_ITERATIONS):
         norm = float(np.linalg.norm(residual))
-        if norm == 0.0:
+        if norm == 0.0 or slow == _SLOW_STEPS:
             break
-        jacobian = part.jacobian(best)
+        if jacobian is None:
+            jacobian = part.jacobian(best)
         is_whole = norm <= 1e-3 and not too_far  # close enough for the full step
         if is_whole:
             step = np.linalg.lstsq(jacobian, -residual, rcond=_RANK)[0]
@@ -69,8 +72,10 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
             step *= min(1.0, 0.5 / longest) if longest > 0.0 else 1.0  # half a radian or half a size at most
         trial = best + part.column_scales * step
         trial_residual = part.residual(trial, u)
-        if np.linalg.norm(trial_residual) < norm:
-            best, residual = trial, trial_residual
+        left = float(np.linalg.norm(trial_residual))
+        if left < norm:
+            slow = slow + 1 if norm <= 1e-3 and left > _SLOW * norm else 0
+            best, residual, jacobian = trial, trial_residual, None
             damping, too_far = max(damping / 5.0, 1e-12), False
         elif norm <= _ROUNDED or damping > 1e8:
             break
@@ -356,12 +361,12 @@ def _beside(system: System, singular: Assembled, side: float) -> Assembled | Non
 def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
     """Return the pose nearest to the start poses, a little beside them, from which the start is reached, if any.
 
-    Near a change point a rough pose may lie between the branches, where all rows are open by a little; so poses near it
-    are tried too.
+    Near a change point a rough pose may lie between the branches, where all rows are open by a little; with redundant
+    rows poses near it are tried too.
     """
     rng = np.random.default_rng(1989)
     beside: list[tuple[float, Assembled]] = []
-    for trial in range(_NEARBY_STARTS):
+    for trial in range(_NEARBY_STARTS if len(system.rows) > len(system.coordinates) else 1):
         spread = _SPREAD * system.column_scales * rng.uniform(-1.0, 1.0, len(start.q)) if trial else 0.0
         for side in (1.0, -1.0):
             u = start.u + side * BESIDE * _reaches(system)

@@ -153,8 +153,7 @@ def test_start_poses_on_another_branch_than_the_law_can_reach_give_way() -> None
         assert len(kinfmu.check(mechanism).notes) == (start > 0)
 
 
-@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
-@pytest.mark.parametrize("noise", [0.0, 0.03])
+@pytest.mark.parametrize(("gap", "noise"), [(1e-3, 0.0), (1e-3, 0.03), (1e-6, 0.0), (1e-8, 0.03)])
 def test_close_to_a_dead_centre_the_start_is_assembled(gap: float, noise: float) -> None:
     """The last part before the limit of a triple rocker, where the whole Gauss-Newton step goes too far."""
     mechanism = kinfmu.load("triple_rocker")
