@@ -302,7 +302,7 @@ kf_answer kf_step(kf_instance *instance, double time, double step)
     kf_answer answer, done;
     if (!(s->mode == KF_STEPPING && end - end == 0.0 && step >= 0.0 &&
           (time >= s->start_time || time >= s->start_time - SAME_TIME * step)) ||
-        is_past_stop(s, time, step)) {
+        (end > s->stop_time && is_past_stop(s, time, step))) {
         return refuse_step(instance, time, step);
     }
     answer = warn_of_inputs(instance);
