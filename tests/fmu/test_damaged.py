@@ -24,7 +24,8 @@ FLIPS = 150
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The bytes of an FMU."""
-    return kinfmu.build(kinfmu.load("slider_crank"), tmp_path_factory.mktemp("fmu") / "slider_crank.fmu").read_bytes()
+    path = tmp_path_factory.mktemp("fmu") / "slider_crank.fmu"
+    return kinfmu.build(kinfmu.load("slider_crank"), path, flavour="python").read_bytes()
 
 
 def with_file(whole: bytes, name: str, content: bytes | None) -> bytes:

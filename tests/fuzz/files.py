@@ -60,7 +60,7 @@ def trial(seed: int, summary: Summary) -> None:
 @cache
 def fmu() -> bytes:
     """An FMU."""
-    return build(gallery.load("slider_crank"), Path("whole.fmu")).read_bytes()
+    return build(gallery.load("slider_crank"), Path("whole.fmu"), flavour="python").read_bytes()
 
 
 @cache

@@ -261,7 +261,7 @@ def _paths(drawn: random.Random, find: Find) -> None:
     commands = (
         ["solve", "plain.toml", "-o", name],
         ["solve", name, "-o", "out.csv"],
-        ["build", "plain.toml", "-o", name],
+        ["build", "plain.toml", "--flavour", "python", "-o", name],
         ["check", name],
         ["check", "plain.toml", "--figure", name],
         ["simulate", name],
@@ -291,7 +291,7 @@ def _commands(drawn: random.Random, find: Find) -> None:
             ["check", "hostile.toml", "--json"],
             ["solve", "hostile.toml", "-o", "out.mcap", "--times", "0:1:0.1"],
             ["simulate", "hostile.toml", "--stop", "0.2", "--step", "0.1", "--mcap", "out.mcap", "--rrd", "out.rrd"],
-            ["build", "hostile.toml"],
+            ["build", "hostile.toml", "--flavour", "python"],
         )
     )
     invoke(runner, command, find)
