@@ -685,11 +685,26 @@ STARTS_ANYWHERE = "starts anywhere"
 
 def starts_anywhere(rng: Draw) -> Sketch:
     """A mechanism of any other family; its law and its start poses are drawn in kinfmu's way: see starts.py."""
-    others = {name: family for name, family in FAMILIES.items() if name != STARTS_ANYWHERE}
-    (name,) = rng.choices(list(others), [weight for _, weight in others.values()])
-    return others[name][0](rng)
+    (name,) = rng.choices(_STARTED, [FAMILIES[name][1] for name in _STARTED])
+    return FAMILIES[name][0](rng)
 
 
+_STARTED = (  # new families go last: a seed is a mechanism
+    "four-bars",
+    "change points",
+    "near change points",
+    "slider-cranks",
+    "crank = rod",
+    "pins in slots",
+    "watt six-bars",
+    "stephenson six-bars",
+    "six-bars driven at the end",
+    "chains",
+    "geared five-bars",
+    "redundant parallelograms",
+    "five-bars",
+    "cylinders",
+)
 FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often of a hundred
     "four-bars": (four_bars, 16),
     "change points": (change_points, 10),
