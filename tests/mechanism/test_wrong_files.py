@@ -71,7 +71,7 @@ CHANGES = {
     "a unit of length that is unknown": (
         "[parameters]",
         'units = { length = "inch" }\n[parameters]',
-        "[units] length = 'inch' is not a unit of length; known: m, mm",
+        "[units] length = 'inch' is not a unit of length; did you mean 'in'?; known: m, mm",
     ),
     "a parameter of another kind": (
         "crank = 1.0",
