@@ -30,6 +30,7 @@ from kinfmu.solver.solver import TOLERANCE
 from kinfmu.swept import Driven, Engine, Tables
 
 ENGINES = ("auto", "python", "native")
+LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 
 
@@ -92,6 +93,7 @@ def solve(
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
     if driven is None:
         driven = chosen.drive(times, tuple(constants.values()))
+    _refuse_huge(plan, driven)
     run = replace(_swept(plan, chosen, times, driven, out, constants), axis=axis)
     if anew_note and len(times):
         run = replace(run, events=(Event(float(times[0]), "info", anew_note), *run.events))
@@ -202,6 +204,18 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
         given = [columns.get(driver.inputs[order], np.array([default])) for driver in plan.drivers]
         tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
     return np.arange(n, dtype=float), *tables
+
+
+def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:
+    """Raise a RequestError for a speed or an acceleration of a driver whose square no float holds."""
+    for order in (1, 2):
+        sizes = np.abs(driven[order])
+        if (sizes > LARGEST_RATE).any():
+            sample, number = np.argwhere(sizes > LARGEST_RATE)[0]
+            raise RequestError(
+                f"{plan.drivers[number].inputs[order]} = {driven[order][sample, number]:.6g} at sample {sample}: "
+                f"the largest value is {LARGEST_RATE:g}"
+            )
 
 
 def _column(name: str, values: ArrayLike) -> FloatArray:

@@ -8,12 +8,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 from kinfmu.drivers import Driver
-from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start
+from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start, start_targets
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
-from kinfmu.errors import InconsistentError, MobilityError, RequestError, listed, suggestion
+from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, RequestError, listed, suggestion
 from kinfmu.joints.arithmetic import Value
+from kinfmu.joints.measures import DistanceBetween
 from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
@@ -239,6 +240,7 @@ def plan_from(
     local = system.mechanism
     refuse_inconsistent(system, redundancy)
     refuse_mobility(system, redundancy)
+    refuse_negative_distances(system)
     anchor = find_anchor(system)
     tracer = Tracer(local)
     set_aside = [row.index for row in redundancy.redundant]
@@ -317,6 +319,16 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
         f"[drivers] mobility is {mobility} but there {_are(names)}: remove {len(names) - mobility}",
         mobility=mobility,
     )
+
+
+def refuse_negative_distances(system: System) -> None:
+    """Raise an AssemblyError if a driver starts at a distance below 0."""
+    for driver, value in zip(system.mechanism.drivers, start_targets(system), strict=True):
+        if isinstance(driver.measured(), DistanceBetween) and value < 0.0:
+            unit = system.mechanism.length_unit
+            raise AssemblyError(
+                f"[drivers.{driver.name}] starts at a length of {value:.6g} {unit}; a distance cannot be negative"
+            )
 
 
 def _loose(system: System, redundancy: Redundancy) -> list[str]:

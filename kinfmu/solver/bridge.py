@@ -9,10 +9,12 @@ proves that it is a pose of the mechanism: where lengths miss a change point by 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import sqrt
 from typing import Any
 
 from .hermite import weights
-from .pose import ALONE, AT_REST, EPS, Model, Pose, Vector, evaluated
+from .linear import unclosed
+from .pose import ALONE, AT_REST, EPS, Found, Model, Pose, Vector, evaluated
 from .span import Span, combined, restored_span
 from .status import Status
 from .turns import turned, whole_turns
@@ -23,6 +25,8 @@ CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose
 AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node turns away
 FINE = 1e-12  # [rad, sizes]; difference of two widths from which narrower ones win nothing
 STRAIGHT = 0.1  # change of a zero located anew, as a part of what is left to go: as little where there is a zero
+DAMPING = 1e-3  # of J dz = -r at a change point: its singular value is 0, the others are far above
+NOISE = 8.0  # roundings of what the rows leave open at the centre: less is no miss
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
 
 Walk = Callable[[Pose, float], "Pose | None"]  # from a pose to a driver value, plainly
@@ -35,10 +39,11 @@ class Bridge:
     moved by its own whole turns, `raised`. nodes: the poses of the span, moved.
     """
 
-    __slots__ = ("centre", "half", "high", "low", "nodes", "raised", "span", "turns")
+    __slots__ = ("_miss", "centre", "half", "high", "low", "nodes", "raised", "span", "turns")
 
     def __init__(self, span: Span, turns: int = 0, raised: tuple[int, ...] = ()) -> None:
         self.span = span
+        self._miss: float | None = None  # not known yet
         self.turns = turns
         self.raised = raised
         self.centre = turned(span.centre, turns)
@@ -79,15 +84,76 @@ class Bridge:
         return pose
 
     def closes(self) -> bool:
-        """True if the interpolated pose at the centre closes, up to what rounding leaves of large angles."""
-        u, z = (self.centre,), self._raised(self.span.middle()[0])
+        """Return whether the interpolated pose at the centre closes, up to what rounding leaves of large angles."""
         try:
-            residual = evaluated(self.span.model, u, z, self.span.held)[3]
+            found = self._middle()
         except (ArithmeticError, ValueError):
             return False
+        return bool(found[3] <= CLOSED + 4.0 * EPS * self._largest(found[0])) and self._keeps_distances(found[-1])
+
+    def _middle(self) -> Found:
+        """The interpolated pose at the centre."""
+        return evaluated(self.span.model, (self.centre,), self._raised(self.span.middle()[0]), self.span.held)
+
+    def _largest(self, z: Vector) -> float:
+        """The largest of the driver value and the unknowns, in radians and sizes."""
         scales = (*self.span.model.REACH, *self.span.model.UNKNOWN_SCALES)
-        largest = max([abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)])
-        return bool(residual <= CLOSED + 4.0 * EPS * largest)
+        return float(max([abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)]))
+
+    def _keeps_distances(self, values: Any) -> bool:
+        """True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
+
+        Two points that pass each other at a distance d leave this row open by d^2.
+        """
+        model = self.span.model
+        for _, block, row, scale in model.DISTANCES if self.low < 0.0 < self.high else ():
+            squared = model.residuals(values)[block][row] * scale + self.centre * self.centre
+            if abs(sqrt(max(squared, 0.0)) - abs(self.centre)) > CLOSED * model.SIZE:
+                return False
+        return True
+
+    def miss(self) -> float:
+        """Return by how much lengths miss the change point, relative to the size; 0 within rounding.
+
+        That is what the rows leave open at the centre and no motion of the unknowns closes: of J dz = -r, damped, the
+        part outside the columns of J.
+        """
+        if self._miss is None:
+            model = self.span.model
+            found = self._middle()
+            jacobians, residuals = model.jacobians(found[-1]), model.residuals(found[-1])
+            left = 0.0
+            for block, (low, high) in enumerate(model.BLOCKS):
+                if self.span.held >> block & 1:
+                    scales = model.UNKNOWN_SCALES[low:high]
+                    rows = zip(jacobians[block], model.ROW_SCALES[block], strict=True)
+                    pure = [[a * c / scale for a, c in zip(row, scales, strict=True)] for row, scale in rows]
+                    left = max(left, max(map(abs, unclosed(pure, residuals[block], DAMPING))))
+            self._miss = max(0.0, left - NOISE * EPS * (1.0 + self._largest(found[0])))
+        return self._miss
+
+    def missed(self, pose: Pose, slope: float) -> tuple[float, float, float]:
+        """Return what the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
+
+        Where lengths miss a change point by m, branches that cross part: by sqrt(m) at the crossing, by m / x at x
+        beside it. Their determinant falls straight to 0 there, so it tells x better than the window's centre.
+
+        Args:
+            pose: Interpolated by the bridge.
+            slope: Of the steepest unknown over the driver.
+
+        """
+        e = 2.0 * sqrt(self.miss())
+        if e == 0.0:
+            return 0.0, 0.0, 0.0
+        sides = [node.determinants for node in self.nodes[2:4]]
+        parts = [
+            2.0 * abs(here) / (abs(before) + abs(after))
+            for k, (here, before, after) in enumerate(zip(pose.determinants, *sides, strict=True))
+            if self.span.held >> k & 1
+        ]
+        w = e + min(parts) * self.half / float(self.span.model.REACH[0])
+        return e * e / w, 2.0 * max(1.0, slope) * (e / w) ** 2, 8.0 * e * e / w**3
 
     def difference(self, u: float) -> tuple[Vector, Vector, Vector]:
         """What the wider span says less than the one used, in z and its two derivatives: the error estimate."""

@@ -18,10 +18,11 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
-from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Model, Pose, Vector, evaluated, tangent_of
+from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Found, Model, Pose, Vector, evaluated, tangent_of
 from .tracks import Track, held_blocks, rates_in_time
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
+UNBOUNDED = 0.5  # change of a determinant, as a part of it, within a pose's error: rates are not known then
 MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest count for all
 NOTHING_KNOWN = inf, inf, inf
 
@@ -65,25 +66,52 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         v = abs(ud[0]) / r
         speed, curve = speed * r * v, curve * r * r * v * v + speed * r * (abs(udd[0]) / r)
     least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
-    squares = [0.0, 0.0, 0.0]
+    squares, lost = [0.0, 0.0, 0.0], False
     try:
         sources = _sources(model, pose, drive, rates)
         if pose.bridge is not None:
             sources.append(_of_bridge(model, pose, drive, rates))
         sources += [_of_track(track, own, drive, rates) for track, own in pose.tracks if own.bridge is not None]
         for source in sources:
-            values, first, second = _moved(model, pose, drive, rates, source)
-            q, qd, qdd = _differences(model, model.motion(values, ud, udd, first, second), here)
+            there, first, second = _moved(model, pose, drive, rates, source)
+            q, qd, qdd = _differences(model, model.motion(there[-1], ud, udd, first, second), here)
+            lost = lost or _is_singular_between(pose, there)
             squares[0] += q * q
             squares[1] += qd * qd
             squares[2] += qdd * qdd
     except (ArithmeticError, ValueError):  # exactly singular, or the sine of an overflow
         return NOTHING_KNOWN
+    for own, v, slope in _bridged(model, pose, ud, rates):
+        for order, off in enumerate(own.bridge.missed(own, slope)):
+            squares[order] += (off * v**order) ** 2
     if not sum(squares) < inf:
         return NOTHING_KNOWN
-    if _is_at_a_crossing(model, pose, rates):
+    if lost or _is_at_a_crossing(model, pose, rates):
         return least[0] + sqrt(squares[0]), inf, inf
     return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
+
+
+def _bridged(model: Model, pose: Pose, ud: Vector, rates: Rates) -> list[tuple[Pose, float, float]]:
+    """What of a pose is interpolated, with its driver's speed in radians and sizes, and its steepest slope."""
+    if pose.bridge is not None:
+        return [(pose, abs(ud[0]) / model.REACH[0], rates.speed * model.REACH[0])]
+    found = []
+    for track, own in pose.tracks:
+        if own.bridge is not None:
+            slope = max([abs(a) / c for a, c in zip(tangent_of(track, own)[0], track.UNKNOWN_SCALES)])  # noqa: B905
+            reach = track.REACH[0]
+            found.append((own, abs(ud[track.driver]) / reach, slope * reach))
+    return found
+
+
+def _is_singular_between(pose: Pose, there: Found) -> bool:
+    """True if a determinant changes by half of its size to a pose that this one cannot be told from.
+
+    As near to a singular point its rates have no bound.
+    """
+    held = held_blocks(pose)
+    pairs = enumerate(zip(pose.determinants, there[1], strict=True))
+    return any(abs(b - a) > UNBOUNDED * abs(a) for k, (a, b) in pairs if not held >> k & 1)
 
 
 def _is_at_a_crossing(model: Model, pose: Pose, rates: Rates) -> bool:
@@ -307,14 +335,15 @@ def _of_node(model: Model, node: Pose, half: float) -> Vector:
     return tuple([sqrt(square) for square in squares])
 
 
-def _moved(model: Model, pose: Pose, drive: Drive, rates: Rates, source: Source) -> tuple[Vector, Vector, Vector]:
-    """Values, first and second derivative at the pose that a source moves to."""
+def _moved(model: Model, pose: Pose, drive: Drive, rates: Rates, source: Source) -> tuple[Found, Vector, Vector]:
+    """What `position` gives at the pose that a source moves to, and its first and second derivative."""
     z = tuple([a + d for a, d in zip(pose.z, source.z)])  # noqa: B905
-    values = evaluated(model, pose.u, z)[-1]
+    there = evaluated(model, pose.u, z)
+    values = there[-1]
     first = model.velocity(values, drive.ud, source.given_first or rates.first, drive.held)
     first = _added(first, rates.first, source.first)
     second = model.acceleration(values, drive.ud, drive.udd, first, source.given_second or rates.second, drive.held)
-    return values, first, _added(second, rates.second, source.second)
+    return there, first, _added(second, rates.second, source.second)
 
 
 def _added(there: Vector, here: Vector, more: Vector) -> Vector:

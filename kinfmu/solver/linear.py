@@ -121,6 +121,16 @@ def qr_solve(factors: QR, right: list[float]) -> list[float]:
     return x
 
 
+def unclosed(matrix: Matrix, right: list[float], damping: float) -> list[float]:
+    """b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: what of b lies outside the columns of A."""
+    columns = list(zip(*matrix, strict=True))
+    normal = [[sum(map(mul, one, other)) for other in columns] for one in columns]
+    for k, row in enumerate(normal):
+        row[k] += damping * damping
+    x = lu_solve(factor(normal), [-sum(map(mul, column, right)) for column in columns])
+    return [b + sum(map(mul, row, x)) for row, b in zip(matrix, right, strict=True)]
+
+
 def _reflect(reflector: list[float], square: float, column: list[float]) -> None:
     weight = 2.0 * sum(a * b for a, b in zip(reflector, column, strict=True)) / square
     for i, entry in enumerate(reflector):

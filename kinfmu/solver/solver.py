@@ -71,6 +71,8 @@ class Solver:
                             return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
+        if any(u[driver] < 0.0 for driver, *_ in self.model.DISTANCES):
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
         pose = advance(self.model, start, u, road)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))

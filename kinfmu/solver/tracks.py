@@ -37,6 +37,9 @@ class Track:
         self.UNKNOWNS = self.of(model.UNKNOWNS)
         self.UNKNOWN_SCALES = self.of(model.UNKNOWN_SCALES)
         self.ROW_SCALES = tuple([model.ROW_SCALES[k] for k in self.blocks])
+        own = {block: k for k, block in enumerate(self.blocks)}
+        self.TALL = tuple([own[block] for block in model.TALL if block in own])
+        self.DISTANCES = tuple([(0, own[block], *row) for by, block, *row in model.DISTANCES if by == driver])
         self.ANCHOR = (u[driver],), self.of(z)
         self.WATCHES = ()
         self.TALL = tuple([k for k, block in enumerate(self.blocks) if block in model.TALL])
@@ -110,6 +113,11 @@ class Track:
     def jacobians(self, values: Any) -> list[Matrix]:
         """As a model's `jacobians`."""
         every = self._model.jacobians(values)
+        return [every[k] for k in self.blocks]
+
+    def residuals(self, values: Any) -> list[list[float]]:
+        """As a model's `residuals`."""
+        every = self._model.residuals(values)
         return [every[k] for k in self.blocks]
 
 

@@ -12,6 +12,7 @@ from kinfmu.backends.c.readers import readers
 from kinfmu.backends.c.stages import stages
 from kinfmu.backends.c.tables import curve_tables, tables
 from kinfmu.backends.c.units import rows_of
+from kinfmu.backends.distances import distance_rows
 from kinfmu.plan import SolvePlan
 
 
@@ -62,6 +63,7 @@ def _sizes(parts: Parts) -> str:
         "PARAMETERS": len(plan.parameters),
         "DERIVED": len(parts.derived),
         "CONSTANTS": len(plan.law_constants),
+        "DISTANCES": len(distance_rows(plan, solved)),
         "TALL": int(any(len(block.residuals) > len(block.unknowns) for block in solved)),
         "LARGEST_BLOCK": max((len(block.residuals) * len(block.unknowns) for block in solved), default=0),
     }

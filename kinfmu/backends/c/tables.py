@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
 from kinfmu.backends.c.text import array, booleans, string
+from kinfmu.backends.distances import distance_rows
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.solver.curve import CurveData
 
@@ -15,6 +16,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
     anchor_u, anchor_z = plan.anchor_values
     kinds = [driver.quantity.kind for driver in plan.drivers]
     scales = [1.0 if name.endswith(".phi") else plan.size for name in plan.unknowns]
+    distances = distance_rows(plan, solved)
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return [
         *array("double kf_anchor_u", anchor_u),
@@ -26,6 +28,10 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
         *(array("int kf_block_drivers", plan.block_drivers) if plan.has_tracks else []),
         *array("double kf_row_scales", [scale for block in solved for scale in block.row_scales]),
         *array("double kf_determinant_factors", [1.0 / block.determinant_scale for block in solved]),
+        *array("int kf_distance_drivers", [row.driver for row in distances]),
+        *array("int kf_distance_blocks", [row.block for row in distances]),
+        *array("int kf_distance_rows", [row.row for row in distances]),
+        *array("double kf_distance_scales", [row.scale for row in distances]),
         *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),
         *array("double kf_constants_written", [constant.value for constant in plan.law_constants]),
         "",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
+from kinfmu.backends.distances import distance_rows
 from kinfmu.backends.python.block_code import indented, tupled, unpacking
 from kinfmu.backends.python.differences import angle_places
 from kinfmu.backends.writer import Names, Writer, identifier
@@ -35,6 +36,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         imports += ["", "from .linear import column_part, factor, lu_solve, qr_factor, qr_solve, row_part"]
     kinds = tuple(driver.quantity.kind for driver in plan.drivers)
     rows, scales = tuple(b.row_names for b in solved), tuple(b.row_scales for b in solved)
+    distances = tuple(map(tuple, distance_rows(plan, solved)))
     reach = tuple(1.0 if kind == "angle" else plan.size for kind in kinds)
     return [
         f'"""Kinematics of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
@@ -64,6 +66,7 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"ROW_SCALES = {scales!r}",
         f"TALL = {tuple(k for k, b in enumerate(solved) if len(b.residuals) > len(b.unknowns))!r}",
         *([f"ROWS = {rows!r}"] if plan.parameters else []),
+        f"DISTANCES = {distances!r}  # drivers of distances; block, row and scale of each",
         *(f"{name} = {data!r}" for data, name in curves.items()),
         "",
     ]

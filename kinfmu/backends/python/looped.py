@@ -36,14 +36,9 @@ class _Looped(Lists):
         self.unknowns = len(plan.unknowns)
 
     def module(self) -> str:
-        with_parameters = bool(self.plan.parameters)
         functions = [
             *drive(self.plan, self.curves),
-            *(
-                line
-                for kind in self.kinds.values()
-                for line in Loops(kind, self.curves).source(with_residuals=with_parameters)
-            ),
+            *(line for kind in self.kinds.values() for line in Loops(kind, self.curves).source()),
             *self._position(),
             *self._velocity(),
             *self._acceleration(),
@@ -55,10 +50,10 @@ class _Looped(Lists):
             *self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
             *self._watches(),
             *self._appended("jacobians", "Jacobian of each block.", "jacobian"),
+            *self._appended("residuals", "Residuals of each block, relative to the size.", "residual"),
             *differences(self.plan),
         ]
-        if with_parameters:
-            functions += self._appended("residuals", "Residuals of each block, relative to the size.", "residual")
+        if self.plan.parameters:
             functions = bound(self.plan, self.names, list(self.derived), functions)
         gathers = any(_is_long(self._gathered(order)[1]) for order in range(3))
         head = header(self.plan, self.curves, extra=("from operator import itemgetter",) if gathers else ())

@@ -58,13 +58,12 @@ class Loops:
         self.own = own
         self.hold: dict[str, Node | None] = {}  # names that later functions take from the position
 
-    def source(self, *, with_residuals: bool) -> list[str]:
+    def source(self) -> list[str]:
         """All functions, those of the position stage first."""
         kind, later = self.kind, []
         if kind.solved:
             later += self._linear("velocity", 1) + self._linear("acceleration", 2)
-            later += self._matrices(kind.solved)
-            later += self._residuals(kind.solved) if with_residuals else []
+            later += self._matrices(kind.solved) + self._residuals(kind.solved)
         if kind.has_assigned:
             later += self._assigned("rates", 1) + self._assigned("accelerations", 2)
         parts = self._position()

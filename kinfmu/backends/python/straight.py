@@ -72,7 +72,7 @@ class _Straight:
             self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
             self._watches(),
             self._jacobians(),
-            *([self._residuals()] if self.plan.parameters else []),
+            self._residuals(),
         ]
         position = self._position()  # after the later stages, which say what it has to hand on
         unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"

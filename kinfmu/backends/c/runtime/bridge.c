@@ -6,6 +6,8 @@
 #define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node turns away */
 #define FINE 1e-12     /* [rad, sizes]; difference of two widths from which narrower ones win nothing */
 #define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: less where there is one */
+#define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
+#define NOISE 8.0      /* roundings of what the rows leave open at the centre: less is no miss */
 #define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
 
 /* True inside the window, where the bridge is used. */
@@ -97,8 +99,8 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     return true;
 }
 
-/* True if the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
-static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
+/* The interpolated pose at the centre, and the largest of the driver value and the unknowns, in radians and sizes. */
+static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *found, double *size)
 {
     const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
     double *const z = solver->scratch.z;
@@ -114,8 +116,98 @@ static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
             largest = kf_is_outside(&solver->model, block) ? largest : fmax(largest, fabs(z[k]) / kf_unknown_scales[k]);
         }
     }
-    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, room), z, span->held, found)
-           && found->residual <= CLOSED + 4.0 * KF_EPS * largest;
+    *size = largest;
+    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, room), z, span->held, found);
+}
+
+/* True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
+ *
+ * Two points that pass each other at a distance d leave this row open by d^2.
+ */
+static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, const kf_found *found)
+{
+    double residuals[KF_ROOM(KF_LARGEST_BLOCK)];
+    int k;
+    for (k = 0; k < KF_DISTANCES && bridge->u[2] < 0.0 && 0.0 < bridge->u[3]; ++k) {
+        if (kf_distance_drivers[k] == KF_ALONG(solver)) {
+            const double u = bridge->centre;
+            double squared;
+            kf_residuals(&solver->model, found, kf_distance_blocks[k], residuals);
+            squared = residuals[kf_distance_rows[k]] * kf_distance_scales[k] + u * u;
+            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > CLOSED * KF_SIZE) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* True if the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
+static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
+{
+    double largest;
+    return find_middle(solver, bridge, found, &largest) && found->residual <= CLOSED + 4.0 * KF_EPS * largest
+           && keeps_distances(solver, bridge, found);
+}
+
+/* By how much lengths miss the change point, relative to the size; 0 within rounding.
+ *
+ * That is what the rows leave open at the centre and no motion of the unknowns closes: of J dz = -r, damped, the part
+ * outside the columns of J.
+ */
+static double miss(kf_solver *solver, const kf_bridge *bridge)
+{
+    kf_found *const found = &solver->scratch.way[1].found;
+    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
+    double jacobian[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)], largest, left = 0.0;
+    const double *rows = kf_row_scales;
+    int block, i, k;
+    if (!find_middle(solver, bridge, found, &largest)) {
+        return 0.0;
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int first = kf_first_of(block), columns = kf_block_ends[block] - first, m = kf_block_rows[block];
+        if (held[block]) {
+            kf_jacobian(&solver->model, found, block, jacobian);
+            kf_residuals(&solver->model, found, block, right);
+            for (i = 0; i < m; ++i) {
+                for (k = 0; k < columns; ++k) {
+                    jacobian[i * columns + k] *= kf_unknown_scales[first + k] / rows[i];
+                }
+            }
+            left = fmax(left, kf_unclosed(m, columns, jacobian, right, DAMPING));
+        }
+        rows += m;
+    }
+    return fmax(0.0, left - NOISE * KF_EPS * (1.0 + largest));
+}
+
+/* What the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
+ *
+ * Where lengths miss a change point by m, branches that cross part: by sqrt(m) at the crossing, by m / x at x beside
+ * it. Their determinant falls straight to 0 there, so it tells x better than the window's centre. slope: of the
+ * steepest unknown.
+ */
+void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3])
+{
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[pose->bridge];
+    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
+    kf_pose *const before = &solver->scratch.way[1], *const after = &solver->scratch.way[2];
+    const double e = 2.0 * sqrt(miss(solver, bridge));
+    double part = INFINITY, w;
+    int k;
+    missed[0] = missed[1] = missed[2] = 0.0;
+    if (e == 0.0 || !at_node(solver, bridge, 2, before) || !at_node(solver, bridge, 3, after)) {
+        return;
+    }
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double sides = fabs(before->found.determinants[k]) + fabs(after->found.determinants[k]);
+        part = held[k] ? fmin(part, 2.0 * fabs(pose->found.determinants[k]) / sides) : part;
+    }
+    w = e + part * bridge->half / kf_reach[KF_ALONG(solver)];
+    missed[0] = e * e / w;
+    missed[1] = 2.0 * fmax(1.0, slope) * (e / w) * (e / w);
+    missed[2] = 8.0 * e * e / (w * w * w);
 }
 
 /* What the wider span says less than the one used, in z and its two derivatives: the error estimate. */

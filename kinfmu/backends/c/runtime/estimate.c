@@ -9,6 +9,8 @@
  */
 #include "way.h"
 
+#define UNBOUNDED 0.5 /* change of a determinant, as a part of it, within a pose's error: rates are not known then */
+
 /* How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given. And the
  * largest of the derivatives in radians and sizes.
  */
@@ -60,6 +62,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
         source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
         source->second[k] = weight * KF_ROUNDINGS * KF_EPS * drive->curve * all_of[k];
     }
+    source->missed[0] = source->missed[1] = source->missed[2] = 0.0;
     source->is_given = false;
 }
 
@@ -148,6 +151,12 @@ static double away(double gap, double by)
     return gap >= 0.0 ? gap + by : gap - by;
 }
 
+/* The steepest slope of an unknown over the only driver, both in radians and sizes. */
+static double steepest(const kf_solver *solver, const kf_pose *pose)
+{
+    return kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales) * kf_reach[KF_ALONG(solver)];
+}
+
 /* What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by. */
 static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
 {
@@ -163,6 +172,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
     if (!round_node(solver, span, 2, rounding) || !round_node(solver, span, 3, rounding)) {
         return false;
     }
+    kf_bridge_missed(solver, pose, steepest(solver, pose), source->missed);
     kf_bridge_difference(solver, pose->bridge, KF_HERE(solver, pose), scratch->z, scratch->zd, scratch->zdd);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         scratch->z[k] = away(scratch->z[k], rounding[k]);
@@ -191,6 +201,8 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
     {
         const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
         is_made = make_source_of_bridge(solver, own, &along);
+        source->missed[1] *= fabs(v) / kf_reach[driver];
+        source->missed[2] *= v / kf_reach[driver] * (v / kf_reach[driver]);
     }
     kf_leave_track(solver);
     for (block = 0; block < KF_BLOCKS; ++block) {
@@ -223,14 +235,30 @@ static double largest_gap(const double *there, const double *here)
     return largest;
 }
 
-/* The squares of what all sources move the outputs by; false if nothing is known. */
+/* True if a determinant changes by half of its size to a pose that this one cannot be told from.
+ *
+ * As near to a singular point its rates have no bound.
+ */
+static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const bool *held)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double a = pose->found.determinants[k], b = there->found.determinants[k];
+        if (!(held != NULL && held[k]) && fabs(b - a) > UNBOUNDED * fabs(a)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The squares of what all sources move the outputs by; false if nothing is known. lost: set where rates are not. */
 static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_driven *drive,
-                  double squares[3])
+                  double squares[3], bool *lost)
 {
     kf_pose *const there = &solver->scratch.way[0];
     double(*const rows)[3][KF_ROOM(KF_OUTPUTS)] = solver->scratch.rows;
     int worst[KF_MOST_SOURCES], i, order;
-    double weight;
+    double weight, missed[3];
     const int count = kf_worst_blocks(&solver->model, &pose->found, drive->held, worst, &weight);
     const int most = pose->bridge >= 0 ? 1 : KF_TRACKS ? KF_DRIVERS : 0;
     kf_outputs_of(&solver->model, pose, ud, udd, rows[0][0], rows[0][1], rows[0][2]);
@@ -253,10 +281,16 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
             return false;
         }
         kf_outputs_of(&solver->model, there, ud, udd, rows[1][0], rows[1][1], rows[1][2]);
+        memcpy(missed, solver->scratch.source.missed, sizeof missed);
+        if (KF_DRIVERS == 1) {
+            missed[1] *= fabs(ud[0]) / kf_reach[0];
+            missed[2] *= ud[0] / kf_reach[0] * (ud[0] / kf_reach[0]);
+        }
         for (order = 0; order < 3; ++order) {
             const double gap = largest_gap(rows[1][order], rows[0][order]);
-            squares[order] += gap * gap;
+            squares[order] += gap * gap + missed[order] * missed[order];
         }
+        *lost = *lost || is_singular_between(pose, there, drive->held);
     }
     return count >= 0 && squares[0] + squares[1] + squares[2] < INFINITY;
 }
@@ -295,6 +329,7 @@ static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
 {
     const kf_driven drive = drive_of(solver, pose, ud, udd);
+    bool lost = false;
     double squares[3] = {0.0, 0.0, 0.0}, largest = 0.0, speed = drive.speed, curve = drive.curve;
     const double *const outputs = solver->scratch.rows[0][0];
     int k;
@@ -303,7 +338,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
         speed = drive.speed * r * v;
         curve = drive.curve * r * r * v * v + drive.speed * r * a;
     }
-    if (!tried(solver, pose, ud, udd, &drive, squares)) {
+    if (!tried(solver, pose, ud, udd, &drive, squares, &lost)) {
         errors[0] = errors[1] = errors[2] = INFINITY;
         return;
     }
@@ -313,7 +348,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
-    if (is_at_a_crossing(solver, pose, &drive) || is_a_track_at_a_crossing(solver, pose)) {
+    if (lost || is_at_a_crossing(solver, pose, &drive) || is_a_track_at_a_crossing(solver, pose)) {
         errors[1] = errors[2] = INFINITY;
     }
 }

@@ -86,6 +86,10 @@ extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each 
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
 extern const double kf_row_scales[KF_ROOM(KF_ROWS)]; /* of the residuals, block after block */
 extern const double kf_determinant_factors[KF_ROOM(KF_BLOCKS)]; /* 1 / determinant far from singular */
+extern const int kf_distance_drivers[KF_ROOM(KF_DISTANCES)]; /* those that drive a distance: d.d - u^2 */
+extern const int kf_distance_blocks[KF_ROOM(KF_DISTANCES)];  /* where their rows are */
+extern const int kf_distance_rows[KF_ROOM(KF_DISTANCES)];
+extern const double kf_distance_scales[KF_ROOM(KF_DISTANCES)]; /* of these rows */
 extern const double kf_parameters_written[KF_ROOM(KF_PARAMETERS)];
 extern const double kf_constants_written[KF_ROOM(KF_CONSTANTS)]; /* of the laws */
 
@@ -136,6 +140,7 @@ bool kf_qr(int m, int k, const double *matrix, double *factors, double *determin
 void kf_qr_solve(int m, int k, const double *factors, const double *right, double *x);
 double kf_row_part(int k, const double *matrix, const double *usual);
 double kf_column_part(int m, int k, const double *matrix, const double *usual);
+double kf_unclosed(int m, int k, const double *matrix, const double *right, double damping);
 double kf_orientation(int m, int k, const double *a, const double *b);
 double kf_reciprocal_condition(int m, int k, double *matrix);
 

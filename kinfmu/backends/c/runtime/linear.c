@@ -228,6 +228,41 @@ static double reciprocal_condition_of_two(const double *matrix)
     return fabs(a * d - b * c) / (norm * inverse_norm);
 }
 
+/* The largest entry of b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: what of b lies outside the columns of A
+ * (m, k).
+ */
+double kf_unclosed(int m, int k, const double *matrix, const double *right, double damping)
+{
+    double normal[KF_ROOM(KF_LARGEST_BLOCK)], factors[3 * KF_ROOM(KF_LARGEST_BLOCK)], x[KF_ROOM(KF_LARGEST_BLOCK)];
+    double b[KF_ROOM(KF_LARGEST_BLOCK)], determinant, largest = 0.0;
+    int i, j, row;
+    for (i = 0; i < k; ++i) {
+        b[i] = 0.0;
+        for (row = 0; row < m; ++row) {
+            b[i] -= matrix[row * k + i] * right[row];
+        }
+        for (j = 0; j < k; ++j) {
+            double sum = i == j ? damping * damping : 0.0;
+            for (row = 0; row < m; ++row) {
+                sum += matrix[row * k + i] * matrix[row * k + j];
+            }
+            normal[i * k + j] = sum;
+        }
+    }
+    if (!kf_lu(k, normal, factors, &determinant)) {
+        return 0.0;
+    }
+    kf_lu_solve(k, factors, b, x);
+    for (row = 0; row < m; ++row) {
+        double left = right[row];
+        for (j = 0; j < k; ++j) {
+            left += matrix[row * k + j] * x[j];
+        }
+        largest = fmax(largest, fabs(left));
+    }
+    return largest;
+}
+
 /* det(A^T B) of two tall matrices over the lengths of its rows: negative if their columns turn the other way. */
 double kf_orientation(int m, int k, const double *a, const double *b)
 {

@@ -159,6 +159,13 @@ inline kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double 
         kf_say(solver->message, " is not a finite number");
         return kf_failed(pose, KF_OUTSIDE);
     }
+    for (k = 0; k < KF_DISTANCES; ++k) {
+        if (u[kf_distance_drivers[k]] < 0.0) {
+            kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
+            kf_say(solver->message, ": a distance cannot be negative");
+            return kf_failed(pose, KF_OUTSIDE);
+        }
+    }
     found = kf_advance(solver, start, road, u, &limit);
     if (found == NULL) {
         kf_say_limit(solver->message, &limit, u, KF_TOLD(solver));

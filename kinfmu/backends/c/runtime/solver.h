@@ -147,6 +147,7 @@ typedef struct {
 typedef struct {
     double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
     double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
+    double missed[3]; /* what adds to the outputs and their derivatives, as lengths miss a change point */
     bool is_given;
 } kf_source;
 

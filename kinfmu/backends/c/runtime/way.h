@@ -80,6 +80,7 @@ void kf_span_difference(const kf_span *span, kf_inner *inner, double x, double *
 bool kf_covers(const kf_bridge *bridge, double u);
 bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose);
 bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose);
+void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3]);
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd);
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
 int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
