@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import FloatArray, IntArray, Run
-from kinfmu.sweep import solve
+
+if TYPE_CHECKING:
+    from kinfmu.plan import SolvePlan
 
 _SAME = 1e-6  # [rad, sizes]; how near the coordinates solved again must come to those of the run
 
@@ -23,6 +25,8 @@ def solved_again(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | N
     A run of few outputs, as [outputs] or --outputs choose them, is solved for all of them at its drivers' values. What
     the run holds itself must come out the same; a column that was left out by --channels stays so.
     """
+    from kinfmu.sweep import solve
+
     values = run.input_names[::3]
     if not values or run.absent.intersection(values) or run.absent.intersection(run.outputs):
         return None
@@ -60,6 +64,7 @@ def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
 @lru_cache(maxsize=4)
 def _plan_of_text(text: str) -> SolvePlan:
     from kinfmu.mechanism import toml_file
+    from kinfmu.plan import compile_plan
 
     return compile_plan(toml_file.parse(text, "the run's mechanism"))
 
