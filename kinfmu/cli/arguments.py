@@ -13,7 +13,7 @@ from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.suffix import suffix_of
-from kinfmu.units import Quantity, factors, in_turns, like_degrees
+from kinfmu.units import ANGLES, Quantity, factors, in_turns, like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -124,11 +124,19 @@ def along(text: str | None, option: str, run: Run) -> float | None:
     from kinfmu.axis import axis_of
 
     axis = axis_of(run)
-    kind = "time" if axis.is_time else "angle" if axis.unit in ("deg", "rad") else "length" if axis.unit else "number"
+    return on_axis(text, option, axis.label, axis.unit, f", {axis.range()}")
+
+
+def on_axis(text: str, option: str, label: str, unit: str, extent: str = "") -> float:
+    """A place on an axis of a label and a unit [s, rad or that unit of length]; a UsageError for a text that is none.
+
+    extent: what the message adds to the label, such as the range of the run.
+    """
+    kind = "time" if unit == "s" else "angle" if unit in ANGLES else "length" if unit else "number"
     try:
-        return driver_value(option, text, Quantity(kind), run.length_unit)
+        return driver_value(option, text, Quantity(kind), unit if kind == "length" else "m")
     except click.UsageError as error:
-        raise click.UsageError(f"{error.message}; the run is over {axis.label}, {axis.range()}") from None
+        raise click.UsageError(f"{error.message}; the run is over {label}{extent}") from None
 
 
 def driver_value(option: str, text: str, quantity: Quantity, length_unit: str) -> float:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import TIME, along
+from kinfmu.cli.arguments import on_axis
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed
-from kinfmu.suffix import suffix_of
+
+if TYPE_CHECKING:
+    from kinfmu.log.timeline import Timeline
 
 
 @main.command(epilog="Example: kinfmu review logs/fourbar.mcap --screenshot fourbar.png --at 45")
@@ -30,17 +33,15 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
 
     RUN and OTHER are records (.mcap) of simulate or solve; RUN may be a recording (.rrd).
     """
-    from kinfmu.log import read
     from kinfmu.log import review as reviewed
 
     if at is not None and screenshot is None:
         raise click.UsageError("--at is the time of --screenshot, which is not given")
-    moment = None
-    if at is not None:
-        if suffix_of(run) == ".rrd":
-            moment = TIME.convert(at, None, None)
-        else:
-            moment = along(at, "--at", read(run))
-    recording = reviewed(run, other, save=save, screenshot=screenshot, at=moment, tell=note)
+
+    def moment(timeline: Timeline) -> float:
+        return on_axis(at or "", "--at", timeline.label, timeline.unit)
+
+    place = None if at is None else moment
+    recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, tell=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"made {listed(made)}")

@@ -7,7 +7,7 @@ import re
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +17,10 @@ from typing import IO, TYPE_CHECKING, Any
 from kinfmu.errors import LogError
 
 if TYPE_CHECKING:
-    from rerun.experimental import ViewerClient
+    from rerun.experimental import Timeline, ViewerClient
 
 Cursor = dict[str, Any]  # {"duration": seconds}, or {"sequence": number} of recordings without time
+CursorOn = Callable[["Timeline"], Cursor]  # a cursor from the timeline that the recording turns out to have
 START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
     "no graphics driver for a picture without a display: scripts/graphics of the source tree installs one; on Debian: "
@@ -40,7 +41,7 @@ class Shot:
     reports: tuple[str, ...]
 
 
-def shoot(path: str | Path, at: Cursor | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
+def shoot(path: str | Path, at: Cursor | CursorOn | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
     """Show a recording in an invisible viewer, at time `at` if given, and take a picture once it stands still.
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
@@ -56,7 +57,7 @@ class Viewer:
     def __init__(self, client: ViewerClient) -> None:
         self._client = client
 
-    def show(self, path: str | Path, at: Cursor | None = None) -> None:
+    def show(self, path: str | Path, at: Cursor | CursorOn | None = None) -> None:
         """Show a recording in the place of the one before, at time `at` if given."""
         client, deadline = self._client, time.monotonic() + SETTLE_TIME
         if client.get_state().recordings:
@@ -66,6 +67,9 @@ class Viewer:
             if time.monotonic() > deadline:
                 raise LogError(f"{path}: the viewer shows nothing of it after {SETTLE_TIME:.0f} s")
             time.sleep(_POLL)
+        if callable(at):
+            shown = state.recordings[0]
+            at = at(next(line for line in shown.timelines if line.name == shown.current_timeline))
         client.set_time(play_state="paused", **(at or {}))
 
     def shot(self) -> Shot:

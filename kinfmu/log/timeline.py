@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.axis import axis_of
+from kinfmu.axis import DEGREE, SAMPLE, axis_of
 from kinfmu.errors import LogError
 from kinfmu.log.clock import nanoseconds
 from kinfmu.run import FloatArray, Run
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 FINEST = 9  # decimals of a value
 _LOST = 0.01  # part of the smallest step between samples that rounding may move one
 _MOST = 2.0**31  # the largest of the whole numbers
+_OF_DRIVER = re.compile(r"(?P<driver>.+) \[(?:0\.(?P<decimals>0*1) )?(?P<unit>[a-z]+)\]")  # 'crank [0.1 deg]'
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,22 @@ class Timeline:
 
     name: str
     parts: int | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the axis: 's', 'deg', 'rad', a unit of length, or '' of samples."""
+        match = _OF_DRIVER.fullmatch(self.name)
+        return "s" if self.parts is None else match["unit"] if match else ""
+
+    @property
+    def label(self) -> str:
+        """'t [s]', 'crank [deg]' or 'sample'."""
+        match = _OF_DRIVER.fullmatch(self.name)
+        return "t [s]" if self.parts is None else f"{match['driver']} [{match['unit']}]" if match else self.name
+
+    def place(self, value: float) -> float:
+        """The time of placed runs at a value of the axis in the unit used inside [s, rad, length, sample]."""
+        return value / (DEGREE if self.unit == "deg" else 1.0) * (self.parts or 1)
 
     def placed(self, run: Run) -> Run:
         """The run with its values on this timeline in the place of its times, those of its events too."""
@@ -57,6 +75,14 @@ class Timeline:
     def number(self, t: float) -> dict[str, Any]:
         """A time of placed runs, or a span of them, as the argument of a boundary of Rerun's."""
         return {"seconds": t} if self.parts is None else {"seq": round(t)}
+
+
+def timeline_named(name: str) -> Timeline:
+    """Return the timeline that has a name in a recording."""
+    match = _OF_DRIVER.fullmatch(name)
+    if not match:
+        return Timeline(name, 1 if name == SAMPLE else None)
+    return Timeline(name, 10 ** len(match["decimals"] or ""))
 
 
 def timeline_of(runs: Sequence[Run]) -> Timeline:

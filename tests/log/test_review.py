@@ -8,9 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+import kinfmu
+from kinfmu.cli import main
 from kinfmu.errors import LogError, RequestError
-from kinfmu.log import headless, review, reviewing, write_mcap
+from kinfmu.log import headless, review, reviewing, write_mcap, write_rrd
+from kinfmu.log.timeline import timeline_named, timeline_of
 from kinfmu.run import Run
 from kinfmu.shapes import palette
 from tests.log.runs import fourbar
@@ -122,3 +126,36 @@ def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
     for colour in palette.BODIES[:3]:
         assert (np.abs(pixels - colour).max(axis=1) <= 2).sum() > 500
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "shot.png"]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "label", "value", "place"),
+    [
+        ("sim_time", "s", "t [s]", 2.5, 2.5),
+        ("crank [deg]", "deg", "crank [deg]", np.pi / 4.0, 45.0),
+        ("crank [0.01 deg]", "deg", "crank [deg]", np.pi / 4.0, 4500.0),
+        ("piston [0.1 mm]", "mm", "piston [mm]", 12.5, 125.0),
+        ("sample", "", "sample", 7.0, 7.0),
+    ],
+)
+def test_a_timeline_is_known_by_its_name(name: str, unit: str, label: str, value: float, place: float) -> None:
+    timeline = timeline_named(name)
+    assert (timeline.unit, timeline.label) == (unit, label)
+    assert timeline.place(value) == pytest.approx(place, rel=1e-15)
+
+
+@pytest.mark.usefixtures("graphics")
+def test_at_of_a_recording_over_a_driver_is_the_drivers_value(tmp_path: Path) -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.arange(0.0, 90.5, 0.5)))
+    recording, record = tmp_path / "run.rrd", tmp_path / "run.mcap"
+    write_rrd(run, recording)
+    write_mcap(run, record)
+    assert timeline_of([run]) == timeline_named("crank [0.1 deg]")
+    for source in (recording, record):
+        picture = tmp_path / f"{source.suffix[1:]}.png"
+        result = CliRunner().invoke(main, ["review", str(source), "--screenshot", str(picture), "--at", "45.5deg"])
+        assert result.exit_code == 0, result.output
+    assert (tmp_path / "rrd.png").read_bytes() == (tmp_path / "mcap.png").read_bytes()
+    with pytest.raises(RequestError, match=r"at = 100 is outside the recording, crank \[deg\] = 0 to 90$"):
+        review(recording, screenshot=tmp_path / "none.png", at=np.radians(100.0))
+    assert not (tmp_path / "none.png").exists()
