@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from time import perf_counter
 
 import numpy as np
 
 from kinfmu.channels import absent_columns
+from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import Slave
@@ -21,7 +22,8 @@ PERIOD = 0.5  # [s] by the clock
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
-_REALS = ("values", "rates", "accelerations", "driven", "residual", "margin", "errors", "watch")
+_REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", "margin", "errors")
+_ESTIMATES = 2  # the last of them, which follow from the others
 
 
 class Samples:
@@ -59,6 +61,8 @@ class Samples:
         self.fixed: dict[str, float] = {}
         self._sink: Sink | None = None
         self._passed_on = self._events_passed_on = 0  # samples and events that the sink has
+        self._estimates: BlockEstimates | None = None  # where the FMU is not asked for those of samples of status ok
+        self._with_estimates = 0  # samples that have them
         self._piece = 1  # samples that the sink gets at once
         self._last_time = 0.0  # when it got some, by the clock
 
@@ -82,8 +86,18 @@ class Samples:
         values = slave.get([slave.references[name] for name in names]) if names else []
         self.fixed = dict(zip(names, values, strict=True))
 
-    def begin(self, slave: Slave, channels: Sequence[str] | None, sink: Sink | None) -> None:
-        """Choose the variables to ask for, and begin the sink's run."""
+    def begin(
+        self,
+        slave: Slave,
+        channels: Sequence[str] | None,
+        sink: Sink | None,
+        estimates: Callable[[], BlockEstimates | None] = lambda: None,
+    ) -> None:
+        """Choose the variables to ask for, and begin the sink's run.
+
+        estimates: computes margins and estimated errors of samples of status ok, which the FMU is then not asked for;
+        called if a column of them is asked for.
+        """
         run = self._run(slice(0, 0))
         self._absent = absent_columns(run, channels)
         references = self._interface.value_references()
@@ -91,15 +105,43 @@ class Samples:
         asked = [k for k, name in enumerate(columns) if name not in self._absent]
         self._asked = asked if len(asked) < len(columns) else None
         self._reals = np.empty((self._most, len(asked)))
-        self._read = slave.reader([references[self._names[k]] for k in asked], self._reals) if asked else None
         part = _REALS.index("driven")
         self._drivers = [place for place, k in enumerate(asked) if self._ends[part - 1] <= k < self._ends[part]]
         self._references_of_drivers = [references[self._names[asked[place]]] for place in self._drivers]
+        of_asked = [references[self._names[k]] for k in asked]
+        count = sum(k < self._ends[-1 - _ESTIMATES] for k in asked)  # of the columns before the estimates
+        self._estimates = self._known_estimates(asked, estimates) if count < len(asked) else None
+        if self._estimates:
+            self._estimated_columns = [k - self._ends[-1 - _ESTIMATES] for k in asked[count:]]
+            self._read_estimates = slave.reader(of_asked[count:], self._reals[:, count:])
+            of_asked = of_asked[:count]
+        self._read = slave.reader(of_asked, self._reals) if of_asked else None
         self._sink = sink
         if sink is not None:
             self._piece = max(FEWEST, PIECE // (8 * (len(asked) + 3)))
             self._last_time = perf_counter()
             sink.begin(self._run(slice(0, 0)))
+
+    def _known_estimates(
+        self, asked: Sequence[int], estimates: Callable[[], BlockEstimates | None]
+    ) -> BlockEstimates | None:
+        """Estimates of samples, and the places of what they follow from; None if a column of it is not asked for."""
+        found = estimates() if len(self._drivers) == len(self._interface.part("driven")) else None
+        places = {self._names[k]: place for place, k in enumerate(asked)}
+        if found is None or not places.keys() >= set(found.unknowns):
+            return None
+        self._unknowns = [places[name] for name in found.unknowns]
+        return found
+
+    def _add_estimates(self) -> None:
+        """Compute margins and estimated errors of the samples of status ok since the last call."""
+        first, self._with_estimates = self._with_estimates, self._size
+        if self._estimates and first < self._size:
+            rows = first + np.flatnonzero(self._status[first : self._size] == Status.OK)
+            known = self._reals[rows]
+            u, ud, udd = (known[:, self._drivers[order::3]] for order in range(3))
+            found = self._estimates(u, ud, udd, known[:, self._unknowns])
+            self._reals[rows, -len(self._estimated_columns) :] = found[:, self._estimated_columns]
 
     def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
         """Read a sample if it is to be kept; False if it holds no numbers but the drivers' values asked for."""
@@ -115,6 +157,8 @@ class Samples:
             return True
         elif self._read:
             self._read(row)
+            if status and self._estimates:
+                self._read_estimates(row)
         self._t[row], self._status[row], self._iterations[row] = t, status, iterations
         self._size = row + 1
         self._pass_on_what_is_due()
@@ -130,6 +174,7 @@ class Samples:
         """All rows as a Run; reason: why it ended by an error."""
         if reason:
             self.log(ERROR, reason)
+        self._add_estimates()
         run = self._run(slice(0, self._size), tuple(self._events))
         self._pass_on()
         if self._sink is not None:
@@ -138,6 +183,7 @@ class Samples:
 
     def _pass_on(self) -> None:
         """The sink gets what it has not got yet."""
+        self._add_estimates()
         rows = slice(self._passed_on, self._size)
         events = tuple(self._events[self._events_passed_on :])
         self._passed_on, self._events_passed_on = self._size, len(self._events)

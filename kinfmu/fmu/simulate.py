@@ -7,6 +7,7 @@ loop sets at t_k, gets, records, then steps.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ import numpy as np
 from kinfmu.channels import kept_samples
 from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.fmu import description
+from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.input_notes import input_notes, undriven
 from kinfmu.fmu.input_table import InputTable, input_table
@@ -103,7 +105,8 @@ def simulate(
                     samples.read_fixed(one)
                     if interrupted:
                         raise KeyboardInterrupt
-                    samples.begin(one, channels, sink)
+                    estimates = partial(_estimates, folder, interface, settings, table, rows[0])
+                    samples.begin(one, channels, sink, estimates)
                     try:
                         driven = [] if table is None else [one.references[name] for name in table.names]
                         _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
@@ -221,6 +224,27 @@ def _initialize(
         raise FmuError(complaint() or str(failure)) from None
     if complaint():
         raise FmuError(complaint())
+
+
+def _estimates(
+    folder: Path,
+    interface: Interface,
+    settings: Mapping[str, float | bool | str],
+    table: InputTable | None,
+    first: NDArray[np.float64],
+) -> BlockEstimates | None:
+    """What computes margins and errors of many samples; None where errors of estimated speeds count too.
+
+    first: inputs at the first sample.
+    """
+    if not _time_drives(interface, settings):
+        given = set() if table is None else {name for name, value in zip(table.names, first, strict=True) if value}
+        rates = {variable.name for k, variable in enumerate(interface.part("inputs")) if k % 3}
+        mode = settings.get("rates", "auto")
+        if not (mode == "wired" or (mode == "auto" and rates <= given)):
+            return None
+    values = [settings.get(variable.name, variable.start) for variable in interface.part("parameters")]
+    return block_estimates(folder, tuple([float(value) for value in values if value is not None]))
 
 
 def _step_through(

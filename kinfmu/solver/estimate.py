@@ -9,15 +9,18 @@ velocity and acceleration are formed again at the moved pose, where they take up
 what rounding adds at each stage. The sum over the sources counts. Near a singular point, of determinant m, errors grow
 like 1/m, 1/m^2, 1/m^3. On a bridge the difference of its two widths, and the errors of the poses that carry it, are the
 source.
+
+Where no pose is bridged and no block has more than two unknowns, nothing here branches on a value: the same text then
+serves arrays, the values of many poses at once (see kinfmu.fmu.block_estimates).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, sqrt
+from math import copysign, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve
+from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve, reciprocal_condition
 from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Found, Model, Pose, Vector, evaluated, tangent_of
 from .tracks import Track, held_blocks, rates_in_time
 
@@ -84,7 +87,7 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
     for own, v, slope in _bridged(model, pose, ud, rates):
         for order, off in enumerate(own.bridge.missed(own, slope)):
             squares[order] += (off * v**order) ** 2
-    if not sum(squares) < inf:
+    if not isfinite(sum(squares)):
         return NOTHING_KNOWN
     if lost or _is_at_a_crossing(model, pose, rates):
         return least[0] + sqrt(squares[0]), inf, inf
@@ -127,6 +130,19 @@ def _is_at_a_crossing(model: Model, pose: Pose, rates: Rates) -> bool:
     return one and pose.margin < UNDECIDED and rates.speed * model.REACH[0] < STEEP
 
 
+def margin_of(model: Model, pose: Pose) -> float:
+    """Return the smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point.
+
+    Or of |determinant| over the largest that it can be: where a row vanishes, as for a piston that drives at its
+    dead centre, equilibrating hides it.
+    """
+    margin: float = min(1.0, pose.margin)
+    for matrix in model.jacobians(pose.values):
+        if len(matrix) > 1:
+            margin = min(margin, reciprocal_condition(matrix))
+    return margin
+
+
 def with_drive_errors(
     model: Model,
     pose: Pose,
@@ -163,7 +179,7 @@ def _motion(model: Model, pose: Pose, ud: Vector, udd: Vector) -> Vector:
 
 def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, float, float]:
     """The largest differences of two rows of motion, of each order, in radians and sizes; inf for what is no number."""
-    if -inf < sum(there) + sum(here) < inf:
+    if isfinite(sum(there) + sum(here)):
         return model.differences(there, here)  # type: ignore[no-any-return]  # generated code has no types
     n = len(model.OUTPUTS)
     q, qd, qdd = [_largest(model, there[k : k + n], here[k : k + n]) for k in range(0, 3 * n, n)]
@@ -217,7 +233,7 @@ def _sources(model: Model, pose: Pose, drive: Drive, rates: Rates) -> list[Sourc
         c = rounding + EPS * own
         found.append((c * farthest, block, softness, c))
     count = len(found)
-    if count > 1:
+    if count > 2:  # a sum of two is the same in any order
         found.sort(key=lambda one: -one[0])
         found = found[:MOST_SOURCES]
     sources = []
@@ -262,15 +278,15 @@ def _softest_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
     det = a * d - b * c
     p, q = rows[0] / det, rows[1] / det
     dp, cp, bq, aq = d * p, -c * p, -b * q, a * q
-    if (abs(dp) + abs(bq)) / scales[0] >= (abs(cp) + abs(aq)) / scales[1]:
-        first, second = dp, bq
-    else:
-        first, second = cp, aq
-    if first < 0.0:
-        dp, cp = -dp, -cp
-    if second < 0.0:
-        bq, aq = -bq, -aq
-    return dp + bq, cp + aq
+    gain = (abs(dp) + abs(bq)) / scales[0] - (abs(cp) + abs(aq)) / scales[1]
+    first = copysign(1.0, choose(gain, dp, cp) + 0.0)  # -0.0 + 0.0 = 0.0
+    second = copysign(1.0, choose(gain, bq, aq) + 0.0)
+    return first * dp + second * bq, first * cp + second * aq
+
+
+def choose(number: float, if_positive: float, otherwise: float) -> float:
+    """Return `if_positive` for a number of 0 and more."""
+    return if_positive if number >= 0.0 else otherwise
 
 
 def _inverse(matrix: Matrix, rows: Vector) -> list[Sequence[float]]:
@@ -351,6 +367,5 @@ def _added(there: Vector, here: Vector, more: Vector) -> Vector:
     along = 0.0
     for a, b, c in zip(there, here, more):  # noqa: B905  one an unknown, all
         along += (a - b) * c
-    if along >= 0.0:
-        return tuple([a + c for a, c in zip(there, more)])  # noqa: B905
-    return tuple([a - c for a, c in zip(there, more)])  # noqa: B905
+    sign = copysign(1.0, along)
+    return tuple([a + sign * c for a, c in zip(there, more)])  # noqa: B905

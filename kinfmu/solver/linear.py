@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import isfinite, sqrt
 from operator import mul
 
 Matrix = list[list[float]]
@@ -183,13 +183,14 @@ def _reciprocal_condition_of_two(matrix: Matrix) -> float:
     """The same for 2 x 2, where the inverse is at hand."""
     (a, b), (c, d) = matrix
     p, q = sqrt(a * a + b * b), sqrt(c * c + d * d)
-    if not (p > 0.0 and q > 0.0):
+    if not isfinite(p + q):
         return 0.0
-    a, b, c, d = a / p, b / p, c / q, d / q
-    p, q = sqrt(a * a + c * c), sqrt(b * b + d * d)
-    if not (p > 0.0 and q > 0.0):
+    try:
+        a, b, c, d = a / p, b / p, c / q, d / q
+        p, q = sqrt(a * a + c * c), sqrt(b * b + d * d)
+        a, b, c, d = a / p, b / q, c / p, d / q
+    except ArithmeticError:  # a row or a column vanishes
         return 0.0
-    a, b, c, d = a / p, b / q, c / p, d / q
     norm = max(abs(a) + abs(c), abs(b) + abs(d))
     inverse_norm = max(abs(d) + abs(c), abs(b) + abs(a))  # over |det|
     return abs(a * d - b * c) / (norm * inverse_norm)

@@ -18,8 +18,7 @@ from .advance import (
     surveyed,
     trusted_step,
 )
-from .estimate import estimated_errors, with_drive_errors
-from .linear import reciprocal_condition
+from .estimate import estimated_errors, margin_of, with_drive_errors
 from .message import place
 from .pose import ALONE, Model, Pose, Vector, evaluated, failed, on_road, tangent_of
 from .road import laid
@@ -206,16 +205,8 @@ class Solver:
         return tuple(self.model.watches(pose.values))
 
     def margin(self, pose: Pose) -> float:
-        """The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point.
-
-        Or of |determinant| over the largest that it can be: where a row vanishes, as for a piston that drives at its
-        dead centre, equilibrating hides it.
-        """
-        margin: float = min(1.0, pose.margin)
-        for matrix in self.model.jacobians(pose.values):
-            if len(matrix) > 1:
-                margin = min(margin, reciprocal_condition(matrix))
-        return margin
+        """Return the smallest over the blocks of 1 / cond of the equilibrated block; see margin_of."""
+        return margin_of(self.model, pose)
 
     def errors(
         self, pose: Pose, ud: Vector, udd: Vector, off: tuple[Vector, Vector] | None = None

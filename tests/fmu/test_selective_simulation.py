@@ -54,7 +54,7 @@ def test_samples_that_are_not_kept_are_not_asked_for(fourbar: Path, asked: list[
     asked.clear()
     run = simulate(fourbar, stop=10.0, step=0.5, rate=0.25)
     assert run.t.tolist() == [0.0, 4.0, 8.0, 10.0]
-    assert len(asked) == 4
+    assert sum("coupler.x" in names for names in asked) == 4  # margin and errors, of some, are asked for by themselves
     np.testing.assert_allclose(run.values, whole.values[[0, 8, 16, 20]], rtol=0.0, atol=1e-14)
 
 

@@ -147,7 +147,7 @@ class _Straight:
         lines = [f"# block {k + 1}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}"]
         lines += newton_lines(writer, block, str(k + 1), starts, f"held & {1 << k}", str(k))
         if len(self.solved) > 1:
-            lines += ["iterations += iteration", "if error > largest:", "    largest = error"]
+            lines += ["iterations += iteration", "largest = max(largest, error)"]
         return lines
 
     def _velocity(self) -> list[str]:

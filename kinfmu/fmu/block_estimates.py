@@ -1,0 +1,186 @@
+"""Margins and estimated errors of many samples at once, by the functions that a python FMU has for one sample.
+
+They follow from driver values, unknowns and rates, which a run records. So a run need not ask for them in every step:
+the FMU's own modules compute them here, with numpy arrays in the place of numbers. All operations round in the same
+way, and sines and cosines come from the same library, so the results are equal to the bit.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.fmu.layout import UNKNOWN_ERROR
+
+Array = NDArray[np.float64]
+Row = tuple[float, ...]
+
+ENTRY = "resources/slavemodule.txt"  # of a python FMU
+ROWS = 1024  # samples at once: their arrays stay in the cache
+MOST_BLOCKS = 2  # blocks of more unknowns, and sums over more blocks, take an order that depends on the values
+MOST_UNKNOWNS = 2
+LEAST_MARGIN = 0.0125  # determinant of the samples that are computed at once; the functions branch near singular poses
+
+
+class BlockEstimates:
+    """Margins and estimated errors of samples of status ok, from columns of a run.
+
+    folder: of the unpacked FMU, which runs in this process; parameters: values of the mechanism's parameters.
+    LookupError if its functions do not take arrays: blocks that are too large, a cam in the equations, or an FMU of
+    another version.
+    """
+
+    def __init__(self, folder: Path, parameters: Row) -> None:
+        package = (folder / ENTRY).read_text().strip().removesuffix("_slave")
+        names = [f"{package}.solver.{name}" for name in ("model", "estimate", "linear", "pose")]
+        model, estimate, linear, pose = (sys.modules[name] for name in names)
+        sizes = [high - low for low, high in model.BLOCKS]
+        if len(sizes) > MOST_BLOCKS or max(sizes, default=0) > MOST_UNKNOWNS or model.TALL:
+            raise LookupError(f"blocks of {sizes} unknowns")
+        self.unknowns: tuple[str, ...] = model.UNKNOWNS
+        self._pose = pose.Pose
+        self._model, self._arrays = model, _with_arrays(model, folder)
+        if model.PARAMETERS:
+            self._model, self._arrays = model.bound(parameters), self._arrays.bound(parameters)
+        self._estimate, self._evaluated = estimate, pose.evaluated
+        condition = _with_arrays(linear, folder).reciprocal_condition
+        others = {"evaluated": _evaluated, "choose": _choose, "reciprocal_condition": condition}
+        self._of_arrays = _with_arrays(estimate, folder, others)
+        self._check()
+
+    def _check(self) -> None:
+        """Compare both ways at the anchor; LookupError if they differ."""
+        u, z = self._model.ANCHOR
+        drive = u, (1.0,) * len(u), (0.0,) * len(u)
+        try:
+            one = self._of_one(*drive, z)
+            two = self._of_part(*(np.array([row, row]) for row in (*drive, z)))
+        except (ArithmeticError, AttributeError, TypeError, ValueError) as error:
+            raise LookupError(f"no arrays: {error}") from None
+        if not (np.isfinite(two).all() and (two == one).all()):
+            raise LookupError(f"at the anchor arrays give {two[0]}, numbers {one}")
+
+    def __call__(self, u: Array, ud: Array, udd: Array, z: Array) -> Array:
+        """Return margin, error_q, error_qd and error_qdd (n, 4) of samples of status ok.
+
+        u, ud, udd: (n, drivers); z: (n, unknowns).
+        """
+        columns = u, ud, udd, z
+        found = np.empty((len(u), 4))
+        for low in range(0, len(u), ROWS):
+            rows = slice(low, low + ROWS)
+            found[rows] = self._of_part(*(column[rows] for column in columns))
+        for k in np.flatnonzero(~np.isfinite(found).all(axis=1)):
+            found[k] = self._of_one(*(tuple(column[k].tolist()) for column in columns))
+        return np.minimum(found, UNKNOWN_ERROR)
+
+    def _of_part(self, u: Array, ud: Array, udd: Array, z: Array) -> Array:
+        """Return the four columns (n, 4), not finite where a sample needs to be looked at by itself."""
+        found = np.full((len(u), 4), np.nan)
+        model, at = self._arrays, _columns(u)
+        try:
+            with np.errstate(divide="raise", over="raise", invalid="raise"):
+                pose = self._pose(at, _evaluated(model, at, _columns(z)))
+                margin = self._of_arrays.margin_of(model, pose)
+                pose.margin = float(np.min(pose.margin))
+                if pose.margin >= LEAST_MARGIN and np.min(margin) > 0.0:
+                    errors = self._of_arrays.estimated_errors(model, pose, _columns(ud), _columns(udd))
+                    for k, column in enumerate((margin, *errors)):
+                        found[:, k] = column
+        except ArithmeticError:
+            pass
+        return found
+
+    def _of_one(self, u: Row, ud: Row, udd: Row, z: Row) -> Row:
+        pose = self._pose(u, self._evaluated(self._model, u, z))
+        return self._estimate.margin_of(self._model, pose), *self._estimate.estimated_errors(self._model, pose, ud, udd)
+
+
+def block_estimates(folder: Path, parameters: Row) -> BlockEstimates | None:
+    """Return the estimates of an unpacked FMU that runs in this process, or None where it has to be asked for them."""
+    try:
+        return BlockEstimates(folder, parameters)
+    except (OSError, LookupError):
+        return None
+
+
+# Functions of numbers, for arrays
+
+
+class _Every:
+    """A bound that holds for every array: `array <= EVERY` is true, where `array <= number` has no truth value."""
+
+    __array_ufunc__ = None
+
+    def __ge__(self, _other: object) -> bool:
+        return True
+
+
+EVERY = _Every()
+
+
+def _columns(table: Array) -> tuple[Array, ...]:
+    return tuple(np.ascontiguousarray(table.T))
+
+
+def _evaluated(model: Any, u: Sequence[Array], z: Sequence[Array]) -> Any:
+    """As kinfmu.solver.pose.evaluated: what `position` gives for unknowns that are known."""
+    rest = (0.0,) * len(z)
+    return model.position(u, z, rest, rest, -0.0, -1, EVERY)
+
+
+def _choose(number: Any, if_positive: Any, otherwise: Any) -> Any:
+    return np.where(number >= 0.0, if_positive, otherwise)
+
+
+def _first_of(is_better: Callable[[Any, Any], Any]) -> Callable[..., Any]:
+    """Python's `max` or `min` of arrays: a value gives way to a later one that is better."""
+
+    def chosen(*values: Any, default: Any = None) -> Any:
+        found, *more = values if len(values) > 1 else (list(values[0]) or [default])
+        for value in more:
+            found = np.where(is_better(value, found), value, found)
+        return found
+
+    return chosen
+
+
+def _each(function: Callable[[float], float]) -> Callable[[Any], Any]:
+    """A function of the C library for an array: numpy's own ones round otherwise."""
+
+    def of_each(values: Any) -> Any:
+        return np.array(list(map(function, values.tolist()))) if isinstance(values, np.ndarray) else function(values)
+
+    return of_each
+
+
+_FUNCTIONS: dict[str, Any] = {
+    "sin": _each(math.sin),
+    "cos": _each(math.cos),
+    "sqrt": np.sqrt,
+    "copysign": np.copysign,
+    "isfinite": lambda values: bool(np.isfinite(values).all()),
+    "any": lambda conditions: bool(np.any([np.any(condition) for condition in conditions])),
+    "max": _first_of(np.greater),
+    "min": _first_of(np.less),
+}
+
+
+def _with_arrays(module: ModuleType, folder: Path, others: Mapping[str, Any] | None = None) -> Any:
+    """Return a second copy of a module of the FMU, with functions of arrays under the names of those of numbers."""
+    path = folder.joinpath("resources", *module.__name__.split(".")).with_suffix(".py")
+    spec = spec_from_file_location(module.__name__, path)
+    if spec is None or spec.loader is None:
+        raise LookupError(f"no module at {path}")
+    copy = module_from_spec(spec)
+    spec.loader.exec_module(copy)
+    vars(copy).update(_FUNCTIONS | dict(others or {}))
+    return copy
