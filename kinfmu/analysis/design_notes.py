@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
-from kinfmu.analysis.loops import FourBar, Place
+from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.named import NamedLoop
 from kinfmu.analysis.way import Way
 from kinfmu.analysis.written import written
@@ -140,7 +141,8 @@ def _welded(mechanism: Mechanism) -> set[str]:
 
 
 def _toggles(mechanism: Mechanism, way: Way, loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """Positions within the run where two links of a four-bar fall in line and the motion goes on.
+    """Positions within the run where two links of a loop fall in line, or a rod stands across its slide, and the motion
+    goes on.
 
     A run of a whole turn takes every crank over them, which is what it is for.
     """
@@ -152,17 +154,34 @@ def _toggles(mechanism: Mechanism, way: Way, loops: Sequence[NamedLoop]) -> Iter
         return
     edge = _EDGE * (high - low)
     for named in loops:
-        if not isinstance(named.loop, FourBar):
-            continue
-        o, p, q, c = named.loop.pins
-        for places, links in (((o, p, q), named.loop.links[:2]), ((p, q, c), named.loop.links[1:])):
+        for toggle in _toggles_of(named.loop):
             for before, after in pairwise(way.poses):
-                sines = _sine(way, before, places), _sine(way, after, places)
-                if sines[0] * sines[1] < 0.0:
-                    at = _within(way, _crossing(way, places, before, after), low)
+                if _sine(way, before, toggle) * _sine(way, after, toggle) < 0.0:
+                    at = _within(way, _crossing(way, toggle, before, after), low)
                     if low + edge < at < high - edge:
                         told = written(at, mechanism.length_unit, way.kind)
-                        yield f"the run crosses a toggle position: {listed(links)} fall in line at {way.name} = {told}"
+                        yield f"the run crosses a toggle position: {toggle.happens} at {way.name} = {told}"
+
+
+class _Toggle(NamedTuple):
+    """What falls in line in a toggle position.
+
+    places: of three pins, or of a rod's two pins, the second of which slides; across: direction at right angles to the
+    slide [rad], along which the rod lies then; happens: the position in words.
+    """
+
+    places: tuple[Place, ...]
+    across: float
+    happens: str
+
+
+def _toggles_of(loop: FourBar | SliderCrank) -> tuple[_Toggle, _Toggle]:
+    first, second, *last = loop.links
+    in_line = _Toggle(loop.pins[:3], 0.0, f"{first}, {second} fall in line")
+    if isinstance(loop, SliderCrank):
+        rod = loop.rod.name
+        return in_line, _Toggle(loop.pins[1:], loop.direction + math.pi / 2.0, f"{rod} stands across the slide")
+    return in_line, _Toggle(loop.pins[1:], 0.0, f"{second}, {last[0]} fall in line")
 
 
 def _within(way: Way, u: float, low: float) -> float:
@@ -173,23 +192,24 @@ def _within(way: Way, u: float, low: float) -> float:
     return low + (u - low) % period
 
 
-def _sine(way: Way, pose: Pose, places: tuple[Place, Place, Place]) -> float:
-    """Sine of the angle between two links that share the second of three pins."""
+def _sine(way: Way, pose: Pose, toggle: _Toggle) -> float:
+    """Sine of the angle between the two links, or between the rod and what is across its slide."""
     q = way.coordinates(pose)
-    (ax, ay), (bx, by), (cx, cy) = (_world(place, q) for place in places)
+    (ax, ay), (bx, by), *third = (_world(place, q) for place in toggle.places)
+    cx, cy = third[0] if third else (bx + math.cos(toggle.across), by + math.sin(toggle.across))
     return ((bx - ax) * (cy - by) - (by - ay) * (cx - bx)) / (
         math.hypot(bx - ax, by - ay) * math.hypot(cx - bx, cy - by)
     )
 
 
-def _crossing(way: Way, places: tuple[Place, Place, Place], low: Pose, high: Pose) -> float:
+def _crossing(way: Way, toggle: _Toggle, low: Pose, high: Pose) -> float:
     """The driver value between two poses where a sine vanishes, by bisection."""
-    at_low = _sine(way, low, places)
+    at_low = _sine(way, low, toggle)
     for _ in range(_HALVINGS):
         middle = way.solver.solve(low, (0.5 * (low.u[0] + high.u[0]),))
         if not middle.good or middle.u[0] in (low.u[0], high.u[0]):
             break
-        if (_sine(way, middle, places) < 0.0) == (at_low < 0.0):
+        if (_sine(way, middle, toggle) < 0.0) == (at_low < 0.0):
             low = middle
         else:
             high = middle
