@@ -169,4 +169,4 @@ def test_a_rod_across_the_slide_of_its_driver_is_told_where_it_is() -> None:
     text = (SLIDER_CRANK + BY_RAM).replace("P = [20, 0]", "P = [40, 0]")
     (note,) = toggles(text, "58 deg", "-88 deg")
     assert note.startswith("the run crosses a toggle position: rod stands across the slide at ram = ")
-    assert float(note.partition("= ")[2].split()[0]) == pytest.approx(math.sqrt(40.0**2 - 35.0**2), rel=1e-8)  # nine digits
+    assert float(note.partition("= ")[2].split()[0]) == pytest.approx(math.sqrt(40.0**2 - 35.0**2), rel=1e-8)
