@@ -156,10 +156,14 @@ class Run:
         parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
         return replace(self, **parts, margin=late("margin"), error=late("error"), events=events)
 
+    def replaced(self, **fields: Any) -> Run:
+        """Return the run with other fields; margins and errors that are not computed yet stay so."""
+        return replace(self, **{name: self.__dict__[name] for name in ("margin", "error")} | fields)
+
     def without(self, names: Iterable[str]) -> Run:
         """The run without columns of these names: their places hold NaN, 0 where they count, and none is computed."""
         absent = self.absent | frozenset(names)
-        tables: dict[str, Any] = {name: self.__dict__[name] for name in ("margin", "error")}
+        tables: dict[str, Any] = {}
         for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
             places = list(group)
             gone = [place.column or 0 for place in places if place.name in absent]
@@ -169,7 +173,7 @@ class Run:
             elif gone:
                 tables[name] = np.array(getattr(self, name))
                 tables[name][:, gone] = np.nan
-        return replace(self, **tables, absent=absent)
+        return self.replaced(**tables, absent=absent)
 
     def columns(self) -> Iterator[Column]:
         """Every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""

@@ -94,9 +94,9 @@ def solve(
     if driven is None:
         driven = chosen.drive(times, tuple(constants.values()))
     _refuse_huge(plan, driven)
-    run = replace(_swept(plan, chosen, times, driven, out, constants), axis=axis)
+    run = _swept(plan, chosen, times, driven, out, constants).replaced(axis=axis)
     if anew_note and len(times):
-        run = replace(run, events=(Event(float(times[0]), "info", anew_note), *run.events))
+        run = run.replaced(events=(Event(float(times[0]), "info", anew_note), *run.events))
     return run
 
 

@@ -22,7 +22,7 @@ class RowCall:
     whose functions take the number of values, too.
     """
 
-    __slots__ = ("_base", "_count", "_function", "_instance", "_name", "_references", "_rows", "_stride")
+    __slots__ = ("_base", "_count", "_function", "_instance", "_more", "_name", "_references", "_rows", "_stride")
 
     def __init__(
         self, fmu: Any, function: str, references: Sequence[int], rows: NDArray[Any], *, has_value_count: bool
@@ -32,14 +32,14 @@ class RowCall:
         types = [c_void_p, c_void_p, c_size_t, c_void_p, *([c_size_t] if has_value_count else [])]
         self._function = CFUNCTYPE(c_int, *types)((function, fmu.dll))
         count = len(references)
-        self._count = (count, count) if has_value_count else (count,)
+        self._count, self._more = count, (count,) if has_value_count else ()
         self._references = (c_uint * count)(*references)
         self._rows, self._base, self._stride = rows, rows.ctypes.data, rows.strides[0]
 
     def __call__(self, row: int) -> None:
         """Get or set; raises fmpy's FMICallException for a status above Warning."""
-        count, *more = self._count
-        status = self._function(self._instance, self._references, count, self._base + row * self._stride, *more)
+        address = self._base + row * self._stride
+        status = self._function(self._instance, self._references, self._count, address, *self._more)
         if status > WARNING:
             from fmpy.fmi1 import FMICallException
 
