@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -176,15 +177,15 @@ def with_arm(linkage: Mechanism) -> Mechanism:
     )
 
 
-def with_second(linkage: Mechanism) -> Mechanism:
-    """A four-bar and the same once more beside it, with a driver of its own: `second`, of `crank2`."""
-    ground, *bodies = linkage.bodies
-    pins = {f"{name}2": (point.x + 9.0, point.y) for name, point in ground.points.items()}
+def beside(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
+    """A mechanism of pins and another one beside it in one file, whose names end in 2."""
+    ground, *bodies = other.bodies
+    pins = {f"{name}2": (point.x + apart, point.y) for name, point in ground.points.items()}
     copies = [
         Body(
             f"{body.name}2",
             {f"{name}2": point for name, point in body.points.items()},
-            (body.start.x + 9.0, body.start.y, body.start.phi),
+            (body.start.x + apart, body.start.y, body.start.phi),
         )
         for body in bodies
     ]
@@ -193,14 +194,86 @@ def with_second(linkage: Mechanism) -> Mechanism:
             f"{joint.name}2",
             tuple(f"{end.replace('.', '2.') if end[:6] != 'ground' else end}2" for end in joint.between),
         )
-        for joint in linkage.joints
+        for joint in other.joints
     ]
-    (driver,) = linkage.drivers
+    drivers = [AngleDriver(f"{driver.name}2", f"{driver.of}2", driver.law) for driver in other.drivers]
+    return replace(
+        one,
+        bodies=(Body("ground", {**one.bodies[0].points, **pins}), *one.bodies[1:], *copies),
+        joints=(*one.joints, *joints),
+        drivers=(*one.drivers, *drivers),
+        points={},
+    )
+
+
+def with_second(linkage: Mechanism) -> Mechanism:
+    """A four-bar and the same once more beside it, with a driver of its own: `second`, of `crank2`."""
+    both = beside(linkage, linkage)
+    return replace(both, drivers=(*linkage.drivers, replace(both.drivers[-1], name="second")))
+
+
+ROBOT_LENGTHS = 1.2, 4.0, 3.0  # of the arm, the link and the strut of `with_robot`
+ROBOT_PIVOT = (6.0, -2.0)
+
+
+def with_robot(linkage: Mechanism, start: float = 0.6) -> Mechanism:
+    """A four-bar, an arm with a driver of its own, and two bars from its end to the rocker's: link and strut."""
+    length, link, strut = ROBOT_LENGTHS
+    rocker = next(body for body in linkage.bodies if body.name == "rocker")
+    x, y, phi = rocker.start.x, rocker.start.y, rocker.start.phi
+    d = complex(x, y) + rocker.points["Q"].x * cmath.exp(1j * phi)
+    end = complex(*ROBOT_PIVOT) + length * cmath.exp(1j * start)
+    way = end - d
+    lean = math.acos((link**2 + abs(way) ** 2 - strut**2) / (2.0 * link * abs(way)))
+    heading = cmath.phase(way) + lean
+    back = d + link * cmath.exp(1j * heading) - end
     return replace(
         linkage,
-        bodies=(Body("ground", {**ground.points, **pins}), *bodies, *copies),
-        joints=(*linkage.joints, *joints),
-        drivers=(driver, AngleDriver("second", "crank2", driver.law)),
+        bodies=(
+            Body("ground", {**linkage.bodies[0].points, "T": ROBOT_PIVOT}),
+            *linkage.bodies[1:],
+            Body("arm", {"T": (0, 0), "U": (length, 0)}, (*ROBOT_PIVOT, start)),
+            Body("link", {"Q": (0, 0), "S": (link, 0)}, (d.real, d.imag, heading)),
+            Body("strut", {"U": (0, 0), "S": (strut, 0)}, (end.real, end.imag, cmath.phase(back))),
+        ),
+        joints=(
+            *linkage.joints,
+            Revolute("T", ("ground.T", "arm.T")),
+            Revolute("D", ("rocker.Q", "link.Q")),
+            Revolute("U", ("arm.U", "strut.U")),
+            Revolute("S", ("link.S", "strut.S")),
+        ),
+        drivers=(*linkage.drivers, AngleDriver("arm", "arm", ConstantSpeed(start, 1.0))),
+    )
+
+
+def folding_robot() -> Mechanism:
+    """A five-bar whose bars fold over each other where its left arm is at 0 and its right one at 180 degrees."""
+    left, right = 0.5, math.pi + 0.5
+    p, q = cmath.exp(1j * left), 2.0 + cmath.exp(1j * right)
+    way = q - p
+    heading = cmath.phase(way) + math.acos(abs(way) / 3.0)
+    back = p + 1.5 * cmath.exp(1j * heading) - q
+    return Mechanism(
+        "folding_robot",
+        [
+            Body("ground", {"A": (0, 0), "B": (2, 0)}),
+            Body("left", {"A": (0, 0), "P": (1, 0)}, (0, 0, left)),
+            Body("right", {"B": (0, 0), "Q": (1, 0)}, (2, 0, right)),
+            Body("link", {"P": (0, 0), "S": (1.5, 0)}, (p.real, p.imag, heading)),
+            Body("strut", {"Q": (0, 0), "S": (1.5, 0)}, (q.real, q.imag, cmath.phase(back))),
+        ],
+        [
+            Revolute("A", ("ground.A", "left.A")),
+            Revolute("B", ("ground.B", "right.B")),
+            Revolute("P", ("left.P", "link.P")),
+            Revolute("Q", ("right.Q", "strut.Q")),
+            Revolute("S", ("link.S", "strut.S")),
+        ],
+        [
+            AngleDriver("left", "left", ConstantSpeed(left, 1.0)),
+            AngleDriver("right", "right", ConstantSpeed(right, 1.0)),
+        ],
     )
 
 

@@ -176,8 +176,13 @@ class SolvePlan:
 
     @property
     def has_tracks(self) -> bool:
-        """True with several drivers if each solved block depends on one alone."""
-        return len(self.drivers) > 1 and bool(self.block_drivers) and min(self.block_drivers) >= 0
+        """True with several drivers if a solved block depends on one alone."""
+        return len(self.drivers) > 1 and max(self.block_drivers, default=-1) >= 0
+
+    @property
+    def has_mixed(self) -> bool:
+        """True if there are tracks, and blocks that depend on several drivers."""
+        return self.has_tracks and min(self.block_drivers) < 0
 
     def parameters_of(self, name: str) -> tuple[str, ...]:
         """Parameters on which an output or a fixed coordinate depends structurally, in file order."""

@@ -24,7 +24,7 @@ BENT = 1.0  # [rad, sizes]; a prediction whose quadratic term is larger may land
 UNDOUBTED = 1e-5  # [rad, sizes]; a prediction that was corrected by less did not land by accident
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
 SMOOTH = 0.5  # change of the tangent beside the predicted one, as a part of it: more is another branch
-_GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
+GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
 _MOST_WALKED = 10_000  # steps between a pose and a node; a few, as a rule
 _ROUGHEST = 5e-4  # of the longest step; where even that cannot be trusted there is no plain way
 
@@ -97,8 +97,8 @@ def advance(model: Model, start: Pose, target: Vector, road: Road | None = None)
             continue
         step = 0.5 * abs(s)
         if step < SHORTEST_STEP * longest:
-            limit = limit or _limit(model, before, pose, direction)
-            if step < _GIVE_UP * longest or _beyond(target, limit.u, direction, s):
+            limit = limit or limit_beyond(model, before, pose, direction)
+            if step < GIVE_UP * longest or is_beyond(target, limit.u, direction, s):
                 return limit
     return Limit(pose.u, TOO_FAR)
 
@@ -239,7 +239,7 @@ def _plainly(model: Model, start: Pose, u: float) -> Pose | None:
     return None
 
 
-def _limit(model: Model, before: Pose, pose: Pose, direction: Vector) -> Limit:
+def limit_beyond(model: Model, before: Pose, pose: Pose, direction: Vector) -> Limit:
     """Where the way ends, just beyond a pose that steps cannot leave.
 
     Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule
@@ -260,7 +260,7 @@ def _limit(model: Model, before: Pose, pose: Pose, direction: Vector) -> Limit:
     return Limit(tuple(b + (b - a) * beyond for a, b in zip(before.u, pose.u, strict=True)), block, crosses)
 
 
-def _beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
+def is_beyond(target: Vector, limit: Vector, direction: Vector, s: float) -> bool:
     """True if the target lies past the limit on the way that s goes."""
     return sum((a - b) * d * s for a, b, d in zip(target, limit, direction, strict=True)) > 0.0
 
@@ -273,6 +273,8 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
         )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
     why = f"branches of {names} cross" if limit.crosses else f"{names} would part"
+    if limit.crosses and len(target) > 1:
+        why += "; the crossing depends on several drivers, so no bridge is built"
     if not differs(model, target, limit.u, LOCATED):
         return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit, where {why}"
     asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve, reciprocal_condition
 from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Found, Model, Pose, Vector, evaluated, tangent_of
-from .tracks import Track, held_blocks, rates_in_time
+from .tracks import MIXED, Track, held_blocks, rates_in_time
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 UNBOUNDED = 0.5  # change of a determinant, as a part of it, within a pose's error: rates are not known then
@@ -74,7 +74,9 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         sources = _sources(model, pose, drive, rates)
         if pose.bridge is not None:
             sources.append(_of_bridge(model, pose, drive, rates))
-        sources += [_of_track(track, own, drive, rates) for track, own in pose.tracks if own.bridge is not None]
+        sources += [
+            _of_track(model, pose, track, own, drive, rates) for track, own in pose.tracks if own.bridge is not None
+        ]
         for source in sources:
             there, first, second = _moved(model, pose, drive, rates, source)
             q, qd, qdd = _differences(model, model.motion(there[-1], ud, udd, first, second), here)
@@ -318,7 +320,7 @@ def _of_bridge(model: Model, pose: Pose, drive: Drive, rates: Rates) -> Source:
     return Source(moved, none, none, first, second)
 
 
-def _of_track(track: Track, own: Pose, drive: Drive, rates: Rates) -> Source:
+def _of_track(model: Model, pose: Pose, track: Track, own: Pose, drive: Drive, rates: Rates) -> Source:
     """What a bridge of one track adds, in time."""
     alone = _drive(own, ALONE, AT_REST)
     along = _rates(track, own, alone)
@@ -329,8 +331,9 @@ def _of_track(track: Track, own: Pose, drive: Drive, rates: Rates) -> Source:
     two = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
     first = track.put([v * x for x in one], still)
     second = track.put([v * v * y + a * x for x, y in zip(one, two)], still)  # noqa: B905
+    of_tracks = sum([1 << k for k, by in enumerate(model.BLOCK_DRIVERS) if by != MIXED])
     return Source(
-        track.put(off.z, still),
+        tuple(model.velocity(pose.values, (0.0,) * len(pose.u), track.put(off.z, still), of_tracks)),
         still,
         still,
         tuple([x + y for x, y in zip(rates.first, first)]),  # noqa: B905

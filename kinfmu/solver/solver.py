@@ -6,14 +6,21 @@ from math import inf, isfinite
 from typing import Any
 
 from .advance import (
+    BENT,
     CLOSE,
+    GIVE_UP,
     LONGEST_STEP,
+    MOST_STEPS,
     NEAR_SINGULAR,
     NO_BLOCK,
+    SHORTEST_STEP,
+    TOO_FAR,
     Limit,
     advance,
     course,
+    is_beyond,
     keeps_branch,
+    limit_beyond,
     limit_message,
     surveyed,
     trusted_step,
@@ -24,7 +31,7 @@ from .pose import ALONE, Model, Pose, Vector, evaluated, failed, on_road, tangen
 from .road import laid
 from .span import REGULAR
 from .status import Status
-from .tracks import Track, on_track, rates_in_time, tracks_of
+from .tracks import MIXED, Track, on_track, rates_in_time, tracks_of
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
@@ -45,6 +52,8 @@ class Solver:
         self._one = len(u) == 1
         tracks = () if self._one else tracks_of(model, u, self.anchor.z)
         self._tracks = tuple([None if track is None else _solver_of(track, self.anchor) for track in tracks])
+        mixes = any(self._tracks) and MIXED in model.BLOCK_DRIVERS
+        self._mixed: Any = Track(model, MIXED, u, self.anchor.z) if mixes else None
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
@@ -81,26 +90,36 @@ class Solver:
         """The pose put together from those of the tracks, each followed along its own driver."""
         if u == start.u and (start.tracks or start.road):
             return start
-        if start.margin >= REGULAR and not start.is_bridged:  # most samples: one trusted step of all drivers
-            near = self._near(start, u)
-            if near is not None:
-                return near
+        near = self._near(start, u)  # most samples: one trusted step of all drivers
+        if near is not None:
+            return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
+        if self._mixed is not None and any(u[driver] < 0.0 for driver, *_ in self._mixed.DISTANCES):
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
+        pose = self._assembled(start, u, u, start.z) if self._mixed is None else self._followed(start, u)
+        return self._checked(pose) if pose.good else pose
+
+    def _assembled(self, start: Pose, u: Vector, target: Vector, z: Vector) -> Pose:
+        """The pose of the tracks at u, on the way from `start` to `target`; all other blocks are as z has them."""
         known = {track.driver: own for track, own in start.tracks}
-        z, parts = start.z, []
+        parts = []
         for k, solver in enumerate(self._tracks):
             if solver is None:
                 continue
-            own = solver.solve(known.get(k) or on_track(solver.model, start), (u[k],))
+            before = known.get(k) or on_track(solver.model, start)
+            own = solver.solve(before, (u[k],))
+            if not own.good and u is not target:  # the message is to tell of the target
+                beyond = solver.solve(before, (target[k],))
+                own = own if beyond.good else beyond
             if not own.good:
-                return failed(start, u, Status(own.status), own.message)
+                return failed(start, target, Status(own.status), own.message)
             z = solver.model.put(own.z, z)
             parts.append((solver.model, own))
         try:
             pose = Pose(u, evaluated(self.model, u, z))
         except (ArithmeticError, ValueError):  # a coordinate that is given outright has no value there
-            return failed(start, u, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), u))
+            return failed(start, target, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), target))
         pose.tracks = tuple(parts)
         roads = {track.driver: own.road for track, own in parts}
         pose.road = tuple([roads.get(k) for k in range(len(u))])
@@ -110,10 +129,88 @@ class Solver:
             pose.status = Status.NEAR_SINGULAR
         elif Status.BRIDGED in statuses:
             pose.status = Status.BRIDGED
-        return self._checked(pose)
+        return pose
+
+    def _followed(self, start: Pose, target: Vector) -> Pose:
+        """The pose at `target` where blocks depend on several drivers: those follow the tracks in trusted steps.
+
+        The drivers go straight. As in `advance`, but at each step the tracks are solved first, and the other blocks are
+        predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
+        """
+        model, pose = self.model, start
+        if start.base is not None:
+            pose = self._assembled(start, start.base.u, start.base.u, start.base.z)
+            if not pose.good:
+                return failed(start, target, Status(pose.status), pose.message)
+        direction, distance = course(model, pose.u, target)
+        if distance > MOST_STEPS * LONGEST_STEP:
+            return failed(start, target, Status.OUTSIDE, limit_message(model, Limit(pose.u, TOO_FAR), target))
+        before, regular, limit = pose, pose, None
+        step, iterations = LONGEST_STEP, 0
+        for _ in range(MOST_STEPS):
+            whole = distance <= step
+            s = distance if whole else step
+            u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction, strict=True)])
+            trial = None if whole and pose is start else self._near(pose, u)
+            if trial is None:
+                trial = self._mixed_step(pose, u, target)
+            if trial is not None:
+                if not trial.good:
+                    return failed(start, target, Status(trial.status), trial.message)
+                iterations += trial.iterations
+                margin = min([abs(trial.determinants[k]) for k in self._mixed.blocks])
+                if whole:
+                    trial.iterations = iterations
+                    if margin < NEAR_SINGULAR:
+                        trial.status = Status.NEAR_SINGULAR
+                        trial.base = regular
+                    return trial
+                before, pose = pose, trial
+                if margin >= NEAR_SINGULAR:
+                    regular = pose
+                distance -= s
+                step = min(2.0 * step, LONGEST_STEP)
+                continue
+            step = 0.5 * s
+            if step < SHORTEST_STEP * LONGEST_STEP:
+                limit = limit or self._mixed_limit(before, pose, direction)
+                if step < GIVE_UP * LONGEST_STEP or is_beyond(target, limit.u, direction, s):
+                    break
+        else:
+            limit = Limit(pose.u, TOO_FAR)
+        return failed(start, target, Status.OUTSIDE, limit_message(self._mixed, limit, target))
+
+    def _mixed_step(self, pose: Pose, u: Vector, target: Vector) -> Pose | None:
+        """One step of all blocks, or None if those that depend on several drivers cannot be trusted to stay on their
+        branch; a failed pose if the tracks end before.
+        """
+        there = self._assembled(pose, u, target, pose.z)
+        if not there.good:
+            return there
+        model, chord = self.model, tuple([b - a for a, b in zip(pose.z, there.z, strict=True)])
+        if max([abs(a) / scale for a, scale in zip(chord, model.UNKNOWN_SCALES, strict=True)]) > BENT:
+            return None
+        mixed = self._mixed.beside(there.z, chord)
+        way = tuple([b - a for a, b in zip(pose.u, u, strict=True)])
+        start = on_track(mixed, pose)
+        trial = trusted_step(mixed, start, way, 1.0, u)
+        if trial is None or (trial.margin < REGULAR and not keeps_branch(mixed, start, trial, way, 1.0)):
+            return None
+        tracks, road, status, iterations = there.tracks, there.road, there.status, there.iterations
+        there = Pose(u, evaluated(model, u, mixed.put(trial.z, there.z)), road)
+        there.tracks, there.status, there.iterations = tracks, status, iterations + trial.iterations
+        return there
+
+    def _mixed_limit(self, before: Pose, pose: Pose, direction: Vector) -> Limit:
+        """Where the way of the blocks that depend on several drivers ends, just beyond a pose."""
+        slopes, _ = rates_in_time(self.model, pose, direction, (0.0,) * len(direction))
+        mixed = self._mixed.beside(pose.z, slopes)
+        return limit_beyond(mixed, on_track(mixed, before), on_track(mixed, pose), direction)
 
     def _near(self, start: Pose, u: Vector) -> Pose | None:
-        """The pose one trusted step away, if it and the step are far from all that is singular."""
+        """The pose one trusted step away, if it and the step are far from all that is singular on a track."""
+        if start.status or start.base is not None or not self._is_apart(start):
+            return None
         direction, distance = course(self.model, start.u, u)
         if not 0.0 < distance <= LONGEST_STEP:
             return None
@@ -122,10 +219,20 @@ class Solver:
                 if road is not None and not road.low <= value <= road.high:
                     return None
         near = trusted_step(self.model, start, direction, distance, u)
-        if near is None or near.margin < REGULAR or not near.watch <= self.tolerance >= near.residual:
+        if near is None or not self._is_apart(near) or not near.watch <= self.tolerance >= near.residual:
+            return None
+        if near.margin < REGULAR and not keeps_branch(self.model, start, near, direction, distance):
             return None
         near.road = start.road or (None,) * len(u)
         return near
+
+    def _is_apart(self, pose: Pose) -> bool:
+        """True if the blocks of all tracks are regular, and the others not near singular."""
+        margin: float = pose.margin
+        if margin >= REGULAR or self._mixed is None:
+            return margin >= REGULAR
+        of_tracks = [abs(pose.determinants[k]) for k, by in enumerate(self.model.BLOCK_DRIVERS) if by != MIXED]
+        return margin >= NEAR_SINGULAR and min(of_tracks) >= REGULAR
 
     def _again(self, start: Pose) -> Pose:
         """The pose at the driver values of `start`: `start` itself, unless nothing has judged it yet, as the anchor."""
@@ -224,7 +331,8 @@ class Solver:
         if self._tracks:
             roads = None if pose.road is None else [None if road is None else road.dump() for road in pose.road]
             parts = [self._tracks[track.driver].dump(own) for track, own in pose.tracks]
-            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, roads, parts]
+            base = None if pose.base is None else [list(pose.base.u), list(pose.base.z)]
+            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, roads, parts, base]
         road = None if pose.road is None else pose.road.dump()
         standing = -1 if pose.bridge is None else pose.road.bridges.index(pose.bridge)
         base = None if pose.base is None else self.dump(pose.base)
@@ -246,11 +354,22 @@ class Solver:
         return pose
 
     def _restored(
-        self, u: list[float], z: list[float], iterations: int, status: int, message: str, roads: Any, parts: list[Any]
+        self,
+        u: list[float],
+        z: list[float],
+        iterations: int,
+        status: int,
+        message: str,
+        roads: Any,
+        parts: list[Any],
+        base: list[list[float]] | None,
     ) -> Pose:
         """The same of a pose that is put together from tracks."""
         pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
         pose.iterations, pose.status, pose.message = iterations, status, message
+        if base is not None:
+            there, unknowns = map(tuple, base)
+            pose.base = Pose(there, evaluated(self.model, there, unknowns))
         solvers = [solver for solver in self._tracks if solver is not None]
         if parts:
             pose.tracks = tuple([(s.model, s.restore(own)) for s, own in zip(solvers, parts, strict=True)])

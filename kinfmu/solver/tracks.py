@@ -1,24 +1,29 @@
 """Tracks: what depends on one driver alone is followed along that driver, whatever the other drivers do.
 
-Where every block of a model depends on a single driver, as two machines in one file do, the blocks of each driver are a
-mechanism with one driver: its track. A track has singular points, bridges and limits of its own. A pose of the whole is
-put together from one pose of each track.
+The blocks that depend on one driver, as those of two machines in one file do, are a mechanism with that driver: its
+track. A track has singular points, bridges and limits of its own. A pose of the whole is put together from one pose of
+each track. Blocks that depend on several drivers come after the tracks: they follow both the drivers and the tracks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import pairwise
+from math import inf, sqrt
 from typing import Any
 
 from .linear import Matrix
 from .pose import Found, Model, Pose, Vector, evaluated, tangent_of
 
+MIXED = -1  # in place of a block's driver: it depends on several
+
 
 class Track:
     """The blocks of a model that depend on one of its drivers, as a model with that driver alone.
 
-    u, z: driver values and unknowns of an assembled pose: there the rest of the model stays.
+    driver: its position; MIXED: the blocks that depend on several drivers, as a model with all drivers. u, z: driver
+    values and unknowns of an assembled pose: there the rest of the model stays.
     """
 
     def __init__(self, model: Model, driver: int, u: Vector, z: Vector) -> None:
@@ -30,24 +35,42 @@ class Track:
         self._outside = sum([1 << k for k, by in enumerate(model.BLOCK_DRIVERS) if by != driver])
         self._along = tuple([float(k == driver) for k in range(len(u))])
         self._rest = (0.0,) * len(u)
+        self._mixes = MIXED in model.BLOCK_DRIVERS
+        self._slopes: Vector = (0.0,) * len(z)
         self.SIZE, self.OFFSET, self.LENGTH_UNIT = model.SIZE, model.OFFSET, model.LENGTH_UNIT
-        self.DRIVERS = (model.DRIVERS[driver],)
-        self.DRIVER_KINDS = (model.DRIVER_KINDS[driver],)
-        self.REACH = (model.REACH[driver],)
+        own = slice(None) if driver == MIXED else slice(driver, driver + 1)
+        self.DRIVERS = tuple(model.DRIVERS[own])
+        self.DRIVER_KINDS = tuple(model.DRIVER_KINDS[own])
+        self.REACH = tuple(model.REACH[own])
         self.UNKNOWNS = self.of(model.UNKNOWNS)
         self.UNKNOWN_SCALES = self.of(model.UNKNOWN_SCALES)
         self.ROW_SCALES = tuple([model.ROW_SCALES[k] for k in self.blocks])
-        own = {block: k for k, block in enumerate(self.blocks)}
-        self.TALL = tuple([own[block] for block in model.TALL if block in own])
-        self.DISTANCES = tuple([(0, own[block], *row) for by, block, *row in model.DISTANCES if by == driver])
-        self.ANCHOR = (u[driver],), self.of(z)
+        at = {block: k for k, block in enumerate(self.blocks)}
+        self.TALL = tuple([at[block] for block in model.TALL if block in at])
+        self.DISTANCES = tuple(
+            [
+                (by if driver == MIXED else 0, at[block], *row)
+                for by, block, *row in model.DISTANCES
+                if block in at and driver in (by, MIXED)
+            ]
+        )
+        self.ANCHOR = u[own], self.of(z)
         self.WATCHES = ()
-        self.TALL = tuple([k for k, block in enumerate(self.blocks) if block in model.TALL])
         ends = [0]
         for k in self.blocks:
             low, high = model.BLOCKS[k]
             ends.append(ends[-1] + high - low)
         self.BLOCKS = tuple(pairwise(ends))
+
+    def beside(self, z: Vector, slopes: Vector) -> Track:
+        """The same blocks while the rest of the model is at other unknowns, and moves.
+
+        slopes: derivatives of the unknowns of the rest along the way that the drivers go; their second derivatives are
+        0. What `z` and `slopes` have of the blocks themselves does not count.
+        """
+        there = copy(self)
+        there._z, there._slopes = z, slopes
+        return there
 
     def of(self, whole: Sequence[Any]) -> tuple[Any, ...]:
         """What the track has of a row with one item an unknown of the model."""
@@ -67,7 +90,7 @@ class Track:
     def position(self, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0, *enough: float) -> Found:
         """As a model's `position`."""
         still = (0.0,) * len(self._z)
-        driven = (*self._u[: self.driver], u[0], *self._u[self.driver + 1 :])
+        driven = u if self.driver == MIXED else (*self._u[: self.driver], u[0], *self._u[self.driver + 1 :])
         found = self._model.position(
             driven,
             self.put(z, self._z),
@@ -78,11 +101,17 @@ class Track:
             *enough,
         )
         determinants = tuple([found[1][k] for k in self.blocks])
+        residual = found[3]
+        if self._mixes:  # blocks that follow the track do not close while they rest
+            rows = self._model.residuals(found[7])
+            squares = [sum([r * r for r in rows[k]]) for k in self.blocks]
+            residual = sqrt(max(squares) if sum(squares) < inf else sum(squares))  # a NaN stays
         return (
             self.of(found[0]),
             determinants,
             min([abs(determinant) for determinant in determinants]),
-            *found[3:6],
+            residual,
+            *found[4:6],
             0.0,
             found[7],
         )
@@ -94,7 +123,7 @@ class Track:
 
     def velocity(self, values: Any, ud: Vector, given: Vector = (), held: int = 0) -> Vector:
         """As a model's `velocity`."""
-        whole = self.put(given or (0.0,) * len(self.places), (0.0,) * len(self._z))
+        whole = self.put(given or (0.0,) * len(self.places), self._slopes)
         driven = self._driven(ud)
         return self.of(self._model.velocity(values, driven, whole, self._outside | self.mask(held)))
 
@@ -103,7 +132,7 @@ class Track:
     ) -> Vector:
         """As a model's `acceleration`."""
         still = (0.0,) * len(self._z)
-        first, whole = self.put(zd, still), self.put(given or (0.0,) * len(self.places), still)
+        first, whole = self.put(zd, self._slopes), self.put(given or (0.0,) * len(self.places), still)
         mask = self._outside | self.mask(held)
         return self.of(self._model.acceleration(values, self._driven(ud), self._driven(udd), first, whole, mask))
 
@@ -122,9 +151,9 @@ class Track:
 
 
 def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
-    """The track of each driver, None for a driver that no block depends on; none at all if a block mixes drivers."""
+    """The track of each driver, None for a driver that no block depends on alone; none at all if there is no track."""
     by = getattr(model, "BLOCK_DRIVERS", ())
-    if not by or min(by) < 0:
+    if not by or max(by) == MIXED:
         return ()
     return tuple([Track(model, k, u, z) if k in by else None for k in range(len(u))])
 
@@ -140,6 +169,10 @@ def held_blocks(pose: Pose) -> int:
 
 def on_track(track: Track, pose: Pose) -> Pose:
     """What a track has of a pose of the whole."""
+    if track.driver == MIXED:
+        determinants = tuple([pose.determinants[k] for k in track.blocks])
+        margin = min([abs(determinant) for determinant in determinants])
+        return Pose(pose.u, (track.of(pose.z), determinants, margin, pose.residual, 0, 0.0, 0.0, pose.values))
     u = (pose.u[track.driver],)
     road = None if pose.road is None else pose.road[track.driver]
     return Pose(u, evaluated(track, u, track.of(pose.z)), None if road is None else road.around(u[0]))

@@ -30,7 +30,18 @@ from kinfmu.solver.span import PLACES
 from kinfmu.sweep import run_times
 from tests.backends.native import STRICT, Native
 from tests.fmu.test_parameters import geared, linkage
-from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar, slider_crank, tight_jaw
+from tests.mechanisms import (
+    bar_as_body,
+    beside,
+    folding_robot,
+    fourbar,
+    reference_fourbar,
+    six_bar,
+    slider_crank,
+    tight_jaw,
+    with_robot,
+)
+from tests.solver.change_points import fourbar as change_point_fourbar
 from tests.solver.change_points import two_loops
 from tests.stress.trial import trial
 
@@ -201,6 +212,18 @@ def test_c_and_python_are_the_same_where_each_driver_has_singular_points_of_its_
     ways = [wander(driver.law.start, 2.0, [0.0, math.pi], k) for k, driver in enumerate(mechanism.drivers)]
     samples = [tuple(u for (u,) in each) for each in zip(*ways, strict=True)]
     assert {Status.OK, Status.BRIDGED} <= set(assert_same(compile_plan(mechanism), samples))
+
+
+@pytest.mark.parametrize("carried", [True, False])
+def test_c_and_python_are_the_same_where_blocks_of_one_driver_and_of_several_are_mixed(carried: bool) -> None:
+    """Over crossings of one driver, and to crossings of several."""
+    machine = change_point_fourbar("4", "1", "3", "2").mechanism
+    mechanism = with_robot(machine) if carried else beside(folding_robot(), machine)
+    marks = [[0.0, math.pi]] * 3 if carried else [[0.0], [math.pi], [0.0, math.pi]]
+    ways = [wander(driver.law.start, 2.0, marks[k], k) for k, driver in enumerate(mechanism.drivers)]
+    samples = [tuple(u for (u,) in each) for each in zip(*ways, strict=True)]
+    expected = {Status.OK, Status.BRIDGED} if carried else {Status.OK, Status.BRIDGED, Status.OUTSIDE}
+    assert expected <= set(assert_same(compile_plan(mechanism), samples))
 
 
 @pytest.mark.parametrize("mechanism", CHANGES)

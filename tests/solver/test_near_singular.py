@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
@@ -12,14 +14,25 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu import Body
 from kinfmu.backends.c import compiler
 from kinfmu.backends.python import load_model
 from kinfmu.plan import compile_plan
+from kinfmu.run import FloatArray
 from kinfmu.solver import Pose, Solver, Status
 from tests.fmu.host import Host as PythonHost
 from tests.fmu.native.host import Host as NativeHost
-from tests.mechanisms import with_arm, with_second
-from tests.solver.change_points import fourbar
+from tests.mechanisms import (
+    ROBOT_LENGTHS,
+    ROBOT_PIVOT,
+    beside,
+    folding_robot,
+    tight_jaw,
+    with_arm,
+    with_robot,
+    with_second,
+)
+from tests.solver.change_points import Case, fourbar
 
 Engine = Literal["python", "native"]
 ENGINES: tuple[Engine, ...] = ("python", "native")
@@ -206,6 +219,43 @@ def test_a_pose_of_two_bridges_comes_back_from_its_numbers_to_the_bit() -> None:
     assert far.z == solver.solve(ahead, (3.0, 3.3)).z
 
 
+@pytest.mark.parametrize("flavour", ["python", "native 2", "native 3"])
+def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_state(
+    flavour: str, tmp_path: Path
+) -> None:
+    name, _, fmi = flavour.partition(" ")
+    case = fourbar("4", "1", "3", "2")
+    path = kinfmu.build(
+        with_robot(case.mechanism),
+        tmp_path / "robot.fmu",
+        flavour=name,  # type: ignore[arg-type]  # one of the two
+        fmi=int(fmi or 2),  # type: ignore[arg-type]
+        drive="inputs",
+    )
+    host = (PythonHost if name == "python" else NativeHost)(path, tmp_path / "unpacked")
+    ways = [(1.0, 0.6), (3.1, 0.9), (3.16, 0.2), (5.0, 0.4), (2.0, 1.0)]
+    try:
+        host.initialize(0.0)
+        fmu = host.slave if name == "python" else host.fmu
+        take, give = (getattr(fmu, f"{verb}FM{'UState' if fmi == '3' else 'Ustate'}") for verb in ("get", "set"))
+        runs, taken = [], take()
+        for _ in range(2):
+            found = []
+            for k, (crank, arm) in enumerate(ways):
+                host.set({"crank_angle": crank, "arm_angle": arm})
+                found.append([host.status(), *host.get("rocker.phi", "link.phi")])
+                assert host.step(0.1 * k, 0.1) == (name == "python")  # True, or fmi2OK
+            runs.append(found)
+            give(taken)
+    finally:
+        host.free()
+    assert runs[0] == runs[1]
+    assert [int(row[0]) for row in runs[0]] == [0, 2, 2, 0, 0]
+    exact = robot_motion(case, np.array(ways), (0.0, 0.0), (0.0, 0.0))[0]
+    off = np.array(runs[0])[:, 2] - exact
+    assert np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi).max() <= 1e-11
+
+
 @pytest.mark.parametrize("flavour", ["python", "native 3"])
 def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str, tmp_path: Path) -> None:
     name, _, fmi = flavour.partition(" ")
@@ -249,3 +299,139 @@ def test_a_track_has_every_constant_of_a_model_that_following_it_reads() -> None
     pose = solver.solve(solver.anchor, (1.2, 1.3 + math.pi))
     assert [name for track, _ in pose.tracks for name in sorted(read - of_the_whole) if not hasattr(track, name)] == []
     assert len(pose.tracks) == 2
+
+
+# ------------------------------------------------------------------------- blocks that depend on several drivers too
+
+
+def robot_motion(case: Case, u: FloatArray, speeds: Sequence[float], accelerations: Sequence[float]) -> FloatArray:
+    """(3, n) angle, rate and acceleration of the link of `with_robot`, from the rocker's closed form: two circles."""
+    length, link, strut = ROBOT_LENGTHS
+    crank, arm = np.asarray(u, dtype=np.longdouble).T
+    phi, first, second = case.motion(crank)["rocker.phi"]
+    v, w = speeds
+    rate, bend = v * first, v * v * second + accelerations[0] * first
+    ends = []
+    for size, angle, one, two in ((2.0, phi, rate, bend), (length, arm, w, accelerations[1])):
+        along = size * np.exp(1j * angle)
+        ends.append((along, 1j * one * along, (1j * two - one * one) * along))
+    pivot = complex(*ROBOT_PIVOT) - 4.0
+    way, way1, way2 = (b - a for a, b in zip(*ends, strict=True))
+    way = way + pivot
+    far = abs(way)
+    beta = np.angle(way) + np.arccos((link**2 + far**2 - strut**2) / (2.0 * link * far))
+    gamma = np.angle(link * np.exp(1j * beta) - way)
+    sine, cosine = np.sin(beta - gamma), np.cos(beta - gamma)
+    beta1 = -(way1 * np.exp(-1j * gamma)).real / (link * sine)
+    gamma1 = -(way1 * np.exp(-1j * beta)).real / (strut * sine)
+    beta2 = (-(way2 * np.exp(-1j * gamma)).real - link * beta1**2 * cosine + strut * gamma1**2) / (link * sine)
+    return np.array([beta, beta1, beta2], dtype=float)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_blocks_that_depend_on_several_drivers_follow_a_track_over_its_crossing(engine: Engine) -> None:
+    """In even steps, in jumps, unordered, and in the window: rates and estimates too."""
+    case, speeds, accelerations = fourbar("4", "1", "3", "2"), (0.7, -1.1), (0.3, 0.2)
+    rng = np.random.default_rng(5)
+    crank = np.concatenate(
+        [np.arange(1.0, 8.0, 0.07), rng.uniform(-6.0, 12.0, 25), math.pi + rng.uniform(-0.04, 0.04, 25), [math.pi, 1.0]]
+    )
+    arm = 0.6 + 0.3 * np.sin(3.0 * crank)
+    run = kinfmu.solve(
+        with_robot(case.mechanism),
+        engine=engine,
+        crank_angle=crank,
+        arm_angle=arm,
+        crank_speed=speeds[0],
+        arm_speed=speeds[1],
+        crank_acceleration=accelerations[0],
+        arm_acceleration=accelerations[1],
+    )
+    assert set(run.status.tolist()) == {Status.OK, Status.BRIDGED}
+    assert (run.status == Status.BRIDGED).sum() >= 25
+    exact = robot_motion(case, np.column_stack([crank, arm]), speeds, accelerations)
+    found = np.array([run["link.phi"], run["link.omega"], run["link.alpha"]])
+    gaps = np.abs(found - exact)
+    gaps[0] = np.abs(np.remainder(found[0] - exact[0] + math.pi, 2.0 * math.pi) - math.pi)
+    assert (gaps <= np.maximum(run.error.T, 1e-13)).all()
+    assert run.error[:, 0].max() <= 1e-11
+    assert run.error.max() <= 1e-8
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_only_a_crossing_that_depends_on_several_drivers_is_a_limit_and_says_so(engine: Engine) -> None:
+    reason = "link.phi, strut.phi cross; the crossing depends on several drivers, so no bridge is built"
+    ways = {"left_angle": [0.3, -0.3], "right_angle": [math.pi + 0.3, math.pi - 0.3]}
+    robot = kinfmu.solve(folding_robot(), engine=engine, **ways)
+    assert robot.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert robot.events[0].text.endswith(reason)
+    both = beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
+    run = kinfmu.solve(both, engine=engine, crank2_angle=[2.0, 4.0], **ways)
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert run.events[0].text.endswith(reason)
+    limit = re.search(r"the limit is left = (\S+) rad .*, right = (\S+) rad .*, crank2 = (\S+) rad", run.events[0].text)
+    assert limit is not None
+    np.testing.assert_allclose([float(u) for u in limit.groups()], [0.0, math.pi, 3.0], rtol=0, atol=1e-6)
+    crank = kinfmu.solve(both, engine=engine, crank2_angle=[2.0, 4.0], left_angle=0.3, right_angle=math.pi + 0.3)
+    assert crank.status.tolist() == [Status.OK, Status.OK]
+
+
+def test_a_limit_of_one_driver_gives_no_such_reason_where_others_are_mixed() -> None:
+    """A dead centre, and a crossing with no room for a bridge, while blocks of several drivers move."""
+    limited = fourbar("2", "1", "1.5", "1").mechanism
+    run = kinfmu.solve(beside(folding_robot(), limited), crank2_angle=[1.0, 2.5], left_angle=0.5, right_angle=3.6)
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert run.events[0].text.startswith("crank2 = 2.5 rad")
+    assert "left" not in run.events[0].text
+    assert run.events[0].text.endswith("where coupler2.phi, rocker2.phi would part")
+    jaw = tight_jaw()
+    ground, *bodies = jaw.bodies
+    arms = folding_robot()
+    both = replace(
+        jaw,
+        bodies=(Body("ground", {**ground.points, **arms.bodies[0].points}), *bodies, *arms.bodies[1:]),
+        joints=(*jaw.joints, *(replace(joint, name=f"{joint.name}2") for joint in arms.joints)),
+        drivers=(*jaw.drivers, *arms.drivers),
+    )
+    piston = [jaw.drivers[0].law.start, 54.6]
+    run = kinfmu.solve(both, piston_position=piston, left_angle=0.5, right_angle=3.6)
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert re.search(r"the limit is piston = 54\.2863\d* mm, where branches of \w+\.phi cross$", run.events[0].text)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_there_and_back_beside_a_machine_ends_where_it_began(engine: Engine) -> None:
+    """Before a mixed crossing, with the machine in its window: the next way starts from the last regular pose."""
+    gaps = [0.3, 1e-2, 1e-3, 1e-4, 1e-5]
+    there_and_back = np.array([*gaps, *gaps[-2::-1]])
+    crank = math.pi + 0.02 * np.sign(there_and_back - 5e-3)
+    run = kinfmu.solve(
+        beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism),
+        engine=engine,
+        left_angle=there_and_back,
+        right_angle=math.pi + there_and_back,
+        crank2_angle=crank,
+    )
+    assert run.good.all()
+    np.testing.assert_array_equal(run.status, run.status[::-1])
+    assert run.status[0] == Status.BRIDGED
+    assert Status.NEAR_SINGULAR in run.status
+    assert np.abs(run.values - run.values[::-1]).max() <= 2.0 * run.error[:, 0].max()
+
+
+@pytest.mark.parametrize("gap", [0.3, 1e-4])
+def test_a_pose_of_bridges_and_mixed_blocks_comes_back_from_its_numbers_to_the_bit(gap: float) -> None:
+    """With its base, where it has one."""
+    both = beside(folding_robot(), fourbar("4", "1", "3", "2").mechanism)
+    solver = Solver(load_model(compile_plan(both)))
+    regular = solver.solve(solver.anchor, (0.3, math.pi + 0.3, 2.9))
+    pose = solver.solve(regular, (gap, math.pi + gap, math.pi + 0.01))
+    assert (pose.base is not None) == (gap < 1e-2)
+    again = solver.restore(solver.dump(pose))
+    ud, udd = (0.3, 0.4, 0.2), (0.1, -0.2, 0.5)
+    assert solver.motion(again, ud, udd) == solver.motion(pose, ud, udd)
+    assert solver.errors(again, ud, udd) == solver.errors(pose, ud, udd)
+    ahead, same = (solver.solve(start, (0.4, math.pi + 0.3, 3.3)) for start in (pose, again))
+    assert ahead.good
+    assert ahead.z == same.z
+    assert pose.z == solver.solve(regular, pose.u).z

@@ -640,6 +640,51 @@ def two_machines(rng: Draw) -> Sketch:
     return Sketch(points, poses, drivers, first.joints, kinds, tuple({*first.marks, *other.marks}))
 
 
+def machines_with_a_robot(rng: Draw) -> Sketch:
+    """A four-bar, often with change points, and a robot whose bars depend on several drivers.
+
+    The robot is a five-bar beside the four-bar, or a driven arm and two bars from its end to that of the rocker.
+    """
+    bars = changing(rng) if rng.random() < 0.7 else grashof(rng, rng.choice(KINDS))
+    first, robot = fourbar(bars, _driven(rng), _side(rng)), five_bars(rng)
+    at, is_carried = (drawn_length(rng, 0.5, 5.0), drawn_length(rng, -3.0, 3.0)), rng.random() < 0.6
+    arm, link, strut = drawn_length(rng, 0.3, 1.5), drawn_length(rng, 1.0, 4.0), drawn_length(rng, 1.0, 4.0)
+    side = _side(rng)
+    points = {body: dict(given) for body, given in first.points.items()}
+    if is_carried:
+        points["ground"]["T"] = at
+        points |= {"arm": {"T": ORIGIN, "U": (arm, 0)}, "strut": {"U": ORIGIN, "S": (strut, 0)}}
+        points["rocker"]["D"] = points["rocker"]["Q"]
+        points["link"] = {"D": ORIGIN, "S": (link, 0)}
+    else:
+        for body, given in robot.points.items():
+            if body == "ground":
+                points[body] |= {f"{name}2": (x + at[0], y + at[1]) for name, (x, y) in given.items()}
+            else:
+                points[f"{body}2"] = {f"{name}2": point for name, point in given.items()}
+
+    def poses(numbers: Numbers, u: Sequence[Jet], closing: Closing) -> dict[str, Pose]:
+        moving = first.poses(numbers, u[:1], closing)
+        pivot = standing(numbers, *at, u[1])
+        if not is_carried:
+            carried = robot.poses(numbers, u[1:], closing)
+            return moving | {f"{body}2": Pose(pose.at + pivot, pose.phi) for body, pose in carried.items()}
+        d = world(numbers, moving["rocker"], points["rocker"]["D"])
+        end = pivot + turned(u[1], numbers.number(arm))
+        way = between(closing, d, (numbers.number(link), numbers.number(strut)), end, side)
+        moving["arm"] = Pose(pivot, u[1])
+        return moving | {"link": Pose(d, way.first.heading()), "strut": Pose(end, way.second.heading())}
+
+    def drivers(frame: Frame, start: Sequence[float]) -> tuple[Driver, ...]:
+        found = first.drivers(frame, start[:1])
+        if is_carried:
+            return (*found, AngleDriver("arm", "arm", ConstantSpeed(start[1], 1.0)))
+        others = robot.drivers(frame, start[1:])
+        return (*found, *(replace(driver, of=f"{driver.of}2") for driver in others))
+
+    return Sketch(points, poses, drivers, kinds=("angle",) * (2 if is_carried else 3), marks=first.marks)
+
+
 def cylinders(rng: Draw) -> Sketch:
     """A boom raised by a cylinder; at times with a stick on it, moved by a second one."""
     has_stick = rng.random() < 0.5
@@ -724,4 +769,5 @@ FAMILIES: dict[str, tuple[Callable[[Draw], Sketch], int]] = {  # and how often o
     "two machines": (two_machines, 4),
     "cylinders": (cylinders, 4),
     STARTS_ANYWHERE: (starts_anywhere, 5),
+    "machines with a robot": (machines_with_a_robot, 4),
 }

@@ -26,7 +26,7 @@ from kinfmu.errors import CompilerError
 RUNTIME = Path(__file__).with_name("runtime")
 MODEL = ("kinfmu.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
 SOLVER = (*MODEL, "solver.h", "way.h", "turns.c", "pose.c", "hermite.c", "span.c", "bridge.c", "road.c", "survey.c",
-          "tracks.c", "limit.c", "advance.c", "message.c", "solver.c", "continuation.c", "softness.c",
+          "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c", "continuation.c", "softness.c",
           "estimate.c")  # fmt: skip
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
 

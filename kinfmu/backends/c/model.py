@@ -52,6 +52,7 @@ def _sizes(parts: Parts) -> str:
     counts = {
         "DRIVERS": len(plan.drivers),
         "TRACKS": int(plan.has_tracks),
+        "MIXES": int(plan.has_mixed),
         "UNKNOWNS": len(plan.unknowns),
         "COORDINATES": len(parts.order),
         "BLOCKS": len(solved),

@@ -1,11 +1,8 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/advance.py. */
 #include "way.h"
 
-#define SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
-#define BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
 #define UNDOUBTED 1e-5     /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
 #define SMOOTH 0.5         /* change of the tangent beside the predicted one, as a part: more is another branch */
-#define GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define MOST_WALKED 10000  /* steps between a pose and a node; a few, as a rule */
 #define ROUGHEST 5e-4      /* of the longest step; where even that cannot be trusted there is no plain way */
 
@@ -19,7 +16,7 @@ static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose
     int block, first = 0;
     for (block = 0; block < KF_BLOCKS; ++block) {
         const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
-        if (rows > columns) {
+        if (rows > columns && !kf_is_outside(model, block)) {
             kf_jacobian(model, &pose->found, block, here);
             kf_jacobian(model, &trial->found, block, there);
             if (kf_orientation(rows, columns, here, there) <= 0.0) {
@@ -66,7 +63,7 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
         return false;
     }
     for (k = 0; trial->found.moved > UNDOUBTED && k < KF_UNKNOWNS; ++k) {
-        if (fabs(x2[k]) * s * s > 2.0 * BENT * kf_unknown_scales[k]) {
+        if (fabs(x2[k]) * s * s > 2.0 * KF_BENT * kf_unknown_scales[k]) {
             return false;
         }
     }
@@ -85,7 +82,7 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
     const kf_model *const model = &solver->model;
     const double *x1 = pose->x1, *x2 = pose->x2, *const there = trial->x1;
     double largest = 0.0, jump = 0.0;
-    int k;
+    int block, k = 0;
     if (pose->found.margin < KF_UNDECIDED && trial->found.margin > pose->found.margin) {
         return false;
     }
@@ -97,9 +94,13 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
         x2 = solver->scratch.x2;
         kf_rates(model, &trial->found, direction, NULL, NULL, trial->x1);
     }
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        largest = fmax(largest, fabs(there[k]) / kf_unknown_scales[k]);
-        jump = fmax(jump, fabs(there[k] - (x1[k] + s * x2[k])) / kf_unknown_scales[k]);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            if (!kf_is_outside(model, block)) {
+                largest = fmax(largest, fabs(there[k]) / kf_unknown_scales[k]);
+                jump = fmax(jump, fabs(there[k] - (x1[k] + s * x2[k])) / kf_unknown_scales[k]);
+            }
+        }
     }
     return jump <= SMOOTH * largest;
 }
@@ -279,12 +280,12 @@ kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *t
             }
         }
         step = 0.5 * fabs(s);
-        if (step < SHORTEST_STEP * longest) {
+        if (step < KF_SHORTEST_STEP * longest) {
             if (!is_limited) {
                 kf_limited(solver, before, pose, direction, limit);
                 is_limited = true;
             }
-            if (step < GIVE_UP * longest || kf_is_beyond(target, limit->u, direction, s)) {
+            if (step < KF_GIVE_UP * longest || kf_is_beyond(target, limit->u, direction, s)) {
                 return NULL;
             }
         }

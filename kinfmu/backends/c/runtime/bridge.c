@@ -129,7 +129,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
     double residuals[KF_ROOM(KF_LARGEST_BLOCK)];
     int k;
     for (k = 0; k < KF_DISTANCES && bridge->u[2] < 0.0 && 0.0 < bridge->u[3]; ++k) {
-        if (kf_distance_drivers[k] == KF_ALONG(solver)) {
+        if (kf_distance_drivers[k] == KF_ALONG(solver) && !kf_is_outside(&solver->model, kf_distance_blocks[k])) {
             const double u = bridge->centre;
             double squared;
             kf_residuals(&solver->model, found, kf_distance_blocks[k], residuals);

@@ -215,6 +215,14 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
             source->given_second[k] = pose->x2[k] + (v * v * two + a * one);
         }
     }
+#if KF_MIXES
+    bool of_tracks[KF_BLOCKS];
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        of_tracks[block] = kf_block_drivers[block] != KF_MIXED;
+    }
+    kf_rates(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
+    memcpy(source->z, solver->scratch.x1, sizeof source->z);
+#endif
     return is_made;
 }
 

@@ -11,6 +11,7 @@
 
 #include "sizes.h"
 
+#define KF_MIXED (-1)
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
 
 /* Hints where compilers take them: what is rarely called, and what most samples go through, best compiled as a whole. */
@@ -27,10 +28,14 @@ typedef struct {
     double parameters[KF_ROOM(KF_PARAMETERS)];
     double derived[KF_ROOM(KF_DERIVED)];
 #if KF_TRACKS
-    int track; /* 0: the whole model; else the number of a driver, from 1, with the blocks that depend on it alone */
-    bool outside[KF_BLOCKS]; /* blocks of other drivers */
+    int track; /* 0: the whole model; else the number of a driver, from 1, with the blocks that depend on it alone; or
+                * KF_MIXED: the blocks that depend on several drivers */
+    bool outside[KF_BLOCKS]; /* all other blocks */
     double along[KF_DRIVERS], rest[KF_DRIVERS]; /* speeds of the drivers, and their values */
     double kept[KF_UNKNOWNS]; /* unknowns of those blocks */
+#if KF_MIXES
+    double slopes[KF_UNKNOWNS]; /* their derivatives on the way, for KF_MIXED; all others rest */
+#endif
 #endif
 } kf_model;
 
@@ -79,7 +84,7 @@ extern const double kf_anchor_u[KF_DRIVERS];
 extern const double kf_anchor_z[KF_ROOM(KF_UNKNOWNS)];
 extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];
 #if KF_TRACKS
-extern const int kf_block_drivers[KF_BLOCKS]; /* the driver that each block depends on */
+extern const int kf_block_drivers[KF_BLOCKS]; /* the driver that each block depends on; KF_MIXED: several */
 #endif
 extern const double kf_reach[KF_DRIVERS]; /* what counts as a step of one */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */

@@ -20,7 +20,7 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     for (k = 1; k < KF_BLOCKS; ++k) {
         limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
     }
-    if (KF_IS_FOLLOWED) {
+    if (KF_IS_ONE(solver)) {
         kf_tangent(&solver->model, pose);
     } else {
         kf_rates(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
@@ -28,7 +28,7 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     for (k = kf_first_of(limit->block); k < kf_block_ends[limit->block]; ++k) {
         steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
     }
-    limit->crosses = steepest * (KF_IS_FOLLOWED ? kf_reach[KF_ALONG(solver)] : 1.0) < KF_STEEP;
+    limit->crosses = steepest * (KF_IS_ONE(solver) ? kf_reach[KF_ALONG(solver)] : 1.0) < KF_STEEP;
     near = fabs(determinants[limit->block]);
     far = fabs(before->found.determinants[limit->block]);
     if (!limit->crosses) {
@@ -81,4 +81,7 @@ void kf_say_limit(char *message, const kf_limit *limit, const double *target, in
         kf_say(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
     }
     kf_say(message, limit->crosses ? " cross" : " would part");
+    if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
+        kf_say(message, "; the crossing depends on several drivers, so no bridge is built");
+    }
 }

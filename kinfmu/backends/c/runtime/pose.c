@@ -65,6 +65,25 @@ void kf_enter_track(kf_solver *solver, int driver)
     }
 }
 
+#if KF_MIXES
+
+/* The model of the blocks that depend on several drivers, while all others are at unknowns z, and move: slopes are their
+ * derivatives along the way that the drivers go, second derivatives are 0.
+ */
+void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes)
+{
+    kf_model *const model = &solver->model;
+    int k;
+    model->track = KF_MIXED;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        model->outside[k] = kf_block_drivers[k] != KF_MIXED;
+    }
+    memcpy(model->kept, z, sizeof model->kept);
+    memcpy(model->slopes, slopes, sizeof model->slopes);
+}
+
+#endif
+
 /* The whole model again. */
 void kf_leave_track(kf_solver *solver)
 {
@@ -89,13 +108,25 @@ static const bool *given_blocks(const kf_model *model, const bool *held, bool *r
     return room;
 }
 
-/* What is given of the unknowns: outside a track they rest. */
-static const double *given_rates(const kf_model *model, const double *given, double *room)
+/* Derivatives of the unknowns outside a track: they rest, but beside blocks that depend on several drivers. */
+static const double *slopes_of(const kf_model *model)
+{
+#if KF_MIXES
+    if (model->track == KF_MIXED) {
+        return model->slopes;
+    }
+#endif
+    (void)model;
+    return kf_at_rest;
+}
+
+/* What is given of the unknowns. */
+static const double *given_rates(const kf_model *model, const double *outside, const double *given, double *room)
 {
     int block, k = 0;
     for (block = 0; block < KF_BLOCKS; ++block) {
         for (; k < kf_block_ends[block]; ++k) {
-            room[k] = model->outside[block] || given == NULL ? 0.0 : given[k];
+            room[k] = model->outside[block] ? outside[k] : given == NULL ? 0.0 : given[k];
         }
     }
     return room;
@@ -106,9 +137,9 @@ void kf_rates(const kf_model *model, const kf_found *found, const double *ud, co
 {
     bool blocks[KF_ROOM(KF_BLOCKS)];
     double rates[KF_ROOM(KF_UNKNOWNS)];
-    if (model->track > 0) {
+    if (model->track != 0) {
         held = given_blocks(model, held, blocks);
-        given = given_rates(model, given, rates);
+        given = given_rates(model, slopes_of(model), given, rates);
     }
     kf_velocity(model, found, ud, given, held, x1);
 }
@@ -118,9 +149,9 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 {
     bool blocks[KF_ROOM(KF_BLOCKS)];
     double rates[KF_ROOM(KF_UNKNOWNS)];
-    if (model->track > 0) {
+    if (model->track != 0) {
         held = given_blocks(model, held, blocks);
-        given = given_rates(model, given, rates);
+        given = given_rates(model, kf_at_rest, given, rates);
     }
     kf_acceleration(model, found, udd, x1, given, held, x2);
 }

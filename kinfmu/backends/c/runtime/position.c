@@ -24,13 +24,35 @@ static inline double watched(const kf_model *model, const kf_found *found)
 inline bool kf_is_outside(const kf_model *model, int block)
 {
 #if KF_TRACKS
-    return model->track > 0 && model->outside[block];
+    return model->track != 0 && model->outside[block];
 #else
     (void)model;
     (void)block;
     return false;
 #endif
 }
+
+#if KF_MIXES
+/* The largest length of the residuals of the blocks that are followed: others do not close while they rest. */
+static double own_residual(const kf_model *model, const kf_found *found)
+{
+    double residuals[KF_ROOM(KF_ROWS)], largest = 0.0, total = 0.0;
+    int block, k;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        double square = 0.0;
+        if (kf_is_outside(model, block)) {
+            continue;
+        }
+        kf_residuals(model, found, block, residuals);
+        for (k = 0; k < kf_block_rows[block]; ++k) {
+            square += residuals[k] * residuals[k];
+        }
+        largest = square > largest ? square : largest;
+        total += square; /* a NaN stays */
+    }
+    return sqrt(total < INFINITY ? largest : total);
+}
+#endif
 
 /* Newton from a prediction, and its determinants, in a model's unit; -1, or the block that failed. */
 static inline int solved(const kf_model *model, const double *z, const bool *held, double enough, kf_found *found)
@@ -56,6 +78,11 @@ static inline int solved(const kf_model *model, const double *z, const bool *hel
     }
     found->residual = sqrt(newton.total < INFINITY ? newton.largest : newton.total);
     found->iterations = newton.iterations;
+#if KF_MIXES
+    if (model->track != 0) {
+        found->residual = own_residual(model, found);
+    }
+#endif
     return -1;
 }
 
@@ -84,7 +111,7 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     }
 #if KF_TRACKS
     bool given[KF_BLOCKS];
-    if (model->track > 0) {
+    if (model->track != 0) {
         int place = 0;
         for (k = 0; k < KF_BLOCKS; ++k) {
             given[k] = model->outside[k] || (held != NULL && held[k]);
@@ -108,7 +135,7 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
         polish(model, held, found);
     }
 #if KF_TRACKS
-    if (model->track > 0) {
+    if (model->track != 0) {
         found->watch = 0.0; /* rows set aside are of the whole */
         return -1;
     }

@@ -16,6 +16,11 @@ void kf_needed(kf_solver *solver, int start, int pose, int regular)
 static bool is_needed(const kf_solver *solver, int road)
 {
     const int *const live = solver->scratch.live;
+#if KF_MIXES
+    if (road == solver->scratch.origin[KF_ALONG(solver)]) {
+        return true;
+    }
+#endif
     return road == live[0] || road == live[1] || road == live[2];
 }
 

@@ -128,10 +128,10 @@ typedef struct {
 
 /* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
  * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
- * not bridged.
+ * not bridged. Blocks of several drivers follow the tracks piece by piece: the roads of the first start are needed too.
  */
-#define KF_ROADS (KF_IS_FOLLOWED ? 4 : 1)
-#define KF_BRIDGES (KF_IS_FOLLOWED ? 3 * KF_KEPT + 1 : 1)
+#define KF_ROADS (KF_IS_FOLLOWED ? 4 + KF_MIXES : 1)
+#define KF_BRIDGES (KF_IS_FOLLOWED ? (3 + KF_MIXES) * KF_KEPT + 1 : 1)
 #define KF_SPANS (KF_IS_FOLLOWED ? KF_KEPT + 8 : 1)
 
 /* What is known along one driver. */
@@ -159,6 +159,10 @@ typedef struct {
     kf_pose base, way[4], walk[2], beside, located;
 #if KF_TRACKS
     kf_pose track[2];
+#endif
+#if KF_MIXES
+    kf_pose whole[4], share[2];
+    int origin[KF_DRIVERS]; /* roads of the tracks where a way of several drivers starts: needed until it ends */
 #endif
     kf_model ahead;
     kf_source source;

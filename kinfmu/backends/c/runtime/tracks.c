@@ -74,12 +74,26 @@ static bool has_track(int driver)
     return block < KF_BLOCKS;
 }
 
-/* One trusted step of all drivers away from all that is singular; false if it is not one. */
-static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+/* True if the blocks of all tracks are regular, and the others not near singular. */
+static bool is_apart(const kf_pose *pose)
+{
+    int block;
+    bool apart = pose->found.margin >= KF_NEAR;
+    if (!KF_MIXES || pose->found.margin >= KF_REGULAR) {
+        return pose->found.margin >= KF_REGULAR;
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        apart = apart && (kf_block_drivers[block] < 0 || fabs(pose->found.determinants[block]) >= KF_REGULAR);
+    }
+    return apart;
+}
+
+/* One trusted step of all drivers away from all that is singular on a track; false if it is not one. */
+bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     double direction[KF_DRIVERS], distance;
     int k;
-    if (!(start->found.margin >= KF_REGULAR) || start->is_held) {
+    if (start->status != KF_OK || start->has_base || !is_apart(start)) {
         return false;
     }
     distance = kf_course(KF_POSE_U(start), u, direction);
@@ -97,8 +111,9 @@ static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose 
             }
         }
     }
-    if (!kf_trusted_step(solver, start, direction, distance, u, pose) || !(pose->found.margin >= KF_REGULAR)
-        || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)) {
+    if (!kf_trusted_step(solver, start, direction, distance, u, pose) || !is_apart(pose)
+        || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)
+        || (pose->found.margin < KF_REGULAR && !kf_keeps_branch(solver, start, pose, direction, distance))) {
         return false;
     }
     pose->has_tracks = true;
@@ -112,47 +127,41 @@ static bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose 
     return true;
 }
 
-kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+/* The pose of the tracks at u, on the way from `start` to `target`; all other blocks are as z has them. */
+kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *from,
+                       kf_pose *pose)
 {
     const double tolerance = solver->tolerance;
     kf_pose *const own = &solver->scratch.track[1];
-    double z[KF_UNKNOWNS], room[KF_DRIVERS], sum = 0.0;
+    double z[KF_UNKNOWNS], room[KF_DRIVERS];
     kf_status status = KF_OK;
     int k, iterations = 0;
-    bool is_same = start->has_tracks;
-    if (solver->stuck) {
-        return kf_failed(pose, KF_INCONSISTENT);
-    }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        is_same = is_same && u[k] == KF_POSE_U(start)[k];
-        sum += u[k];
-    }
-    if (is_same) {
-        *pose = *start;
-        return pose->status;
-    }
-    if (is_near(solver, start, u, pose)) {
-        return KF_OK;
-    }
-    solver->message[0] = '\0';
-    if (!(sum - sum == 0.0)) {
-        kf_say_place(solver->message, u, KF_ROUGHLY, -1);
-        kf_say(solver->message, " is not a finite number");
-        return kf_failed(pose, KF_OUTSIDE);
-    }
-    memcpy(z, start->found.x, sizeof z);
+    memcpy(z, from, sizeof z);
     memset(pose->held, 0, sizeof pose->held);
     pose->is_held = false;
     for (k = 0; k < KF_DRIVERS; ++k) {
         kf_status one;
         if (!has_track(k)) {
-            pose->own[k].road = pose->own[k].bridge = -1;
+            pose->own[k].status = KF_OK;
+            pose->own[k].road = pose->own[k].bridge = pose->own[k].base_bridge = -1;
             pose->own[k].has_base = false;
             continue;
         }
         kf_enter_track(solver, k);
         solver->tolerance = INFINITY; /* the whole is what counts */
         one = kf_solve_along(solver, kf_own_pose(solver, start, k), kf_driven_at(&solver->model, &u[k], room), own);
+        if (!KF_GOOD(one) && u != target) { /* the message is to tell of the target */
+            char message[KF_MESSAGE];
+            kf_status beyond;
+            memcpy(message, solver->message, sizeof message);
+            kf_driven_at(&solver->model, &target[k], room);
+            beyond = kf_solve_along(solver, kf_own_pose(solver, start, k), room, own);
+            if (KF_GOOD(beyond)) {
+                memcpy(solver->message, message, sizeof message);
+            } else {
+                one = beyond;
+            }
+        }
         solver->tolerance = tolerance;
         if (KF_GOOD(one)) {
             keep(solver, own, k, pose, z);
@@ -172,10 +181,57 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     pose->has_tracks = true;
     pose->status = status;
     if (!kf_evaluated_as_given(&solver->model, u, z, &pose->found)) {
+        kf_limit limit;
+        memcpy(limit.u, KF_POSE_U(start), sizeof limit.u);
+        limit.block = KF_NO_BLOCK;
+        limit.crosses = false;
+        solver->message[0] = '\0';
+        kf_say_limit(solver->message, &limit, target, -1);
         return kf_failed(pose, KF_OUTSIDE);
     }
     pose->found.iterations = iterations;
-    return kf_checked(solver, pose);
+    return pose->status;
+}
+
+kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    kf_status status;
+    double sum = 0.0;
+    int k;
+    bool is_same = start->has_tracks;
+    if (solver->stuck) {
+        return kf_failed(pose, KF_INCONSISTENT);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        is_same = is_same && u[k] == KF_POSE_U(start)[k];
+        sum += u[k];
+    }
+    if (is_same) {
+        *pose = *start;
+        return pose->status;
+    }
+    if (kf_is_near(solver, start, u, pose)) { /* most samples */
+        return KF_OK;
+    }
+    solver->message[0] = '\0';
+    if (!(sum - sum == 0.0)) {
+        kf_say_place(solver->message, u, KF_ROUGHLY, -1);
+        kf_say(solver->message, " is not a finite number");
+        return kf_failed(pose, KF_OUTSIDE);
+    }
+#if KF_MIXES
+    for (k = 0; k < KF_DISTANCES; ++k) {
+        if (kf_block_drivers[kf_distance_blocks[k]] == KF_MIXED && u[kf_distance_drivers[k]] < 0.0) {
+            kf_say_place(solver->message, u, KF_ROUGHLY, -1);
+            kf_say(solver->message, ": a distance cannot be negative");
+            return kf_failed(pose, KF_OUTSIDE);
+        }
+    }
+    status = kf_followed_all(solver, start, u, pose);
+#else
+    status = kf_assembled(solver, start, u, u, start->found.x, pose);
+#endif
+    return KF_GOOD(status) ? kf_checked(solver, pose) : status;
 }
 
 #endif
@@ -191,7 +247,8 @@ const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double 
     double given_first[KF_UNKNOWNS], given_second[KF_UNKNOWNS];
     int block, k = 0;
     for (block = 0; pose->is_held && block < KF_BLOCKS; ++block) {
-        const double v = ud[kf_block_drivers[block]], a = udd == NULL ? 0.0 : udd[kf_block_drivers[block]];
+        const int driver = kf_block_drivers[block];
+        const double v = driver < 0 ? 0.0 : ud[driver], a = driver < 0 || udd == NULL ? 0.0 : udd[driver];
         for (; k < kf_block_ends[block]; ++k) {
             given_first[k] = v * pose->own1[k];
             given_second[k] = v * v * pose->own2[k] + a * pose->own1[k];

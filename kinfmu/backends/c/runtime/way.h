@@ -17,10 +17,13 @@
 #define KF_NEAR 0.0125       /* determinant below which a pose is near-singular */
 #define KF_CLOSE 0.1
 #define KF_MOST_STEPS 1000000
+#define KF_SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
+#define KF_GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
+#define KF_BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
 #define KF_UNDECIDED 1e-6    /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
 #define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 
-/* Models with several drivers whose blocks each depend on one alone are followed along one driver at a time: a track.
+/* Blocks of models with several drivers that depend on one driver alone are followed along it: a track.
  * KF_ALONG: the number of the driver; KF_SPEEDS: those of the drivers then; KF_AT: values of all drivers of which one is
  * given.
  */
@@ -28,6 +31,7 @@
 #define KF_ALONG_OF(model) ((model)->track - 1)
 #define KF_SPEEDS(model) ((model)->along)
 void kf_enter_track(kf_solver *solver, int driver);
+void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes);
 void kf_leave_track(kf_solver *solver);
 const double *kf_driven_at(const kf_model *model, const double *value, double *room);
 void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
@@ -121,8 +125,16 @@ KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 /* tracks.c */
 #if KF_TRACKS
 kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver);
+kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *z,
+                       kf_pose *pose);
+bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 #endif
 const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd);
+
+/* mixed.c */
+#if KF_MIXES
+KF_RARE kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
+#endif
 
 /* softness.c */
 #define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
