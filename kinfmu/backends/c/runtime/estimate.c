@@ -154,6 +154,7 @@ static double away(double gap, double by)
 /* The steepest slope of an unknown over the only driver, both in radians and sizes. */
 static double steepest(const kf_solver *solver, const kf_pose *pose)
 {
+    (void)solver; /* without tracks the only driver is the first */
     return kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales) * kf_reach[KF_ALONG(solver)];
 }
 
