@@ -47,7 +47,9 @@ def solved_again(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | N
 
 
 def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
-    """The mechanism with the parameters of the run, and all coordinates as outputs."""
+    """The mechanism with the parameters of the run, assembled as the run was, and all coordinates as outputs."""
+    from kinfmu.continued import continued
+
     settings = (entry.partition(" = ") for entry in run.info.get("parameters", "").split(", "))  # of an FMU
     told = {**run.info, **{name: value for name, _, value in settings}}
     changed: dict[str, float | str] = {}
@@ -58,7 +60,7 @@ def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
             continue
         if parameter.expression is None and value != float(parameter.value):
             changed[name] = value
-    return replace(mechanism.with_parameters(changed), coordinates="all", points={})
+    return replace(continued(mechanism, changed).mechanism, coordinates="all", points={})
 
 
 @lru_cache(maxsize=4)
