@@ -23,6 +23,7 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
     """A gallery name or a .toml file; what does not exist is wrong usage, what is wrong in it the mechanism's fault."""
 
     name = "MECH"
+    suffixes = ".toml"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         name, known = str(value), gallery.names()
@@ -35,7 +36,7 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
             return name
         near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), "")
         near = near or suggestion(name, [*beside(Path(name), ".toml"), *known])
-        message = f"'{name}' is not in the gallery{near}; gallery: {listed(known)}; files end in .toml"
+        message = f"'{name}' is not in the gallery{near}; gallery: {listed(known)}; files end in {self.suffixes}"
         return self.fail(message, param, ctx)
 
 
@@ -43,6 +44,7 @@ class ModelName(MechanismName):
     """An .fmu file, or a mechanism."""
 
     name = "FMU|MECH"
+    suffixes = ".toml or .fmu"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         if suffix_of(str(value)) == ".fmu":

@@ -63,11 +63,14 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
     edge = 0.0 if axis.is_time else 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1])) if len(run) else 0.0
     rows = (axis.values >= first - edge) & (axis.values <= last + edge)
     if not rows.any():
+        unit = f" {axis.unit}".rstrip()
+        asked = f"from {first:g} to {last:g}{unit}"
+        if stop is None:
+            asked = f"from {first:g}{unit} on"
+        elif start is None:
+            asked = f"up to {last:g}{unit}"
         told = axis.range() or "none"
-        raise RequestError(
-            f"--start, --stop: the run has no samples from {first:g} to {last:g}"
-            f"{' ' * bool(axis.unit)}{axis.unit}; its samples: {told}"
-        )
+        raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {told}")
     kept = run.t[rows]
     low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
     return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))

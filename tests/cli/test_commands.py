@@ -190,6 +190,10 @@ def test_a_file_that_is_no_fmu_is_told(fails: Callable[..., str], tmp_path: Path
     assert "text.fmu" in fails("simulate", "text.fmu")
 
 
+def test_what_simulate_takes_is_said_where_a_file_is_neither(refuses: Callable[..., str]) -> None:
+    assert refuses("simulate", "motion.csv").endswith("files end in .toml or .fmu")
+
+
 def test_review_of_a_run_that_is_missing_is_told(refuses: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "fourbar.mcap").touch()
     told = refuses("review", "forbar.mcap", "--save", "none.rrd")

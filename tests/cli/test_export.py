@@ -118,4 +118,7 @@ def test_a_part_of_a_run_is_exported(
     assert command("export", record, "-o", "run.csv", "--start", "175").exit_code == 0
     assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(175, 181))
     told = refuses("export", record, "-o", "run.csv", "--start", "181")
-    assert "the run has no samples from 181 to inf s; its samples: t = 0 to 180 s" in told
+    assert "the run has no samples from 181 s on; its samples: t = 0 to 180 s" in told
+    assert "no samples up to -1 s; its" in refuses("export", record, "-o", "run.csv", "--stop", "-1")
+    told = refuses("export", record, "-o", "run.csv", "--start", "0.2", "--stop", "0.4")
+    assert "no samples from 0.2 to 0.4 s; its" in told
