@@ -25,7 +25,7 @@ class Kept:
     def add(self, pose: Pose) -> None:
         """The next sample's pose."""
         self._found.append(
-            None if not pose.good else pose if pose.is_bridged or (pose.tracks and pose.status) else pose.z
+            None if not pose.good else pose if pose.bridge is not None or (pose.tracks and pose.status) else pose.z
         )
 
     def margins(self) -> FloatArray:

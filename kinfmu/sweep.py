@@ -145,6 +145,8 @@ def _set(
     """
     written = plan.mechanism
     settings = {**geometry, **constants}
+    if not settings:
+        return plan, (), None, ""
     changed = written.with_parameters(settings)
     if not geometry and (not by_law or law_starts(changed) == law_starts(written)):
         return plan, (), None, ""

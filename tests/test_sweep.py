@@ -137,3 +137,29 @@ def test_no_samples_are_an_empty_run() -> None:
     run = kinfmu.solve(kinfmu.load("fourbar"), [])
     assert len(run) == 0
     assert run.q.shape == (0, 5)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"crank_angle": [0.4, 0.5, 0.6]},
+        {"t": [1.0, 2.0, 3.0]},
+        {"t": [1.0, 2.0, 3.0], "parameters": {"crank.start": 0.3}},
+    ],
+    ids=["inputs", "times", "parameters"],
+)
+def test_margins_and_error_estimates_are_computed_when_they_are_read(engine: str, arguments: dict[str, object]) -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), engine=engine, **arguments)  # type: ignore[arg-type]  # several kinds
+    assert callable(vars(run)["margin"])
+    assert callable(vars(run)["error"])
+    assert run.margin.shape == (3,)
+    assert run.error.shape == (3, 3)
+    assert not callable(vars(run)["margin"])
+    assert not callable(vars(run)["error"])
+
+
+def test_a_solve_of_a_plan_resolves_no_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = compile_plan(kinfmu.load("fourbar"))
+    monkeypatch.setattr(kinfmu.Mechanism, "with_parameters", None)  # calling it fails
+    assert kinfmu.solve(plan, crank_angle=[0.4, 0.5]).good.all()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .bridge import HALF_WIDTH, Bridge, Walk, build, moved, secant_zero
 from .linear import orientation
 from .message import LOCATED, ROUGHLY, differs, place
-from .pose import ALONE, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road, position
+from .pose import ALONE, POLISHED, STEEP, UNDECIDED, Model, Pose, Vector, directed, on_road, polished
 from .road import Road, Searched
 from .span import REGULAR
 from .status import Status
@@ -128,7 +128,10 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     """One step of predict and correct, or None if it cannot be trusted to stay on the branch."""
     zd, zdd = pose.tangent or directed(model, pose, direction)
     try:
-        trial = Pose(u, position(model, u, pose.z, zd, zdd, s), pose.road)
+        found = model.position(u, pose.z, zd, zdd, s)
+        if found[2] < POLISHED:
+            found = polished(model, u, found)
+        trial = Pose(u, found, pose.road)
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
     needed = TRUST * trial.moved

@@ -70,7 +70,9 @@ class Pose:
     @property
     def is_bridged(self) -> bool:
         """True if unknowns of the pose are interpolated."""
-        return self.bridge is not None or any(own.bridge is not None for _, own in self.tracks)
+        if not self.tracks:
+            return self.bridge is not None
+        return any(own.bridge is not None for _, own in self.tracks)
 
     @property
     def good(self) -> bool:
@@ -125,9 +127,14 @@ def on_road(pose: Pose, road: Any) -> Pose:
 def position(model: Model, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0) -> Found:
     """What the model's `position` gives; near a singular pose Newton goes on until the residual no longer falls."""
     found: Found = model.position(u, z, zd, zdd, s, held)
-    if found[2] >= POLISHED or held < 0:
-        return found
-    rest = (0.0,) * len(z)
+    return found if found[2] >= POLISHED or held < 0 else polished(model, u, found, held)
+
+
+def polished(model: Model, u: Vector, found: Found, held: int = 0) -> Found:
+    """What Newton gives that goes on from a pose near a singular one; the pose as it is where that wins nothing."""
+    if held and not any(abs(size) < POLISHED and not held >> k & 1 for k, size in enumerate(found[1])):
+        return found  # the blocks near a singular pose are not solved for
+    rest = (0.0,) * len(found[0])
     try:
         better: Found = model.position(u, found[0], rest, rest, -0.0, held, 0.0)
     except (ArithmeticError, ValueError):

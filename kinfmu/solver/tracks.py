@@ -180,7 +180,7 @@ def on_track(track: Track, pose: Pose) -> Pose:
 
 def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
     """First and second derivative of the unknowns in time; of blocks that are interpolated by the chain rule."""
-    held = held_blocks(pose)
+    held = held_blocks(pose) if pose.is_bridged else 0
     if not held:
         zd = tuple(model.velocity(pose.values, ud))
         return zd, tuple(model.acceleration(pose.values, ud, udd, zd))

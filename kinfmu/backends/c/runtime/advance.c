@@ -43,8 +43,8 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
     } else {
         x1 = solver->scratch.x1;
         x2 = solver->scratch.x2;
-        kf_rates(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
-        kf_second_rates(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
+        KF_VELOCITY(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
+        KF_ACCELERATION(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
     }
     if (kf_position(model, u, pose->found.x, x1, x2, s, NULL, &trial->found) >= 0) { /* singular, or diverged */
         return false;
@@ -92,7 +92,7 @@ bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const dou
     } else {
         x1 = solver->scratch.x1; /* of the step from the pose to the trial */
         x2 = solver->scratch.x2;
-        kf_rates(model, &trial->found, direction, NULL, NULL, trial->x1);
+        KF_VELOCITY(model, &trial->found, direction, NULL, NULL, trial->x1);
     }
     for (block = 0; block < KF_BLOCKS; ++block) {
         for (; k < kf_block_ends[block]; ++k) {
@@ -135,20 +135,6 @@ kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u)
         }
     }
     return NULL;
-}
-
-/* Direction and length of a straight way of several drivers, measured by the driver that has most to go. */
-double kf_course(const double *start, const double *target, double *direction)
-{
-    double length = 0.0;
-    int k;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        length = fmax(length, fabs((target[k] - start[k]) / kf_reach[k]));
-    }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        direction[k] = (target[k] - start[k]) / length;
-    }
-    return length;
 }
 
 /* The pose at the end of a way, with the iterations of the whole way.

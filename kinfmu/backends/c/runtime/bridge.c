@@ -93,8 +93,8 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     }
     pose->bridge = number;
     pose->status = KF_BRIDGED;
-    kf_rates(model, &pose->found, KF_SPEEDS(model), zd, span->held, pose->x1);
-    kf_second_rates(model, &pose->found, kf_at_rest, pose->x1, zdd, span->held, pose->x2);
+    KF_VELOCITY(model, &pose->found, KF_SPEEDS(model), zd, span->held, pose->x1);
+    KF_ACCELERATION(model, &pose->found, kf_at_rest, pose->x1, zdd, span->held, pose->x2);
     pose->derivatives = 2;
     return true;
 }

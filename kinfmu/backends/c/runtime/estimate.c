@@ -56,7 +56,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
         given[k] = 0.0;
     }
     kf_soften(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
-    kf_rates(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         source->z[k] = weight * c * all_of[k];
         source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
@@ -95,14 +95,14 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
     if (!kf_evaluated(model, KF_POSE_U(pose), z, all, &there->found)) {
         return false;
     }
-    kf_rates(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
+    KF_VELOCITY(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
                 there->x1);
     add(there->x1, pose->x1, source->first, z);
-    kf_rates(model, &there->found, drive->ud, z, all, there->x1);
-    kf_second_rates(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
+    KF_VELOCITY(model, &there->found, drive->ud, z, all, there->x1);
+    KF_ACCELERATION(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
                     drive->held, there->x2);
     add(there->x2, pose->x2, source->second, z);
-    kf_second_rates(model, &there->found, drive->udd, there->x1, z, all, there->x2);
+    KF_ACCELERATION(model, &there->found, drive->udd, there->x1, z, all, there->x2);
     return true;
 }
 
@@ -181,7 +181,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
         source->given_second[k] = pose->x2[k] + away(scratch->zdd[k], 1.0 / (half * half) * rounding[k]);
         source->first[k] = source->second[k] = 0.0;
     }
-    kf_rates(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
     memcpy(source->z, scratch->x1, KF_UNKNOWNS * sizeof(double));
     source->is_given = true;
     return true;
@@ -221,7 +221,7 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
     for (block = 0; block < KF_BLOCKS; ++block) {
         of_tracks[block] = kf_block_drivers[block] != KF_MIXED;
     }
-    kf_rates(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
     memcpy(source->z, solver->scratch.x1, sizeof source->z);
 #endif
     return is_made;

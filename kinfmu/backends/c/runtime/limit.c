@@ -23,7 +23,7 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     if (KF_IS_ONE(solver)) {
         kf_tangent(&solver->model, pose);
     } else {
-        kf_rates(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
+        KF_VELOCITY(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
     }
     for (k = kf_first_of(limit->block); k < kf_block_ends[limit->block]; ++k) {
         steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);

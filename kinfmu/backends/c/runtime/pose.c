@@ -39,10 +39,10 @@ bool kf_evaluated_as_given(const kf_model *model, const double *u, const double 
 inline void kf_tangent(const kf_model *model, kf_pose *pose)
 {
     if (pose->derivatives < 1) {
-        kf_rates(model, &pose->found, KF_SPEEDS(model), NULL, NULL, pose->x1);
+        KF_VELOCITY(model, &pose->found, KF_SPEEDS(model), NULL, NULL, pose->x1);
     }
     if (pose->derivatives < 2) {
-        kf_second_rates(model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+        KF_ACCELERATION(model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
         pose->derivatives = 2;
     }
 }

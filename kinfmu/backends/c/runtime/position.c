@@ -86,10 +86,26 @@ static inline int solved(const kf_model *model, const double *z, const bool *hel
     return -1;
 }
 
+/* True if a block that is solved for is near a singular pose. */
+static bool is_polished(const bool *held, const kf_found *found)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        if (fabs(found->determinants[k]) < KF_POLISHED && !(held != NULL && held[k])) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Go on near a singular pose until the residual no longer falls; the pose stays as it is where that wins nothing. */
 static KF_RARE void polish(const kf_model *model, const bool *held, kf_found *found)
 {
-    const kf_found before = *found;
+    kf_found before;
+    if (!is_polished(held, found)) {
+        return;
+    }
+    before = *found;
     if (solved(model, before.x, held, 0.0, found) >= 0 || !(found->residual <= before.residual)) {
         *found = before;
         return;

@@ -127,11 +127,13 @@ static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
     return kf_checked(solver, pose);
 }
 
-#if !KF_TRACKS
-#define kf_solve_along kf_solve
+#if KF_TRACKS
+#define KF_SOLVE_ALONG kf_solve_along
+#else
+#define KF_SOLVE_ALONG kf_solve
 #endif
 
-inline kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     kf_pose *found;
     kf_limit limit;
@@ -205,11 +207,11 @@ inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, 
     }
 #endif
     if ((rates != NULL || accelerations != NULL) && pose->derivatives < 1) {
-        kf_rates(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
+        KF_VELOCITY(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
         pose->derivatives = one ? 1 : 0; /* of the single driver they stay true */
     }
     if (accelerations != NULL && pose->derivatives < 2) {
-        kf_second_rates(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
+        KF_ACCELERATION(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
         pose->derivatives = one ? 2 : 0;
     }
     kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);

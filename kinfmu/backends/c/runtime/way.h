@@ -39,11 +39,13 @@ void kf_rates(const kf_model *model, const kf_found *found, const double *ud, co
 void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
                      const double *given, const bool *held, double *x2);
 #define KF_AT(model, value, room) kf_driven_at(model, value, room)
+#define KF_VELOCITY kf_rates
+#define KF_ACCELERATION kf_second_rates
 #else
 #define KF_ALONG_OF(model) 0
 #define KF_SPEEDS(model) kf_alone
-#define kf_rates kf_velocity
-#define kf_second_rates kf_acceleration
+#define KF_VELOCITY kf_velocity
+#define KF_ACCELERATION kf_acceleration
 #define KF_AT(model, value, room) (value)
 #endif
 #define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
@@ -115,9 +117,22 @@ void kf_say_limit(char *message, const kf_limit *limit, const double *target, in
 KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit);
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
-double kf_course(const double *start, const double *target, double *direction);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
 kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
+
+/* Direction and length of a straight way of several drivers, measured by the driver that has most to go. */
+static inline double kf_course(const double *start, const double *target, double *direction)
+{
+    double length = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        length = fmax(length, fabs((target[k] - start[k]) / kf_reach[k]));
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        direction[k] = (target[k] - start[k]) / length;
+    }
+    return length;
+}
 
 /* survey.c */
 KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);

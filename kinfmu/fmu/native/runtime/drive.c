@@ -36,8 +36,10 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
                 udd[k] = bend * (2.0 * share);
                 ud[k] = d2 + bend * (h2 * share);
             }
-            ud[k] = usable(ud[k]);
-            udd[k] = usable(udd[k]);
+            if (!(fabs(ud[k]) + fabs(udd[k]) <= KF_LARGEST)) {
+                ud[k] = usable(ud[k]);
+                udd[k] = usable(udd[k]);
+            }
         }
     }
 }
@@ -114,8 +116,9 @@ double kf_moment(const kf_state *s, double *t, double *u)
 KF_RARE void kf_find_rate_sources(kf_state *s)
 {
     const bool all = s->model_exchange || s->rates == KF_RATES_WIRED;
-    int k, order;
+    int k, order, count = 0;
     memset(s->sources, all ? KF_RATE_INPUT : KF_RATE_ESTIMATED, sizeof s->sources);
+    s->given = all ? KF_ALL_RATES : KF_NO_RATES;
     if (all || s->rates == KF_RATES_ESTIMATED) {
         return;
     }
@@ -125,9 +128,12 @@ KF_RARE void kf_find_rate_sources(kf_state *s)
             if (order == 2 && s->wired[3 * k + 1] && s->orders[3 * k + 1]) {
                 source = KF_RATE_OF_SPEED;
             }
-            s->sources[3 * k + order] = (unsigned char)(s->wired[3 * k + order] ? KF_RATE_INPUT : source);
+            source = s->wired[3 * k + order] ? KF_RATE_INPUT : source;
+            s->sources[3 * k + order] = (unsigned char)source;
+            count += source != KF_RATE_ESTIMATED;
         }
     }
+    s->given = count == 0 ? KF_NO_RATES : count < 2 * KF_DRIVERS ? KF_SOME_RATES : KF_ALL_RATES;
 }
 
 /* The rate of place 3 k + order: an input, a derivative of one, or the estimate. */
@@ -158,15 +164,12 @@ static void choose(const kf_state *s, const double *inputs, double *ud, double *
 /* ud, udd at time t: the inputs, with estimates for rates that are not given. */
 static void by_inputs(const kf_state *s, const double *inputs, double t, const double *u, double *ud, double *udd)
 {
-    int k;
-    bool all = true;
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        all = all && s->sources[3 * k + 1] && s->sources[3 * k + 2];
-    }
-    if (!all) {
+    if (s->given != KF_ALL_RATES) {
         kf_estimated_rates(s->history, s->samples, t, u, ud, udd);
     }
-    choose(s, inputs, ud, udd);
+    if (s->given != KF_NO_RATES) {
+        choose(s, inputs, ud, udd);
+    }
 }
 
 /* The end of a step that followed derivatives of inputs: they move to its end, and the rates there are found. Rates that are

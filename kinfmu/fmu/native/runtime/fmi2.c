@@ -124,8 +124,7 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
-    const kf_answer answer = kf_check(common(c), vr, value, nvr);
-    return (fmi2Status)(answer == KF_DONE ? kf_get_real(common(c), vr, nvr, value) : answer);
+    return (fmi2Status)kf_get_real(common(c), vr, nvr, value);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
@@ -164,8 +163,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
-    const kf_answer answer = kf_check(common(c), vr, value, nvr);
-    return (fmi2Status)(answer == KF_DONE ? kf_set_real(common(c), vr, nvr, value) : answer);
+    return (fmi2Status)kf_set_real(common(c), vr, nvr, value);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])

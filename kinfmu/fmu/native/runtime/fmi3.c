@@ -158,31 +158,32 @@ fmi3Status fmi3Reset(fmi3Instance instance)
 
 static KF_RARE kf_answer wrong_count(fmi3Instance instance, size_t references, size_t values)
 {
-    return kf_answered(common(instance), KF_ERROR, "%zu value references, but %zu values: every variable is a scalar",
-                       references, values);
+    return instance == NULL ? KF_ERROR
+                            : kf_answered(common(instance), KF_ERROR,
+                                          "%zu value references, but %zu values: every variable is a scalar", references, values);
 }
 
 /* Every variable is a scalar: as many values as references. */
 static kf_answer check(fmi3Instance instance, const void *references, size_t count, const void *values, size_t value_count)
 {
-    if (instance && count != value_count) {
-        return wrong_count(instance, count, value_count);
-    }
-    return kf_check(common(instance), references, values, count);
+    return count == value_count ? kf_check(common(instance), references, values, count)
+                                : wrong_count(instance, count, value_count);
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
-    const kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    return (fmi3Status)(answer == KF_DONE ? kf_get_real(common(instance), valueReferences, nValueReferences, values) : answer);
+    return (fmi3Status)(nValueReferences == nValues
+                            ? kf_get_real(common(instance), valueReferences, nValueReferences, values)
+                            : wrong_count(instance, nValueReferences, nValues));
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
-    const kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    return (fmi3Status)(answer == KF_DONE ? kf_set_real(common(instance), valueReferences, nValueReferences, values) : answer);
+    return (fmi3Status)(nValueReferences == nValues
+                            ? kf_set_real(common(instance), valueReferences, nValueReferences, values)
+                            : wrong_count(instance, nValueReferences, nValues));
 }
 
 /* solver.status and rates are enumerations, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */

@@ -26,7 +26,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     s->driven_by_time = kf_driven_by_time_start;
     s->rates = kf_rates_start;
     s->time = s->last_time = kf_start_time;
-    s->stop_time = INFINITY;
+    s->stop_time = DBL_MAX;
     s->mode = KF_INSTANTIATED;
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     for (k = 0; k < 3 * KF_DRIVERS; ++k) {
@@ -50,7 +50,7 @@ inline void kf_forget(kf_state *s)
     kf_forget_motion(s);
 }
 
-void kf_touch(kf_state *s)
+inline void kf_touch(kf_state *s)
 {
     if (!s->touched) {
         s->touched = true;
@@ -295,18 +295,28 @@ static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, d
     return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: a step needs finite numbers, not below 0", time, step);
 }
 
+/* Whether a step can be done that is, by rounding, not between the start and the stop time. */
+static KF_RARE bool is_all_but_inside(const kf_state *s, double time, double step)
+{
+    return s->mode == KF_STEPPING && isfinite(time + step) && step >= 0.0 && time >= s->start_time - SAME_TIME * step &&
+           !is_past_stop(s, time, step);
+}
+
 kf_answer kf_step(kf_instance *instance, double time, double step)
 {
     kf_state *const s = &instance->now;
     const double end = time + step;
-    kf_answer answer, done;
-    if (!(s->mode == KF_STEPPING && end - end == 0.0 && step >= 0.0 &&
-          (time >= s->start_time || time >= s->start_time - SAME_TIME * step)) ||
-        (end > s->stop_time && is_past_stop(s, time, step))) {
+    kf_answer answer = KF_DONE, done;
+    if (!(s->mode == KF_STEPPING && step >= 0.0 && time >= s->start_time && end <= s->stop_time) &&
+        !is_all_but_inside(s, time, step)) {
         return refuse_step(instance, time, step);
     }
-    answer = warn_of_inputs(instance);
-    done = s->driven_by_time ? step_by_time(instance, time, step) : step_by_inputs(instance, time, step);
+    if (s->driven_by_time) {
+        answer = warn_of_inputs(instance);
+        done = step_by_time(instance, time, step);
+    } else {
+        done = step_by_inputs(instance, time, step);
+    }
     if (done == KF_DONE) {
         s->failed = s->terminated = false;
         s->last_time = end;
@@ -340,7 +350,7 @@ kf_answer kf_set_experiment(kf_instance *instance, double start_time, bool has_s
         return kf_answered(instance, KF_ERROR, "the stop time %g s is not after the start time %g s", stop_time, start_time);
     }
     s->time = s->last_time = s->start_time = start_time;
-    s->stop_time = has_stop_time ? stop_time : INFINITY;
+    s->stop_time = has_stop_time ? fmin(stop_time, DBL_MAX) : DBL_MAX;
     kf_forget(s);
     return KF_DONE;
 }

@@ -29,6 +29,9 @@ typedef enum {
 /* Where the rate of a driver comes from: an estimate, its own input, a derivative given of the driver's value or speed. */
 typedef enum { KF_RATE_ESTIMATED, KF_RATE_INPUT, KF_RATE_OF_VALUE, KF_RATE_OF_SPEED } kf_rate_source;
 
+/* How many rates of the drivers are given, and not estimated. */
+typedef enum { KF_NO_RATES, KF_SOME_RATES, KF_ALL_RATES } kf_given_rates;
+
 /* A communication point and the driver values there. */
 typedef struct {
     double t;
@@ -61,6 +64,7 @@ typedef struct {
     bool stray_told;        /* the host was warned that time drives */
     bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
     unsigned char sources[3 * KF_DRIVERS]; /* kf_rate_source of each rate */
+    kf_given_rates given; /* how many of them are not estimated */
     bool moving;                /* derivatives of inputs were given for the next step */
     bool ended;                 /* the committed pose is the end of a step that followed derivatives of inputs */
     unsigned char orders[3 * KF_DRIVERS]; /* highest order of the derivatives given of each input, 0 if none */
@@ -71,7 +75,7 @@ typedef struct {
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
     bool failed, terminated;
     double failed_time, failed_step, last_time;
-    double start_time, stop_time; /* of the experiment; the stop time is infinite if none was given */
+    double start_time, stop_time; /* of the experiment; the stop time is DBL_MAX if none was given */
     kf_status held_status; /* discrete variables of model exchange, which stay between events */
     int held_iterations;
     char held_message[KF_MESSAGE];

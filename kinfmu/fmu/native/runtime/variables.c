@@ -146,10 +146,15 @@ static unsigned parts_of(kf_list *list, const unsigned *references, size_t count
 
 kf_answer kf_get_real(kf_instance *instance, const unsigned *references, size_t count, double *values)
 {
-    const double *const real = instance->now.real;
-    const unsigned parts = parts_of(&instance->list, references, count);
+    const double *real;
+    unsigned parts;
     kf_answer answer = KF_DONE;
     size_t k;
+    if (instance == NULL || references == NULL || values == NULL) {
+        return kf_check(instance, references, values, count);
+    }
+    real = instance->now.real;
+    parts = parts_of(&instance->list, references, count);
     if (parts & KF_NOT_REAL) {
         return get_unusual(instance, references, count, values);
     }
@@ -259,12 +264,22 @@ static void set_input(kf_state *s, unsigned k, double value)
     kf_touch(s);
 }
 
+/* Nothing is set: an array is NULL, or the instance is terminated. */
+static KF_RARE kf_answer set_nothing(const kf_instance *instance, const unsigned *references, size_t count,
+                                     const double *values)
+{
+    const kf_answer answer = kf_check(instance, references, values, count);
+    return answer == KF_DONE && instance->now.mode == KF_TERMINATED
+               ? kf_answered(instance, KF_ERROR, "nothing can be set after terminate")
+               : answer;
+}
+
 kf_answer kf_set_real(kf_instance *instance, const unsigned *references, size_t count, const double *values)
 {
     kf_state *const s = &instance->now;
     size_t k;
-    if (s->mode == KF_TERMINATED) {
-        return kf_answered(instance, KF_ERROR, "nothing can be set after terminate");
+    if (instance == NULL || references == NULL || values == NULL || s->mode == KF_TERMINATED) {
+        return set_nothing(instance, references, count, values);
     }
     for (k = 0; k < count; ++k) {
         const unsigned place = KF_PLACE(references[k]);
