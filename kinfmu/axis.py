@@ -19,7 +19,7 @@ _LARGE = 1e9  # [rad]; larger angles stay in radians
 
 
 class Samples(Protocol):
-    """What of a run its axis is known by; the fields as kinfmu.Run describes them."""
+    """The fields of a run that determine its axis, as kinfmu.Run describes them."""
 
     @property
     def axis(self) -> str: ...
@@ -109,7 +109,7 @@ def axis_of(run: Samples) -> Axis:
 def rates_per(run: Samples) -> str:
     """Return what the rates of a run are derivatives by: 'time', or 'angle' or 'length' of the driver on its axis.
 
-    They are derivatives by the driver where it has speed 1 and acceleration 0, and the others stand still.
+    They are derivatives by the driver where it has speed 1 and acceleration 0, and the others are at rest.
     """
     if run.axis not in run.input_names[::3]:
         return "time"
@@ -121,7 +121,7 @@ def rates_per(run: Samples) -> str:
 
 
 def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
-    """Return the axis of a run by inputs: the one value that changes, if it always goes one way, else the samples.
+    """Return the axis of a run by inputs: the one value that changes, if it is monotonic, else the samples.
 
     u: (n, d) values of the drivers; names: of these inputs, (d,).
     """
@@ -145,13 +145,13 @@ def _span(values: FloatArray) -> float:
 
 def _at_speeds(run: Samples) -> str:
     """'Rates are at the speed crank = 3 rad/s.': where each driver has one speed, else that they are at those given."""
-    told = []
+    shown = []
     for name in run.input_names[::3]:
         driver, kind = _driver(name)
         column = run.input_names.index(name) + 1
         speeds = run.inputs[:, column]
         if len(speeds) and math.isfinite(speeds[0]) and np.all(speeds == speeds[0]):
-            told.append(f"{driver} = {speeds[0]:.6g} {'rad' if kind == 'angle' else run.length_unit}/s")
-    if len(told) < len(run.input_names) // 3:
+            shown.append(f"{driver} = {speeds[0]:.6g} {'rad' if kind == 'angle' else run.length_unit}/s")
+    if len(shown) < len(run.input_names) // 3:
         return f"Rates are at the speeds given for {listed(_driver(name)[0] for name in run.input_names[::3])}."
-    return f"Rates are at the speed{'s' if len(told) > 1 else ''} {listed(told)}."
+    return f"Rates are at the speed{'s' if len(shown) > 1 else ''} {listed(shown)}."

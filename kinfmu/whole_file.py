@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: written beside the target under a hidden name, then renamed."""
+"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def write_whole(path: str | Path, data: bytes) -> None:
 
 @contextmanager
 def replacement(target: Path) -> Iterator[Path]:
-    """Give an empty file beside `target` that takes its place when the block ends without an error.
+    """Give an empty file next to `target` that takes its place when the block ends without an error.
 
     target: the file itself, no link to it. Raises an OSError if a file cannot be written or is being written to.
     """
     temporary = beside(target)
     try:
-        temporary.open("xb").close()  # not tempfile: its files are readable by nobody else
+        temporary.open("xb").close()  # not tempfile: its files are readable by their owner only
         yield temporary
         with _alone_in(target.parent):
             check_is_free(target)
@@ -85,7 +85,7 @@ def check_is_free(target: Path) -> None:
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """In this block no other process is in such a block for the same folder, unless one stays there for too long."""
+    """Lock a folder against other processes that replace files in it; after PATIENCE go on without the lock."""
     descriptor = -1
     if fcntl:
         with suppress(OSError):

@@ -29,7 +29,7 @@ _EDGE = 1e-6  # of the run's way; what lies nearer to its ends is not crossed
 
 
 def part_notes(mechanism: Mechanism) -> Iterator[str]:
-    """One line for each point that nothing uses, for joints in one place, for a link that is much too short, and for a
+    """Yield one line for each unused point, for joints in one place, for a link that is much too short, and for a
     step longer than the run.
     """
     yield from _unused_points(mechanism)
@@ -44,7 +44,7 @@ def part_notes(mechanism: Mechanism) -> Iterator[str]:
 
 
 def motion_notes(mechanism: Mechanism, ways: Sequence[Way], loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """One line on bodies that no driver moves, and one for each toggle position that the run crosses.
+    """Yield one line on bodies that no driver moves, and one for each toggle position that the run crosses.
 
     ways: of all drivers, one each.
     """
@@ -130,7 +130,7 @@ def _still_bodies(mechanism: Mechanism, ways: Sequence[Way]) -> Iterator[str]:
 
 
 def _welded(mechanism: Mechanism) -> set[str]:
-    """Bodies that welds hold on the ground."""
+    """Return the bodies that are welded to the ground."""
     found, count = {GROUND_NAME}, 0
     while len(found) > count:
         count = len(found)
@@ -159,8 +159,8 @@ def _toggles(mechanism: Mechanism, way: Way, loops: Sequence[NamedLoop]) -> Iter
                 if _sine(way, before, toggle) * _sine(way, after, toggle) < 0.0:
                     at = _within(way, _crossing(way, toggle, before, after), low)
                     if low + edge < at < high - edge:
-                        told = written(at, mechanism.length_unit, way.kind)
-                        yield f"the run crosses a toggle position: {toggle.happens} at {way.name} = {told}"
+                        value = written(at, mechanism.length_unit, way.kind)
+                        yield f"the run crosses a toggle position: {toggle.happens} at {way.name} = {value}"
 
 
 class _Toggle(NamedTuple):

@@ -34,8 +34,8 @@ _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
 _LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
 _SHORTEST = 1e-5  # the same; where steps get shorter a limit lies between
-_STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is not believed
-_TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: so far off lie branches
+_STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is rejected
+_TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: other branches are farther away
 _PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches beside a singular start pose are sought
 _NEARBY_STARTS = 6  # poses tried beside a start that does not close by a little
 _SPREAD = 0.3  # [rad, sizes]; how far they lie from the start pose
@@ -203,7 +203,7 @@ def _decided(system: System) -> tuple[StartValues, Assembled | None]:
     if len(system.coordinates) > MOST_DENSE or (found is not None and _is_reached(system, found, law)):
         return given, found
     if found is None and len(system.rows) > len(system.coordinates):
-        return given, None  # joints that contradict each other may close at single poses that are not meant
+        return given, None  # contradictory joints may close at isolated poses by chance
     moved = StartValues(_with_angles(system, given.q, law - given.u), law, is_followed=True, is_moved=True)
     there = _assembled(system, moved)
     return (moved, there) if there is not None and there.margin > SINGULAR else (given, found)
@@ -249,7 +249,7 @@ def _with_angles(system: System, q: FloatArray, change: FloatArray) -> FloatArra
 
 
 def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
-    """True if a straight way of the drivers leads from a pose to other driver values: no limit lies between."""
+    """True if a straight line of driver values leads from a pose to others: no limit lies between."""
     _, u = _followed(system, found.q, found.u, target)
     return np.array_equal(u, target)
 
@@ -257,7 +257,7 @@ def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
 def _followed(
     system: System, q: FloatArray, u: FloatArray, target: FloatArray, trust: float | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a pose followed on a straight way of the drivers to `target` or as far as it leads, and where that is.
+    """Return a pose followed along a straight line of driver values to `target`, or to its limit, and the values there.
 
     Steps are predicted to second order. trust: the margin over the largest correction of a prediction, so that no
     other branch is that near; None: any branch will do where branches cross.
@@ -349,7 +349,7 @@ def closes_beside(system: System, singular: Assembled) -> bool:
 
 
 def _beside(system: System, singular: Assembled, side: float) -> Assembled | None:
-    """Return the nearest closed pose on one side of a singular one, as far from it as there is one."""
+    """Return a closed pose on one side of a singular one, at the first distance of _PARTS that has one."""
     for part in _PARTS:
         u = singular.u + side * part * BESIDE * _reaches(system)
         near = next(iter(branches(system, singular.q, u)), None)
@@ -361,7 +361,7 @@ def _beside(system: System, singular: Assembled, side: float) -> Assembled | Non
 def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
     """Return the pose nearest to the start poses, a little beside them, from which the start is reached, if any.
 
-    Near a change point a rough pose may lie between the branches, where all rows are open by a little; with redundant
+    Near a change point a rough pose may lie between the branches, where no row closes by a small gap; with redundant
     rows poses near it are tried too.
     """
     rng = np.random.default_rng(1989)

@@ -34,11 +34,11 @@ def build(
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
-    path: a file that ends in .fmu or a folder; `<name>.fmu` here if nothing is said. flavour: 'native' (C, for all
+    path: a file that ends in .fmu or a folder; default: `<name>.fmu` here. flavour: 'native' (C, for all
     hosts) or 'python' (through pythonfmu, for hosts that are Python processes); default: native where a C compiler is
-    found, else python. drive: what drives at first, 'time' (the law in the file) or 'inputs'; if nothing is said time,
-    unless a driver's law is external. outputs: coordinates such as 'coupler.x' that the FMU shall have, all if nothing
-    is said; what no output needs is not solved. fmi: 2 or 3; the python flavour is FMI 2.0 only. platforms: of the
+    found, else python. drive: what drives at first, 'time' (the law in the file) or 'inputs'; default: time,
+    unless a driver's law is external. outputs: coordinates such as 'coupler.x' that the FMU has; default:
+    all; what no output needs is not solved. fmi: 2 or 3; the python flavour is FMI 2.0 only. platforms: of the
     native flavour, 'host' (by the system's compiler) or 'all' (by zig). progress: called with (platforms done,
     platforms in all) while they compile.
 

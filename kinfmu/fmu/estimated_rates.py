@@ -61,7 +61,7 @@ def estimated_rates(
 
 
 def _usable(rate: float) -> float:
-    """A rate beyond LARGEST, from samples that are all but at one time, is no estimate."""
+    """A rate beyond LARGEST, from samples at almost the same time, is no estimate."""
     return rate if -LARGEST <= rate <= LARGEST else 0.0
 
 
@@ -92,7 +92,7 @@ def errors_of_estimated_rates(
                 speed = UNSURE * abs(differences[3]) * h2 * h1
                 acceleration = 2.0 * UNSURE * abs(differences[3]) * (h2 + h1) + 4.0 * rounding / (h2 * h1)
             speed += 2.0 * rounding / h2
-        speeds.append(speed if speed < inf else inf)  # no numbers count as no knowledge
+        speeds.append(speed if speed < inf else inf)  # NaN counts as unknown
         accelerations.append(acceleration if acceleration < inf else inf)
     return tuple(speeds), tuple(accelerations)
 

@@ -483,7 +483,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self.log(self._refused[name], Fmi2Status.error)
 
     def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, *rest: Any, **more: Any) -> None:
-        """Log a text: in FMI 2.0 a message is a format, in which #r1# stands for a variable, so % and # are doubled."""
+        """Log a text: in FMI 2.0 a message is a format, in which #r1# is replaced by a variable, so double % and #."""
         super().log(msg.replace("%", "%%").replace("#", "##"), status, *rest, **more)
 
     def _report_defect(self, error: Exception) -> None:
@@ -559,7 +559,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return False
 
     def _no_step(self, current_time: float, step_size: float) -> str:
-        """Why a step is none, or nothing."""
+        """Return why a step is refused, or an empty text."""
         if not self._running:
             return "doStep before the end of initialization, or after terminate"
         if not (math.isfinite(current_time + step_size) and step_size >= 0.0):

@@ -255,7 +255,7 @@ def fmi2_callbacks(log: Log) -> Any:
 
     def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
         text = (message or b"").decode("utf-8", errors="replace")
-        log(status, text.replace("%%", "%").replace("##", "#"))  # a format, in which these stand for themselves
+        log(status, text.replace("%%", "%").replace("##", "#"))  # a format, in which % and # are doubled
 
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = fmi2CallbackLoggerTYPE(logger)

@@ -1,4 +1,4 @@
-"""FMUs of unknown origin, unpacked: what is damaged is one line, and what is too large is not unpacked at all."""
+"""FMUs of unknown origin, unpacked: damage is reported in one line, and what is too large is not unpacked."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _DAMAGED = (
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
-    """The FMU in a temporary folder, which is removed in the end.
+    """Unpack an FMU into a temporary folder, which is removed at the end.
 
     Raises an FmuError for a file that is no FMU, is damaged, or would take more room than LARGEST.
     """
@@ -53,7 +53,7 @@ def unpacked(path: Path) -> Iterator[Path]:
 
 
 def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) -> str:
-    """The text of a file of the FMU that was unpacked into `folder`.
+    """Return the text of a file of the FMU that was unpacked into `folder`.
 
     Raises an FmuError if there is none, it is too large, or it is not UTF-8.
     """

@@ -11,7 +11,7 @@ from kinfmu.run import Run
 
 MOST_EVENTS = 12  # the log holds them all
 _WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}
-_UNSHOWN = ("title", "token")  # the token tells FMUs apart for programs; the record holds it
+_UNSHOWN = ("title", "token")  # the token identifies FMUs for programs; the record holds it
 
 
 def card(run: Run, note: str = "") -> str:

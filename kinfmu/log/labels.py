@@ -24,7 +24,7 @@ def dots(scene: Scene) -> float:
 
 
 def places_below(scene: Scene) -> FloatArray:
-    """Where names of supports stand, (k, 2): below each, and further down where another would cover it."""
+    """Return where names of supports are written, (k, 2): below each, and further down where another would cover it."""
     depth = 1.7 * SUPPORT * scene.stroke
     line, placed = _LINE / dots(scene), list[FloatArray]()
     for at in scene.supports.values():

@@ -120,7 +120,7 @@ def _samples(
 ) -> tuple[list[NDArray[np.uint64]], str]:
     """Rows of samples, in blocks in the order of their numbers, and why there are no more; count: the most there are.
 
-    What the file says of their number bounds the memory: it ends there.
+    The count that the file states bounds the memory: reading ends there.
     """
     blocks: list[NDArray[np.uint64]] = []
     numbers: list[NDArray[np.uint32]] = []
@@ -164,7 +164,7 @@ def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
                 if event:
                     events.append(event)
     except (LogError, ValueError, IndexError, struct.error):
-        pass  # the samples say why the file ends there; what is no message of the log ends it, too
+        pass  # reading the samples reports why the file ends there; a damaged message ends the events too
     return tuple(events)
 
 

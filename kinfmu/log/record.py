@@ -102,7 +102,7 @@ def run_of(
 ) -> Run:
     """The run that was written; about: of `lists_in`; blocks: (k, columns) rows of `tables`.
 
-    Raises a LogError for samples whose status or time is none.
+    Raises a LogError for samples with an invalid status or time.
     """
     run = replace(
         _empty(about, sum(map(len, blocks))),

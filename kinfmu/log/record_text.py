@@ -1,4 +1,4 @@
-"""The texts of a record, read: a file of others may hold anything under a valid checksum."""
+"""Reading the texts of a record: a foreign file may hold anything under a valid checksum."""
 
 from __future__ import annotations
 

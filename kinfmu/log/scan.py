@@ -224,8 +224,8 @@ def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Block
         kind, length = _HEAD.unpack_from(view, at)
         count += 1
         if at + 9 + length > len(raw) or (kind == Opcode.MESSAGE and 9 + length < MESSAGE.itemsize) or count > most:
-            told = "too many records" if count > most else "a record goes beyond its end"
-            raise LogError(f"the chunk at byte {place} is damaged: {told}")
+            fault = "too many records" if count > most else "a record goes beyond its end"
+            raise LogError(f"the chunk at byte {place} is damaged: {fault}")
         if kind == Opcode.MESSAGE:
             record = raw[at : at + 9 + length].reshape(1, -1)
             if record[0, 9:11].view("<u2")[0] == channel:

@@ -104,7 +104,7 @@ def timeline_of(runs: Sequence[Run]) -> Timeline:
 
 
 def _decimals(values: FloatArray) -> int:
-    """How many decimals tell values apart."""
+    """Return how many decimals distinguish the values."""
     steps = np.abs(np.diff(values))
     least = float(steps[steps > 0.0].min(initial=math.inf))
     largest = float(np.max(np.abs(values), initial=0.0))

@@ -2,8 +2,8 @@
 
 A row that is redundant as a constraint may still be what keeps a mechanism regular: of two rods that couple two wheels,
 a quarter turn apart, each is in its dead centre where the other is not. Set aside, it would leave singular points that
-the mechanism has not. Such a row joins the block that it meets; where its combination of rows runs through several
-blocks, these become one block.
+the mechanism does not have. Such a row joins the block that it meets; where its combination of rows runs through
+several blocks, these become one block.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.redundancy import Redundancy
 
-_POSES = 64  # of the motion at which a block is looked at; with their steps once round and back
+_POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way
 _STEP = 0.2  # [rad, sizes]; between them
 _LOOKS = 3  # poses at which the combination of rows is seen that a redundant row is
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others, or weight in a combination, that counts as zero
@@ -102,7 +102,7 @@ def with_companions(
 def _combinations(system: System, redundancy: Redundancy, pose: FloatArray) -> dict[int, set[int]]:
     """Of each redundant row, the kept rows whose gradients give its own.
 
-    Kept rows are independent, so there is but one such combination, and none at a pose where they are singular.
+    Kept rows are independent, so there is only one such combination, and none at a pose where they are singular.
     """
     spare = [dependent.index for dependent in redundancy.redundant]
     found: dict[int, set[int]] = {index: set() for index in spare}
@@ -185,7 +185,7 @@ def _regular_only_with(
 ) -> bool:
     """True if blocks are singular somewhere on the motion where the same blocks with one more companion are regular.
 
-    Only the bodies that the blocks' joints join move, and all joints between them hold. Nothing is won where a block
+    Only the bodies that the blocks' joints join move, and all joints between them hold. There is no gain where a block
     before them is singular too.
     """
     rows = [row for block in joined for row in block.all_rows]
@@ -215,7 +215,7 @@ def _regular_only_with(
 
 
 def _motion(part: Part, q: FloatArray, rank: int, count: int) -> Iterator[FloatArray]:
-    """Poses along the motion that rows of a rank leave, from a closed one: one way, and the other where it ends.
+    """Yield poses along the motion that rows of a rank leave free: in one direction, then in the other.
 
     Random directions (seeded) where the motion has several freedoms. It ends where all rows together are singular.
     """

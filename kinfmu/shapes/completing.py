@@ -51,11 +51,11 @@ def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
     from kinfmu.continued import continued
 
     settings = (entry.partition(" = ") for entry in run.info.get("parameters", "").split(", "))  # of an FMU
-    told = {**run.info, **{name: value for name, _, value in settings}}
+    values = {**run.info, **{name: value for name, _, value in settings}}
     changed: dict[str, float | str] = {}
     for name, parameter in mechanism.parameters.items():
         try:
-            value = float(told[name])
+            value = float(values[name])
         except (KeyError, ValueError):
             continue
         if parameter.expression is None and value != float(parameter.value):
@@ -72,7 +72,7 @@ def _plan_of_text(text: str) -> SolvePlan:
 
 
 def _plan_of_all(mechanism: Mechanism) -> SolvePlan:
-    """The plan of a mechanism, kept, for records are drawn piece by piece."""
+    """Return the plan of a mechanism; it is cached, since records are drawn piece by piece."""
     from kinfmu.mechanism.toml_text import text
 
     return _plan_of_text(text(mechanism))
@@ -86,7 +86,7 @@ def _spread(column: FloatArray, rows: IntArray, count: int) -> FloatArray:
 
 
 def remedy(run: Run, names: Iterable[str]) -> str:
-    """Return what would bring missing coordinates into a run: how they were left out tells."""
+    """Return what would bring missing coordinates into a run: it depends on how they were left out."""
     if run.absent.intersection(names):
         return "keep them: --channels all, or q among its names"
     return "name them in [outputs] coordinates, or leave that out"

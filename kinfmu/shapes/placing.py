@@ -12,7 +12,7 @@ from kinfmu.shapes.completing import solved_again
 def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
     """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing.
 
-    Coordinates that are no outputs of the run are solved again, if its drivers' values tell them.
+    Coordinates that are no outputs of the run are solved again, if they follow from its drivers' values.
     """
     columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}

@@ -26,7 +26,7 @@ AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose a
 FINE = 1e-12  # [rad, sizes]; difference of two widths from which narrower ones win nothing
 STRAIGHT = 0.1  # change of a zero located anew, as a part of what is left to go: as little where there is a zero
 DAMPING = 1e-3  # of J dz = -r at a change point: its singular value is 0, the others are far above
-NOISE = 8.0  # roundings of what the rows leave open at the centre: less is no miss
+NOISE = 8.0  # roundings of the residual at the centre; a smaller residual is no miss
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
 
 Walk = Callable[[Pose, float], "Pose | None"]  # from a pose to a driver value, plainly
@@ -103,7 +103,7 @@ class Bridge:
     def _keeps_distances(self, values: Any) -> bool:
         """True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
 
-        Two points that pass each other at a distance d leave this row open by d^2.
+        Two points that pass each other at a distance d give this row a residual of d^2.
         """
         model = self.span.model
         for _, block, row, scale in model.DISTANCES if self.low < 0.0 < self.high else ():
@@ -115,8 +115,8 @@ class Bridge:
     def miss(self) -> float:
         """Return by how much lengths miss the change point, relative to the size; 0 within rounding.
 
-        That is what the rows leave open at the centre and no motion of the unknowns closes: of J dz = -r, damped, the
-        part outside the columns of J.
+        That is the residual at the centre that no change of the unknowns removes: of J dz = -r, damped, the part
+        outside the columns of J.
         """
         if self._miss is None:
             model = self.span.model
@@ -135,8 +135,8 @@ class Bridge:
     def missed(self, pose: Pose, slope: float) -> tuple[float, float, float]:
         """Return what the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
 
-        Where lengths miss a change point by m, branches that cross part: by sqrt(m) at the crossing, by m / x at x
-        beside it. Their determinant falls straight to 0 there, so it tells x better than the window's centre.
+        Where lengths miss a change point by m, crossing branches separate: by sqrt(m) at the crossing, by m / x at
+        the distance x from it. Their determinant is linear in x, so it gives x more exactly than the window's centre.
 
         Args:
             pose: Interpolated by the bridge.

@@ -110,9 +110,9 @@ def _bridged(model: Model, pose: Pose, ud: Vector, rates: Rates) -> list[tuple[P
 
 
 def _is_singular_between(pose: Pose, there: Found) -> bool:
-    """True if a determinant changes by half of its size to a pose that this one cannot be told from.
+    """Return whether a determinant changes by half of its size to a pose that rounding cannot distinguish.
 
-    As near to a singular point its rates have no bound.
+    So close to a singular point the rates have no bound.
     """
     held = held_blocks(pose)
     pairs = enumerate(zip(pose.determinants, there[1], strict=True))
@@ -275,7 +275,7 @@ def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[float]:
 
 
 def _softest_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
-    """The same for 2 x 2, where the inverse is at hand: its columns (d p, -c p) and (-b q, a q)."""
+    """The same for 2 x 2, with the inverse written out: its columns (d p, -c p) and (-b q, a q)."""
     (a, b), (c, d) = matrix
     det = a * d - b * c
     p, q = rows[0] / det, rows[1] / det

@@ -138,7 +138,7 @@ def _reflect(reflector: list[float], square: float, column: list[float]) -> None
 
 
 def orientation(a: Matrix, b: Matrix) -> float:
-    """det(A^T B) of two tall matrices over the lengths of its rows: negative if their columns turn the other way."""
+    """det(A^T B) of two tall matrices over the lengths of its rows: negative if their orientations differ."""
     columns = list(zip(*b, strict=True))
     product = [[sum(map(mul, one, other)) for other in columns] for one in zip(*a, strict=True)]
     try:

@@ -1,10 +1,10 @@
 """Compiled libraries on disk: a private folder whose files are checked before they are used.
 
-A library is stored as KEY-DIGEST.so: KEY stands for what was compiled, DIGEST is the SHA-256 of the file. A file that
+A library is stored as KEY-DIGEST.so: KEY identifies what was compiled, DIGEST is the SHA-256 of the file. A file that
 does not match its name, or that another user could have written, is removed and compiled again.
 
 Writing is atomic and synced: a process that is killed, or a full disk, leaves no library that is cut short. Processes
-that store the same library at once replace one another's file, whose content the name fixes.
+that store the same library at once replace each other's file; the content is the same, since the name holds its digest.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def _make_private(folder: Path) -> None:
 
 
 def _is_intact(path: Path, digest: str) -> bool:
-    """Whether a file is a regular one of this user that nobody else can write, with this SHA-256."""
+    """Return whether a file is a regular one with this SHA-256 that only this user can write."""
     try:
         descriptor = os.open(path, _OPEN)
     except OSError:

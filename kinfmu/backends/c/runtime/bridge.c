@@ -7,7 +7,7 @@
 #define FINE 1e-12     /* [rad, sizes]; difference of two widths from which narrower ones win nothing */
 #define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: less where there is one */
 #define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
-#define NOISE 8.0      /* roundings of what the rows leave open at the centre: less is no miss */
+#define NOISE 8.0      /* roundings of the residual at the centre; a smaller residual is no miss */
 #define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
 
 /* True inside the window, where the bridge is used. */
@@ -122,7 +122,7 @@ static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *fo
 
 /* True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
  *
- * Two points that pass each other at a distance d leave this row open by d^2.
+ * Two points that pass each other at a distance d give this row a residual of d^2.
  */
 static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, const kf_found *found)
 {
@@ -152,8 +152,8 @@ static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
 
 /* By how much lengths miss the change point, relative to the size; 0 within rounding.
  *
- * That is what the rows leave open at the centre and no motion of the unknowns closes: of J dz = -r, damped, the part
- * outside the columns of J.
+ * That is the residual at the centre that no change of the unknowns removes: of J dz = -r, damped, the part outside the
+ * columns of J.
  */
 static double miss(kf_solver *solver, const kf_bridge *bridge)
 {
@@ -184,9 +184,9 @@ static double miss(kf_solver *solver, const kf_bridge *bridge)
 
 /* What the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
  *
- * Where lengths miss a change point by m, branches that cross part: by sqrt(m) at the crossing, by m / x at x beside
- * it. Their determinant falls straight to 0 there, so it tells x better than the window's centre. slope: of the
- * steepest unknown.
+ * Where lengths miss a change point by m, crossing branches separate: by sqrt(m) at the crossing, by m / x at the distance
+ * x from it. Their determinant is linear in x, so it gives x more exactly than the window's centre. slope: of the steepest
+ * unknown.
  */
 void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3])
 {

@@ -244,9 +244,9 @@ static double largest_gap(const double *there, const double *here)
     return largest;
 }
 
-/* True if a determinant changes by half of its size to a pose that this one cannot be told from.
+/* True if a determinant changes by half of its size to a pose that rounding cannot distinguish.
  *
- * As near to a singular point its rates have no bound.
+ * So close to a singular point the rates have no bound.
  */
 static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const bool *held)
 {
@@ -260,7 +260,7 @@ static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const
     return false;
 }
 
-/* The squares of what all sources move the outputs by; false if nothing is known. lost: set where rates are not. */
+/* Squares of the changes of the outputs by all sources; false if unknown. lost: set if rates are unknown. */
 static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_driven *drive,
                   double squares[3], bool *lost)
 {

@@ -263,7 +263,7 @@ double kf_unclosed(int m, int k, const double *matrix, const double *right, doub
     return largest;
 }
 
-/* det(A^T B) of two tall matrices over the lengths of its rows: negative if their columns turn the other way. */
+/* det(A^T B) of two tall matrices over the lengths of its rows: negative if their orientations differ. */
 double kf_orientation(int m, int k, const double *a, const double *b)
 {
     double product[KF_ROOM(KF_LARGEST_BLOCK)], factors[3 * KF_ROOM(KF_LARGEST_BLOCK)], determinant;

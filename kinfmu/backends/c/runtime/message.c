@@ -21,7 +21,7 @@ void kf_say(char *message, const char *format, ...)
 void kf_say_number(char *message, const char *format, double value)
 {
     char *written = message + strlen(message);
-    kf_say(message, format, value == value ? value : fabs(value)); /* NaN may have a sign, which says nothing */
+    kf_say(message, format, value == value ? value : fabs(value)); /* a NaN is printed without its sign */
     for (; *written != '\0'; ++written) {
         if (*written == ',') {
             *written = '.';

@@ -49,7 +49,7 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 #define KF_AT(model, value, room) (value)
 #endif
 #define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
-#define KF_TOLD(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages tell of; -1: all */
+#define KF_TOLD(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages name; -1: all */
 #define KF_ALONG(solver) KF_ALONG_OF(&(solver)->model)
 #define KF_HERE(solver, pose) (KF_POSE_U(pose)[KF_ALONG(solver)])
 #define KF_MAP(solver) (&(solver)->maps[KF_ALONG(solver)])

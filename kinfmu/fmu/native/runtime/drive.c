@@ -12,7 +12,7 @@
 
 #define UNSURE 2.0 /* what one term more says may change by this much over the step */
 
-/* A rate beyond KF_LARGEST, from samples that are all but at one time, is no estimate. */
+/* A rate beyond KF_LARGEST, from samples at almost the same time, is no estimate. */
 static double usable(double rate)
 {
     return fabs(rate) <= KF_LARGEST ? rate : 0.0;
@@ -82,7 +82,7 @@ void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t,
                 of_udd[k] = 2.0 * UNSURE * fabs(leading[3]) * (e2 + e1 + ahead) + 4.0 * rounding / (h2 * h1);
             }
             of_ud[k] += 2.0 * rounding / h2 * (1.0 + 2.0 * ahead / h1);
-            of_ud[k] = of_ud[k] < INFINITY ? of_ud[k] : INFINITY; /* no numbers count as no knowledge */
+            of_ud[k] = of_ud[k] < INFINITY ? of_ud[k] : INFINITY; /* NaN counts as unknown */
             of_udd[k] = of_udd[k] < INFINITY ? of_udd[k] : INFINITY;
         }
     }
@@ -173,7 +173,7 @@ static void by_inputs(const kf_state *s, const double *inputs, double t, const d
 }
 
 /* The end of a step that followed derivatives of inputs: they move to its end, and the rates there are found. Rates that are
- * not given follow the parabola through the last samples: the inputs at the end are extrapolated and tell nothing new.
+ * not given follow the parabola through the last samples: the inputs at the end are extrapolated and add no information.
  */
 void kf_end_of_step(kf_state *s, double step)
 {
@@ -209,7 +209,7 @@ static void ended_drive(const kf_state *s, double *u, double *ud, double *udd)
     memcpy(udd, s->ended_udd, sizeof s->ended_udd);
 }
 
-/* u, ud, udd by the laws at time t; where rates are beyond KF_LARGEST, u is no number, and no pose belongs to it. */
+/* u, ud, udd by the laws at time t; where rates are beyond KF_LARGEST, u is NaN, which has no pose. */
 void kf_law(const kf_state *s, double t, double *u, double *ud, double *udd)
 {
     int k;

@@ -13,7 +13,7 @@ typedef struct {
     fmi2ComponentEnvironment environment;
 } instance2;
 
-/* In FMI 2.0 a message is a format, in which `#r1#` stands for a variable: text has its % and # twice. */
+/* In FMI 2.0 a message is a format, in which `#r1#` is replaced by a variable: % and # of the text are doubled. */
 static void tell(const void *host, kf_answer answer, const char *category, const char *message)
 {
     const instance2 *const instance = host;

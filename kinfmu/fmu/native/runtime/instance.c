@@ -279,7 +279,7 @@ static KF_RARE kf_answer past_stop(const kf_instance *instance, const char *func
                        function, time, step, instance->now.stop_time);
 }
 
-/* Why a step is none. */
+/* Refuse a step and log the reason. */
 static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, double step)
 {
     const kf_state *const s = &instance->now;

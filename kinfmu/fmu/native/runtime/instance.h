@@ -40,7 +40,7 @@ typedef struct {
 
 /* Everything that a result depends on, and what is known of it: plain data, so that the state of an FMU is a copy of it.
  *
- * `real` holds the Real variables by their place in the list; a bit of `known` says that those of a part are up to date.
+ * `real` holds the Real variables by their place in the list; a bit of `known` is set if those of a part are up to date.
  */
 typedef struct {
     kf_pose poses[2];
@@ -104,7 +104,7 @@ typedef struct {
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 
-#define KF_LONGEST (KF_MESSAGE + 120) /* bytes of a message with what is said about it */
+#define KF_LONGEST (KF_MESSAGE + 120) /* bytes of a message with its context */
 
 /* Messages: `kf_answered` formats one, hands it to the host and returns `answer`. */
 extern const char *const kf_categories[3];
