@@ -98,7 +98,7 @@ static bool is_polished(const bool *held, const kf_found *found)
     return false;
 }
 
-/* Go on near a singular pose until the residual no longer falls; the pose stays as it is where that wins nothing. */
+/* Go on near a singular pose until the residual no longer falls; keep the pose if the residual does not fall. */
 static KF_RARE void polish(const kf_model *model, const bool *held, kf_found *found)
 {
     kf_found before;
