@@ -92,8 +92,9 @@ def solve(
         times, driven, axis = _column("t", t), None, TIME
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
     if driven is None:
-        driven = chosen.drive(times, tuple(constants.values()))
-    _refuse_huge(plan, driven)
+        driven = _with_values(chosen.drive(times, tuple(constants.values())))
+    else:
+        _refuse_huge(plan, driven)
     run = _swept(plan, chosen, times, driven, out, constants).replaced(axis=axis)
     if anew_note and len(times):
         run = run.replaced(events=(Event(float(times[0]), "info", anew_note), *run.events))
@@ -206,6 +207,13 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
         given = [columns.get(driver.inputs[order], np.array([default])) for driver in plan.drivers]
         tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
     return np.arange(n, dtype=float), *tables
+
+
+def _with_values(driven: Driven) -> Driven:
+    """Return what laws drive; NaN where a law has no value, or has rates whose squares no float holds."""
+    u, ud, udd = driven
+    has_value = (np.abs(ud) <= LARGEST_RATE) & (np.abs(udd) <= LARGEST_RATE)
+    return driven if has_value.all() else (np.where(has_value, u, np.nan), ud, udd)
 
 
 def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:

@@ -206,15 +206,19 @@ def test_a_rack_never_comes_back_and_has_no_limit() -> None:
 def test_a_run_past_the_range_is_noted() -> None:
     swinging = fourbar(4.0, 3.0, 1.5, 1.0, start=0.2)
     report = kinfmu.check(replace(swinging, run=RunSettings(0.0, 2.0, 0.1)))
+    toggle = (
+        "the run crosses a toggle position: crank, coupler fall in line at crank = 0.204480199 rad (11.7158524 deg)"
+    )
     assert report.notes == (
         "[run] takes crank from 0.2 rad (11.4591559 deg) to 2.2 rad (126.050715 deg): beyond the range",
+        toggle,
     )
-    assert kinfmu.check(replace(swinging, run=RunSettings(0.0, 0.4, 0.1))).notes == ()
+    assert kinfmu.check(replace(swinging, run=RunSettings(0.0, 0.4, 0.1))).notes == (toggle,)
 
 
 def test_a_run_of_several_drivers_that_stops_is_noted_with_its_time() -> None:
     stretched = replace(five_bar_arm(), run=RunSettings(0.0, 40.0, 0.1))
     (note,) = kinfmu.check(stretched).notes
     assert note.startswith("[run] at t = ")
-    assert "cannot be reached: the limit is" in note
+    assert "cannot be reached: to these digits it is the limit" in note
     assert kinfmu.check(replace(five_bar(), run=RunSettings(0.0, 0.5, 0.1))).notes == ()
