@@ -79,7 +79,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Native]:
 def said_by_native(native: Native, limit: float, asked: float) -> str:
     text = ctypes.create_string_buffer(480)
     found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
-    native.c.kf_say_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked))
+    native.c.kf_say_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked), -1)
     return text.value.decode()
 
 
