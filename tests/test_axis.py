@@ -165,5 +165,5 @@ def test_a_part_of_a_sweep_is_chosen_by_its_driver(sweep: Run, start: str | None
 def test_a_part_that_a_sweep_has_not_is_refused(sweep: Run) -> None:
     from kinfmu.cli.export import _between
 
-    with pytest.raises(RequestError, match=r"no samples from 720 to inf deg; its samples: crank = 0 to 360 deg"):
+    with pytest.raises(RequestError, match=r"no samples from 720 deg on; its samples: crank = 0 to 360 deg"):
         _between(sweep, "720deg", None)
