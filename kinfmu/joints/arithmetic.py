@@ -75,19 +75,45 @@ def without_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Valu
     whole: Value = 0.0
     small: Value = 0.0
     for part in period:
-        total = whole + part
-        back = total - whole
-        small = small + ((whole - (total - back)) + (part - back))
-        whole = total
+        whole, left = _exact_sum(whole, part)
+        small = small + left
     times = floor((x - begin) / whole)
-    product = times * whole
-    (n, n_small), (p, p_small) = _halves(times), _halves(whole)
-    rounded = ((n * p - product) + n * p_small + n_small * p) + n_small * p_small
-    return times, (x - product) - rounded - times * small
+    product, left = _exact_product(times, whole)
+    return times, (x - product) - left - times * small
+
+
+def sine_of_line(slope: Value, x: Value, intercept: Value) -> Value:
+    """Return sin(slope x + intercept), exact after thousands of turns.
+
+        sin(p + e) = sin p + e cos p,   p: the rounded phase, e: what rounding leaves of it, |e| <= eps |p|
+
+    Args:
+        slope: Angle per unit of x.
+        x: Argument.
+        intercept: Angle at x = 0 [rad].
+
+    """
+    product, left = _exact_product(slope, x)
+    phase, left_too = _exact_sum(product, intercept)
+    return sin(phase) + cos(phase) * (left + left_too)
+
+
+def _exact_sum(a: Value, b: Value) -> tuple[Value, Value]:
+    """Return a + b, rounded, and what rounding leaves of it (Knuth)."""
+    total = a + b
+    back = total - a
+    return total, (a - (total - back)) + (b - back)
+
+
+def _exact_product(a: Value, b: Value) -> tuple[Value, Value]:
+    """Return a b, rounded, and what rounding leaves of it (Dekker)."""
+    product = a * b
+    (high, low), (high_too, low_too) = _halves(a), _halves(b)
+    return product, ((high * high_too - product) + high * low_too + low * high_too) + low * low_too
 
 
 def _halves(x: Value) -> tuple[Value, Value]:
-    """Two numbers of 26 bits whose sum is x (Dekker): products of such halves are exact."""
+    """Return two numbers of 26 bits whose sum is x (Dekker): products of such halves are exact."""
     scaled = 134217729.0 * x  # 2^27 + 1
     high = scaled - (scaled - x)
     return high, x - high

@@ -68,6 +68,8 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
         r = model.REACH[0]
         v = abs(ud[0]) / r
         speed, curve = speed * r * v, curve * r * r * v * v + speed * r * (abs(udd[0]) / r)
+    _, qd, qdd = _differences(model, here, (0.0,) * len(here))
+    speed, curve = max(speed, qd), max(curve, qdd)
     least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
     squares, lost = [0.0, 0.0, 0.0], False
     try:

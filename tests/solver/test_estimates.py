@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import Run
+from kinfmu import Body, Point, Run
 from kinfmu.solver import Pose, Solver, Status
 from tests.error_estimates import FAMILIES, ORDERS, Number, measured, told
 from tests.mechanisms import fourbar as fourbar_of_bars
@@ -65,6 +66,34 @@ def test_they_grow_with_the_speed_and_with_its_square() -> None:
     mechanism = kinfmu.load("crank_rocker")
     slow, fast = (kinfmu.solve(mechanism, crank_angle=[2.0], crank_speed=speed) for speed in (1.0, 1000.0))
     np.testing.assert_allclose(fast.error / slow.error, [[1.0, 1e3, 1e6]], rtol=0.01)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("ratio", [7.3, -3.7])
+def test_rates_of_gears_are_estimated_by_their_own_size(engine: str, ratio: float) -> None:
+    """A train that only speeds up: its last gear turns up to ratio^2 times as fast as the driver."""
+    names = ["first", "second", "third"]
+    ground = Body("ground", {name: Point(float(k), 0.0) for k, name in enumerate(names)})
+    mechanism = kinfmu.Mechanism(
+        "train",
+        (ground, *(Body(name, {"O": Point(0.0, 0.0)}) for name in names)),
+        (
+            *(kinfmu.Revolute(f"pin_{name}", (f"ground.{name}", f"{name}.O")) for name in names),
+            kinfmu.Gear("low", ("first", "second"), ratio),
+            kinfmu.Gear("high", ("second", "third"), ratio),
+        ),
+        (kinfmu.AngleDriver("motor", "first"),),
+    )
+    rng = np.random.default_rng(7)
+    u, v, a = rng.uniform(-3.0, 3.0, (3, 200))
+    run = kinfmu.solve(mechanism, engine=engine, motor_angle=u, motor_speed=v, motor_acceleration=a)
+    exact = [[Fraction(ratio) ** 2 * Fraction(x) for x in column.tolist()] for column in (u, v, a)]
+    found = [run["third.phi"], run["third.omega"], run["third.alpha"]]
+    for order in range(3):
+        errors = [abs(float(Fraction(x) - true)) for x, true in zip(found[order].tolist(), exact[order], strict=True)]
+        assert max(errors) > 0.0
+        assert (errors <= run.error[:, order]).all()
+        assert (run.error[:, order] <= 1e-13).all()
 
 
 def test_nothing_is_estimated_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value, sin
+from kinfmu.joints.arithmetic import Value, sine_of_line
 from kinfmu.joints.laws.law import NEARLY, Frequency, Law, Led, Phase
 
 
@@ -25,7 +25,7 @@ class Harmonic(Law):
     phase: Phase = 0.0
 
     def target(self, x: Value, **constants: Value) -> Value:
-        return constants["start"] + constants["amplitude"] * sin(constants["frequency"] * x + constants["phase"])
+        return constants["start"] + constants["amplitude"] * sine_of_line(constants["frequency"], x, constants["phase"])
 
     def why_no_turn(self) -> str:
         if abs(self.frequency - round(self.frequency)) <= NEARLY:

@@ -341,6 +341,7 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     bool lost = false;
     double squares[3] = {0.0, 0.0, 0.0}, largest = 0.0, speed = drive.speed, curve = drive.curve;
     const double *const outputs = solver->scratch.rows[0][0];
+    const double zeros[KF_ROOM(KF_OUTPUTS)] = {0.0};
     int k;
     if (KF_DRIVERS == 1) {
         const double r = kf_reach[KF_ALONG(solver)], v = fabs(ud[0]) / r, a = fabs(udd[0]) / r;
@@ -354,6 +355,8 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     for (k = 0; k < KF_OUTPUTS; ++k) {
         largest = kf_output_is_angle[k] ? fmax(largest, fabs(outputs[k])) : largest;
     }
+    speed = fmax(speed, largest_gap(solver->scratch.rows[0][1], zeros));
+    curve = fmax(curve, largest_gap(solver->scratch.rows[0][2], zeros));
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
