@@ -40,6 +40,8 @@ _PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches beside a si
 _NEARBY_STARTS = 6  # poses tried beside a start that does not close by a little
 _SPREAD = 0.3  # [rad, sizes]; how far they lie from the start pose
 _NEARLY = 0.01  # residual of a pose that may close beside the start
+_LESS = 0.5  # of the margin at the start of a way: what follows leads toward a limit
+_DOUBLED = 8.0  # times the correction, where a step to second order is twice as long
 _CORRECTION = 0.02  # [rad, sizes]; a prediction that is corrected by more may have left the branch
 _SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
 _RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
@@ -260,31 +262,38 @@ def _followed(
     """Return a pose followed along a straight line of driver values to `target`, or to its limit, and the values there.
 
     Steps are predicted to second order. trust: the margin over the largest correction of a prediction, so that no
-    other branch is that near; None: any branch will do where branches cross.
+    other branch is that near, and the end is where the margin has halved; None: any branch will do where branches
+    cross.
     """
+    whole, scales = Part(system), system.column_scales
     way, at_rest = target - u, np.zeros(len(target))
     length = float(np.abs(way / _reaches(system)).max())
     shortest = _SHORTEST if trust is None else _ROUNDED
     done, step = 0.0, min(1.0, _LONGEST / length)
-    here = margin(system, q) if trust else 0.0
+    here = first = there = margin(system, q) if trust else 0.0
     while done < 1.0 and step * length >= shortest:
         step = min(step, 1.0 - done)
         ahead = target if step == 1.0 - done else u + step * way
-        jacobian = system.jacobian(q)
-        qd = np.linalg.lstsq(jacobian, system.nu(q, u, step * way), rcond=_RANK)[0]
-        qdd = np.linalg.lstsq(jacobian, system.gamma(q, qd, u, step * way, at_rest), rcond=_RANK)[0]
+        jacobian = whole.jacobian(q)
+        qd = scales * np.linalg.lstsq(jacobian, system.nu(q, u, step * way) / whole.row_scales, rcond=_RANK)[0]
+        gamma = system.gamma(q, qd, u, step * way, at_rest)
+        qdd = scales * np.linalg.lstsq(jacobian, gamma / whole.row_scales, rcond=_RANK)[0]
         predicted = q + qd + 0.5 * qdd
         corrected, allowed = np.inf, _CORRECTION
-        if np.abs((predicted - q) / system.column_scales).max() <= _LONGEST * _STEEPEST:
-            trial, gap = close(system, predicted, ahead)
+        if np.abs((predicted - q) / scales).max() <= _LONGEST * _STEEPEST:
+            trial, gap = close(whole, predicted, ahead)
             if gap <= CLOSED:
-                corrected = float(np.abs((trial - predicted) / system.column_scales).max())
-                there = margin(system, trial) if trust else 0.0
+                corrected = float(np.abs((trial - predicted) / scales).max())
+                there = margin(system, trial) if trust else there
                 allowed = min(allowed, here / trust, there / trust) if trust else allowed
-        if corrected <= allowed:
-            q, u, here, done, step = trial, ahead, there, done + step, 2.0 * step
-        else:
+        if corrected > allowed:
             step /= 2.0
+            continue
+        q, u, here, done = trial, ahead, there, done + step
+        if here < _LESS * first:
+            break
+        if _DOUBLED * corrected <= allowed:
+            step *= 2.0
     return q, u
 
 
