@@ -18,11 +18,11 @@ class Interruption:
     """
 
     def __init__(self) -> None:
-        self._came: list[int] = []
+        self.came: list[int] = []  # signals, in order
         self._before: dict[int, Any] = {}
 
     def __bool__(self) -> bool:
-        return bool(self._came)
+        return bool(self.came)
 
     def __enter__(self) -> Interruption:
         if threading.current_thread() is threading.main_thread():
@@ -41,10 +41,10 @@ class Interruption:
         self._before = {}
 
     def _note(self, number: int, _frame: Any) -> None:
-        self._came.append(number)
+        self.came.append(number)
 
     def deliver(self) -> None:
         """Do now what SIGTERM or SIGHUP do, if one came: end the process, as a rule."""
-        for number in self._came:
+        for number in self.came:
             if number in ENDING:
                 signal.raise_signal(number)

@@ -1,9 +1,14 @@
-"""FMI functions that get or set the same variables in every step, called with arguments that are built once."""
+"""C functions of an FMU that are called in every step, with arguments that are built once.
+
+fmpy's own methods build arrays and lists in every call, which takes longer than a step of a native FMU. So does the
+conversion of Python numbers that ctypes does by declared types: numbers of C are changed in place here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from ctypes import CFUNCTYPE, c_int, c_size_t, c_uint, c_void_p
+from ctypes import CFUNCTYPE, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
@@ -14,33 +19,60 @@ WARNING = 1  # fmi2Warning and fmi3Warning; a greater status is a failure
 class RowCall:
     """Gets variables into a row of a table, or sets them to its values: `call(row)`.
 
-    It calls the C function with the address of the row. fmpy's own methods build two arrays and a list in every call,
-    which takes longer than a step of a native FMU.
+    Args:
+        fmu: Instance, of fmpy.
+        function: Name of the C function, such as "fmi2GetReal".
+        references: The k value references.
+        rows: (n, k) table of the function's type, each row without gaps.
+        has_value_count: True for FMI 3.0, whose functions take the number of values, too.
 
-    fmu: the instance, of fmpy; function: name of the C function, such as "fmi2GetReal"; references: the k value
-    references; rows: (n, k) table of the function's type, each row without gaps; has_value_count: True for FMI 3.0,
-    whose functions take the number of values, too.
     """
 
-    __slots__ = ("_base", "_count", "_function", "_instance", "_more", "_name", "_references", "_rows", "_stride")
+    __slots__ = ("_address", "_base", "_function", "_name", "_rows", "_stride")
 
     def __init__(
         self, fmu: Any, function: str, references: Sequence[int], rows: NDArray[Any], *, has_value_count: bool
     ) -> None:
-        self._instance = fmu.component
         self._name = function
-        types = [c_void_p, c_void_p, c_size_t, c_void_p, *([c_size_t] if has_value_count else [])]
-        self._function = CFUNCTYPE(c_int, *types)((function, fmu.dll))
-        count = len(references)
-        self._count, self._more = count, (count,) if has_value_count else ()
-        self._references = (c_uint * count)(*references)
+        count = c_size_t(len(references))
+        self._address = c_void_p()
+        variables = (c_uint * len(references))(*references)
+        more = (count,) if has_value_count else ()
+        self._function = function_of(fmu, function, variables, count, self._address, *more)
         self._rows, self._base, self._stride = rows, rows.ctypes.data, rows.strides[0]
 
     def __call__(self, row: int) -> None:
         """Get or set; raises fmpy's FMICallException for a status above Warning."""
-        address = self._base + row * self._stride
-        status = self._function(self._instance, self._references, self._count, address, *self._more)
+        self._address.value = self._base + row * self._stride
+        status = self._function()
         if status > WARNING:
             from fmpy.fmi1 import FMICallException
 
             raise FMICallException(function=self._name, status=status)
+
+
+class StepCall:
+    """Steps an FMU: `call(time, step)` returns the status of its DoStep.
+
+    Args:
+        fmu: Instance, of fmpy.
+        function: Name of the C function, such as "fmi2DoStep".
+        more: Its arguments after time and step, values of ctypes.
+
+    """
+
+    __slots__ = ("_function", "_step", "_time", "name")
+
+    def __init__(self, fmu: Any, function: str, *more: Any) -> None:
+        self.name = function
+        self._time, self._step = c_double(), c_double()
+        self._function = function_of(fmu, function, self._time, self._step, *more)
+
+    def __call__(self, time: float, step: float) -> int:
+        self._time.value, self._step.value = time, step
+        return self._function()
+
+
+def function_of(fmu: Any, name: str, *arguments: Any) -> partial[int]:
+    """Return a C function of an FMU with its arguments, values of ctypes, of which the first is the instance."""
+    return partial(CFUNCTYPE(c_int)((name, fmu.dll)), c_void_p.from_param(fmu.component), *arguments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -44,6 +45,7 @@ class Samples:
         self._reals = np.empty((0, self._ends[-1]))  # the columns that are asked for
         self._t = np.empty(self._most)
         self._status, self._iterations = np.empty((2, self._most), np.int64)
+        self._columns = self._t.data, self._status.data, self._iterations.data  # which numbers enter faster
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()
@@ -64,7 +66,8 @@ class Samples:
         self._estimates: BlockEstimates | None = None  # where the FMU is not asked for those of samples of status ok
         self._with_estimates = 0  # samples that have them
         self._piece = 1  # samples that the sink gets at once
-        self._last_time = 0.0  # when it got some, by the clock
+        self._full_at = self._most + 1  # number of samples from which it gets them
+        self._due = inf  # when it gets what there is, by the clock
 
     def log(self, status: int, text: str) -> None:
         """A message of the FMU becomes an event at the current time."""
@@ -119,7 +122,7 @@ class Samples:
         self._sink = sink
         if sink is not None:
             self._piece = max(FEWEST, PIECE // (8 * (len(asked) + 3)))
-            self._last_time = perf_counter()
+            self._full_at, self._due = self._piece, perf_counter() + PERIOD
             sink.begin(self._run(slice(0, 0)))
 
     def _known_estimates(
@@ -153,22 +156,19 @@ class Samples:
             if self._drivers:
                 self._reals[row, self._drivers] = slave.get(self._references_of_drivers)
         elif not is_kept:
-            self._pass_on_what_is_due()
+            if perf_counter() > self._due:
+                self._pass_on()
             return True
         elif self._read:
             self._read(row)
             if status and self._estimates:
                 self._read_estimates(row)
-        self._t[row], self._status[row], self._iterations[row] = t, status, iterations
-        self._size = row + 1
-        self._pass_on_what_is_due()
-        return good
-
-    def _pass_on_what_is_due(self) -> None:
-        """The sink gets a piece when there is one, and what there is when PERIOD has passed."""
-        waiting = self._size - self._passed_on
-        if self._sink is not None and (waiting >= self._piece or perf_counter() - self._last_time > PERIOD):
+        times, all_status, all_iterations = self._columns
+        times[row], all_status[row], all_iterations[row] = t, status, iterations
+        self._size = row = row + 1
+        if row >= self._full_at or perf_counter() > self._due:
             self._pass_on()
+        return good
 
     def end(self, reason: str = "") -> Run:
         """All rows as a Run; reason: why it ended by an error."""
@@ -191,7 +191,8 @@ class Samples:
         if sink is not None and (events or rows.start < rows.stop):
             sink.add(self._run(rows, events))
         self._sink = sink
-        self._last_time = perf_counter()
+        if sink is not None:
+            self._full_at, self._due = self._size + self._piece, perf_counter() + PERIOD
 
     def _run(self, rows: slice, events: tuple[Event, ...] = ()) -> Run:
         reals, iterations = self._reals[rows], self._iterations[rows].copy()

@@ -109,7 +109,7 @@ def simulate(
                     samples.begin(one, channels, sink, estimates)
                     try:
                         driven = [] if table is None else [one.references[name] for name in table.names]
-                        _step_through(one, samples, t, kept, driven, rows, progress, interrupted)
+                        _step_through(one, samples, t, kept, driven, rows, progress, interrupted.came)
                     except BaseException as failure:
                         samples.end(str(failure) or type(failure).__name__)
                         raise
@@ -255,11 +255,11 @@ def _step_through(
     inputs: list[int],
     rows: NDArray[np.float64],
     progress: Callable[[int, int], None] | None,
-    interrupted: Interruption,
+    signals: list[int],
 ) -> None:
     """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step.
 
-    kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values.
+    kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values; signals: those that end the run.
     """
     kept_at = np.zeros(len(t), bool)
     kept_at[kept] = True
@@ -268,12 +268,12 @@ def _step_through(
     set_inputs = slave.setter(inputs, rows) if inputs else None
     for k, time in enumerate(times):
         samples.now = time
-        if k and interrupted:
+        if signals and k:
             samples.log(ERROR, f"at t = {time:g} s: interrupted; the run ends here")
             return
         if set_inputs:
             set_inputs(k)
-        good = samples.read(time, slave, is_kept=bool(is_kept[k]))
+        good = samples.read(time, slave, is_kept=is_kept[k])
         if progress is not None:
             progress(k + 1, len(t))
         if not good:

@@ -6,7 +6,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import CFUNCTYPE, c_bool, c_double, c_int, c_void_p
+from ctypes import c_bool, c_double, c_int
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import FmuError, MissingPackageError
 from kinfmu.fmu.description import Description
-from kinfmu.fmu.row_call import WARNING, RowCall
+from kinfmu.fmu.row_call import WARNING, RowCall, StepCall
 
 DISCARD = 2  # fmi2Discard and fmi3Discard
 Log = Callable[[int, str], None]  # status and text of a message
@@ -28,8 +28,7 @@ class Slave(ABC):
     """
 
     fmpy: Any
-    _do_step: Any  # the C function
-    _step_end: tuple[Any, ...]  # its arguments after time and step
+    _do_step: StepCall
 
     def __init__(self, about: Description) -> None:
         self.references = about.interface.value_references()
@@ -73,14 +72,14 @@ class Slave(ABC):
 
     def step(self, time: float, step: float) -> bool:
         """DoStep; False if it is Discard. Every other failure is an FmuError."""
-        status = self._do_step(self.fmpy.component, time, step, *self._step_end)
+        status = self._do_step(time, step)
         if status <= WARNING:
             return True
         if status == DISCARD:
             return False
         from fmpy.fmi1 import FMICallException
 
-        raise FmuError(f"at t = {time:g} s: {FMICallException(function=self._do_step.__name__, status=status)}")
+        raise FmuError(f"at t = {time:g} s: {FMICallException(function=self._do_step.name, status=status)}")
 
 
 class Slave2(Slave):
@@ -97,12 +96,11 @@ class Slave2(Slave):
             unzipDirectory=str(folder),
         )
         self._instantiate(folder, fmi2_callbacks(log))
-        self._do_step = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)(("fmi2DoStep", self.fmpy.dll))
-        self._step_end = (1,)  # the state before is not needed
+        self._do_step = StepCall(self.fmpy, "fmi2DoStep", c_int(1))  # the state before is not needed
         found = np.zeros((1, 2), np.int32)
         counts = [self.references[name] for name in ("solver.status", "solver.iterations")]
         self._read_counts = RowCall(self.fmpy, "fmi2GetInteger", counts, found, has_value_count=False)
-        self._found = found[0]
+        self._found = found[0].data
 
     def _instantiate(self, folder: Path, callbacks: Any) -> None:
         """What fmpy's `instantiate` does, with the resources' address unquoted.
@@ -146,8 +144,7 @@ class Slave2(Slave):
 
     def counts(self) -> tuple[int, int]:
         self._read_counts(0)
-        status, iterations = self._found.tolist()
-        return status, iterations
+        return self._found[0], self._found[1]
 
     def message(self) -> str:
         return str(self.fmpy.getString(self._message)[0].decode())
@@ -171,15 +168,15 @@ class Slave3(Slave):
             log(status, (message or b"").decode("utf-8", errors="replace"))
 
         self.fmpy.instantiate(loggingOn=True, logMessage=logger)
-        types = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
-        self._do_step = CFUNCTYPE(c_int, *types)(("fmi3DoStep", self.fmpy.dll))
-        self._step_end = (True, *((c_bool * 1)() for _ in range(3)), (c_double * 1)())  # flags and the time reached
-        self._status, self._iterations = np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int32)
+        found = *((c_bool * 1)() for _ in range(3)), (c_double * 1)()  # flags and the time reached
+        self._do_step = StepCall(self.fmpy, "fmi3DoStep", c_bool(True), *found)
+        status, iterations = np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int32)
+        self._found = status[0].data, iterations[0].data
         self._read_status, self._read_iterations = (
             RowCall(self.fmpy, function, [self.references[name]], found, has_value_count=True)
             for function, name, found in (
-                ("fmi3GetInt64", "solver.status", self._status),
-                ("fmi3GetInt32", "solver.iterations", self._iterations),
+                ("fmi3GetInt64", "solver.status", status),
+                ("fmi3GetInt32", "solver.iterations", iterations),
             )
         )
 
@@ -205,7 +202,8 @@ class Slave3(Slave):
     def counts(self) -> tuple[int, int]:
         self._read_status(0)
         self._read_iterations(0)
-        return self._status.item(), self._iterations.item()
+        status, iterations = self._found
+        return status[0], iterations[0]
 
     def message(self) -> str:
         return str(self.fmpy.getString(self._message)[0])
