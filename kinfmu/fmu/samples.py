@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,8 @@ class Samples:
         self._reals = np.empty((0, self._ends[-1]))  # the columns that are asked for
         self._t = np.empty(self._most)
         self._status, self._iterations = np.empty((2, self._most), np.int64)
-        self._columns = self._t.data, self._status.data, self._iterations.data  # which numbers enter faster
+        columns: list[Any] = [self._t.data, self._status.data, self._iterations.data]  # which numbers enter faster
+        self._columns = columns
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()

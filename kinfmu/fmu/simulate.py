@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -263,7 +263,8 @@ def _step_through(
     """
     kept_at = np.zeros(len(t), bool)
     kept_at[kept] = True
-    is_kept, times = kept_at.data, t.data  # items of a memoryview are Python's own numbers, which is faster
+    is_kept: Any = kept_at.data
+    times = t.data  # items of a memoryview are Python's own numbers, which is faster
     last = len(t) - 1
     set_inputs = slave.setter(inputs, rows) if inputs else None
     for k, time in enumerate(times):
