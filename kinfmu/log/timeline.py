@@ -90,14 +90,14 @@ def timeline_of(runs: Sequence[Run]) -> Timeline:
     axes = [axis_of(run) for run in runs]
     if len({(axis.name, axis.unit) for axis in axes}) > 1:
         raise LogError(
-            f"the runs are over {' and '.join(axis.label for axis in axes)}: they can be compared over the same alone"
+            f"the runs are over {' and '.join(axis.label for axis in axes)}; runs over the same axis can be compared"
         )
     first = axes[0]
     if first.is_time:
         return Timeline("sim_time")
     for axis in axes:
         if float(np.max(np.abs(axis.values), initial=0.0)) > _MOST:
-            raise LogError(f"values of {axis.label} beyond {_MOST:.3g} cannot be placed in a recording")
+            raise LogError(f"{axis.label}: a recording holds values of at most {_MOST:.10g}")
     decimals = max(_decimals(axis.values) for axis in axes) if first.unit else 0
     part = f"{10.0**-decimals:.{decimals}f}"
     return Timeline(first.label.replace("[", f"[{part} ") if decimals else first.label, 10**decimals)

@@ -199,6 +199,17 @@ def test_a_folder_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     assert library.exists()
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="POSIX users")
+def test_a_folder_that_stays_open_to_others_is_refused(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a file system that keeps no permissions."""
+    library = compiler.shared_library(SEVEN)
+    cache.chmod(0o777)
+    monkeypatch.setattr(type(cache), "chmod", lambda *_: None)
+    with pytest.raises(CompilerError, match=rf"from '{cache}': others can write in it; set KINFMU_CACHE to a folder"):
+        compiler.shared_library(SEVEN)
+    assert library.exists()
+
+
 @pytest.mark.usefixtures("cache")
 def test_a_library_that_the_system_does_not_load_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(path: str) -> ctypes.CDLL:

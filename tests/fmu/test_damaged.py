@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import re
 import struct
 import zipfile
 from collections.abc import Callable
@@ -186,6 +187,13 @@ def test_a_damaged_description_is_one_line(whole: bytes, tmp_path: Path, case: s
     text = content_of(whole, DESCRIPTION)
     assert change(text) != text
     assert words in told(with_file(whole, DESCRIPTION, change(text).encode()), tmp_path)
+
+
+def test_a_watch_of_another_name_is_one_line(tmp_path: Path) -> None:
+    fmu = kinfmu.build(kinfmu.load("fourbar"), tmp_path / "whole.fmu", flavour="python").read_bytes()
+    text = content_of(fmu, DESCRIPTION).replace('"watch.', '"clock.')
+    line = told(with_file(fmu, DESCRIPTION, text.encode()), tmp_path)
+    assert re.search(r"'clock\.[\w.]+' is no name of a watch such as 'watch.rod.length'$", line)
 
 
 def test_a_description_of_millions_of_tags_is_not_read(whole: bytes, tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def _check_motion(interface: Interface) -> None:
         raise FmuError("part driven does not hold the inputs, three for each driver")
     for name in _names(interface.part("watch")):
         if not name.startswith("watch."):
-            raise FmuError(f"{quoted(name)} is no watch")
+            raise FmuError(f"{quoted(name)} is no name of a watch such as 'watch.rod.length'")
 
 
 def _names(variables: Sequence[Variable]) -> list[str]:
