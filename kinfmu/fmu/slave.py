@@ -563,7 +563,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if not self._running:
             return "doStep before the end of initialization, or after terminate"
         if not (math.isfinite(current_time + step_size) and step_size >= 0.0):
-            return f"doStep from t = {current_time:g} s by {step_size:g} s: time and step must be finite, the step at least 0"
+            return f"doStep from t = {current_time:g} s by {step_size:g} s: they must be finite, the step at least 0"
         if current_time < self._start_time - SAME_TIME * step_size:
             return f"doStep from t = {current_time!r} s: that is before the start at {self._start_time!r} s"
         if current_time + step_size - self._stop_time > LATE * step_size + ROUNDING * abs(self._stop_time):

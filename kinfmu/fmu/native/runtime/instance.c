@@ -292,7 +292,7 @@ static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, d
                                                          "doStep from t = %.17g s: that is before the start at %.17g s", time,
                                                          s->start_time);
     }
-    return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: time and step must be finite, the step at least 0", time, step);
+    return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: they must be finite, the step at least 0", time, step);
 }
 
 /* Whether a step can be done that is, by rounding, not between the start and the stop time. */
