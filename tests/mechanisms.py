@@ -19,11 +19,11 @@ def reference_fourbar(bar: float = 1.0, start_degrees: float = 60.0) -> Mechanis
     return parse(written.replace("x = 1.5, y = 0.866", f"x = {1 + math.cos(start)!r}, y = {math.sin(start)!r}"))
 
 
-def tight_jaw() -> Mechanism:
-    """The gallery's gripper with its rods' pins turned on: branches cross 0.25 mm before the dead centre."""
+def tight_jaw(pin: tuple[float, float] = (-6.05, 19.06)) -> Mechanism:
+    """The gallery's gripper with its rods' pins elsewhere: branches cross 0.25 mm before the dead centre."""
     written = text(load("parallel_jaw"))
-    for mirrored in ("", "-"):
-        written = written.replace(f"rod = [0.0, {mirrored}20.0]", f"rod = [-6.05, {mirrored}19.06]")
+    for side, mirrored in (("", 1.0), ("-", -1.0)):
+        written = written.replace(f"rod = [0.0, {side}20.0]", f"rod = [{pin[0]!r}, {mirrored * pin[1]!r}]")
     return parse(written)
 
 

@@ -12,6 +12,9 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, gallery
 from kinfmu.equations.assembly import assemble, in_order, start_targets
 from kinfmu.equations.system import System
+from kinfmu.errors import AmbiguousStartError
+from kinfmu.plan import compile_plan
+from tests.mechanisms import fourbar as fourbar_of_bars
 from tests.stress.families import STARTS_ANYWHERE
 from tests.stress.trial import trial
 
@@ -189,3 +192,19 @@ def test_rough_starts_near_change_points_are_assembled(seed: int) -> None:
     assembled = assemble(System(one.drawn.mechanism))
     assert assembled is not None
     assert assembled.margin > 1e-6
+
+
+@pytest.mark.parametrize("miss", [1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3])
+@pytest.mark.parametrize(("bars", "angle"), [((2, 1, 2, 1), 0.0), ((4, 1, 3, 2), math.pi), ((3, 3, 2, 2), 0.0)])
+def test_a_start_that_misses_a_change_point_is_assembled_or_said_to_be_ambiguous(
+    bars: tuple[int, ...], angle: float, miss: float
+) -> None:
+    for side in (1.0, -1.0):
+        mechanism = fourbar_of_bars(*map(float, bars), start=angle + side * miss)
+        try:
+            (u,) = compile_plan(mechanism).anchor.u
+        except AmbiguousStartError as error:
+            assert miss <= 1e-6
+            assert "and 2 branches leave it: at crank = " in str(error)
+        else:
+            assert abs(u - angle - side * miss) <= 0.1001

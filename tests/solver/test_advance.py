@@ -115,6 +115,15 @@ def test_a_crossing_too_near_a_dead_centre_is_a_limit_and_no_way_to_the_other_br
     assert re.search(r"the limit is piston = 54\.2863\d* mm, where branches of \w+\.phi cross$", run.events[0].text)
 
 
+@pytest.mark.parametrize("degrees", [24.5, 24.6, 24.61, 24.618])
+def test_a_crossing_without_room_for_a_bridge_is_reported_as_one(degrees: float) -> None:
+    """The crossing comes as close as 3e-8 mm to the dead centre, where the rods and the cranks are in line."""
+    turn = math.radians(degrees)
+    run = kinfmu.solve(tight_jaw((-20.0 * math.sin(turn), 20.0 * math.cos(turn))), piston_position=[50.0, 56.0])
+    assert run.status.tolist() == [Status.OK, Status.OUTSIDE]
+    assert re.search(r"the limit is piston = 54\.5\d* mm, where branches of \w+\.phi cross$", run.events[0].text)
+
+
 def test_prediction_far_off_does_not_land_a_turn_away() -> None:
     # beside a limit the rod turns ever faster than the crank: one long step back once took it round
     mechanism = slider_crank(1.78, 1.086, -0.796, start=0.11)
