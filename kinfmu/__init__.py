@@ -43,24 +43,24 @@ if TYPE_CHECKING:
     from kinfmu.joints import RelativeAngle as RelativeAngle
     from kinfmu.joints import Revolute as Revolute
     from kinfmu.joints import Translational as Translational
-    from kinfmu.joints.laws import ConstantSpeed as ConstantSpeed
-    from kinfmu.joints.laws import Cycloidal as Cycloidal
-    from kinfmu.joints.laws import External as External
-    from kinfmu.joints.laws import Harmonic as Harmonic
-    from kinfmu.joints.laws import ModifiedSine as ModifiedSine
-    from kinfmu.joints.laws import ModifiedTrapezoid as ModifiedTrapezoid
-    from kinfmu.joints.laws import MotionSequence as MotionSequence
-    from kinfmu.joints.laws import Polynomial as Polynomial
-    from kinfmu.joints.laws import Polynomial345 as Polynomial345
-    from kinfmu.joints.laws import Polynomial4567 as Polynomial4567
-    from kinfmu.joints.laws import Segment as Segment
-    from kinfmu.joints.laws import SimpleHarmonic as SimpleHarmonic
-    from kinfmu.joints.laws import Spline as Spline
-    from kinfmu.joints.measures import AngleBetween as AngleBetween
-    from kinfmu.joints.measures import CoordinateOf as CoordinateOf
-    from kinfmu.joints.measures import DistanceBetween as DistanceBetween
-    from kinfmu.joints.measures import OffsetFrom as OffsetFrom
-    from kinfmu.joints.measures import PositionAlong as PositionAlong
+    from kinfmu.laws import ConstantSpeed as ConstantSpeed
+    from kinfmu.laws import Cycloidal as Cycloidal
+    from kinfmu.laws import External as External
+    from kinfmu.laws import Harmonic as Harmonic
+    from kinfmu.laws import ModifiedSine as ModifiedSine
+    from kinfmu.laws import ModifiedTrapezoid as ModifiedTrapezoid
+    from kinfmu.laws import MotionSequence as MotionSequence
+    from kinfmu.laws import Polynomial as Polynomial
+    from kinfmu.laws import Polynomial345 as Polynomial345
+    from kinfmu.laws import Polynomial4567 as Polynomial4567
+    from kinfmu.laws import Segment as Segment
+    from kinfmu.laws import SimpleHarmonic as SimpleHarmonic
+    from kinfmu.laws import Spline as Spline
+    from kinfmu.measures import AngleBetween as AngleBetween
+    from kinfmu.measures import CoordinateOf as CoordinateOf
+    from kinfmu.measures import DistanceBetween as DistanceBetween
+    from kinfmu.measures import OffsetFrom as OffsetFrom
+    from kinfmu.measures import PositionAlong as PositionAlong
     from kinfmu.mechanism import Body as Body
     from kinfmu.mechanism import Mechanism as Mechanism
     from kinfmu.mechanism import Parameter as Parameter
@@ -68,8 +68,8 @@ if TYPE_CHECKING:
     from kinfmu.mechanism import RunSettings as RunSettings
     from kinfmu.mechanism import Start as Start
     from kinfmu.run import Run as Run
-    from kinfmu.sink import Sink as Sink
-    from kinfmu.solver.status import Status as Status
+    from kinfmu.run import Sink as Sink
+    from kinfmu.solver.python.status import Status as Status
     from kinfmu.sweep import solve as solve
 
 VERSION = "0.1.0"
@@ -77,38 +77,38 @@ __version__ = VERSION
 
 _HOME = {
     "Angle": "kinfmu.joints",
-    "AngleBetween": "kinfmu.joints.measures",
+    "AngleBetween": "kinfmu.measures",
     "AngleDriver": "kinfmu.drivers",
     "Body": "kinfmu.mechanism",
     "CamOscillating": "kinfmu.joints",
     "CamRoller": "kinfmu.joints",
     "CamTranslating": "kinfmu.joints",
-    "ConstantSpeed": "kinfmu.joints.laws",
+    "ConstantSpeed": "kinfmu.laws",
     "Coordinate": "kinfmu.joints",
     "CoordinateDriver": "kinfmu.drivers",
-    "CoordinateOf": "kinfmu.joints.measures",
+    "CoordinateOf": "kinfmu.measures",
     "Coupling": "kinfmu.joints",
-    "Cycloidal": "kinfmu.joints.laws",
+    "Cycloidal": "kinfmu.laws",
     "Distance": "kinfmu.joints",
-    "DistanceBetween": "kinfmu.joints.measures",
+    "DistanceBetween": "kinfmu.measures",
     "DistanceDriver": "kinfmu.drivers",
-    "External": "kinfmu.joints.laws",
+    "External": "kinfmu.laws",
     "Fixed": "kinfmu.joints",
     "Gear": "kinfmu.joints",
-    "Harmonic": "kinfmu.joints.laws",
+    "Harmonic": "kinfmu.laws",
     "KinfmuError": "kinfmu.errors",
     "Mechanism": "kinfmu.mechanism",
-    "ModifiedSine": "kinfmu.joints.laws",
-    "ModifiedTrapezoid": "kinfmu.joints.laws",
-    "MotionSequence": "kinfmu.joints.laws",
-    "OffsetFrom": "kinfmu.joints.measures",
+    "ModifiedSine": "kinfmu.laws",
+    "ModifiedTrapezoid": "kinfmu.laws",
+    "MotionSequence": "kinfmu.laws",
+    "OffsetFrom": "kinfmu.measures",
     "Parameter": "kinfmu.mechanism",
     "Point": "kinfmu.mechanism",
     "PointOnLine": "kinfmu.joints",
-    "Polynomial": "kinfmu.joints.laws",
-    "Polynomial345": "kinfmu.joints.laws",
-    "Polynomial4567": "kinfmu.joints.laws",
-    "PositionAlong": "kinfmu.joints.measures",
+    "Polynomial": "kinfmu.laws",
+    "Polynomial345": "kinfmu.laws",
+    "Polynomial4567": "kinfmu.laws",
+    "PositionAlong": "kinfmu.measures",
     "RackAndPinion": "kinfmu.joints",
     "RelativeAngle": "kinfmu.joints",
     "RelativeAngleDriver": "kinfmu.drivers",
@@ -116,13 +116,13 @@ _HOME = {
     "Revolute": "kinfmu.joints",
     "Run": "kinfmu.run",
     "RunSettings": "kinfmu.mechanism",
-    "Segment": "kinfmu.joints.laws",
-    "SimpleHarmonic": "kinfmu.joints.laws",
-    "Sink": "kinfmu.sink",
+    "Segment": "kinfmu.laws",
+    "SimpleHarmonic": "kinfmu.laws",
+    "Sink": "kinfmu.run",
     "SlideDriver": "kinfmu.drivers",
-    "Spline": "kinfmu.joints.laws",
+    "Spline": "kinfmu.laws",
     "Start": "kinfmu.mechanism",
-    "Status": "kinfmu.solver.status",
+    "Status": "kinfmu.solver.python.status",
     "Translational": "kinfmu.joints",
     "build": "kinfmu.fmu",
     "check": "kinfmu.analysis",

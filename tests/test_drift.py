@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism, Run
-from kinfmu.solver import Status
+from kinfmu.solver.python import Status
 from tests import oracle
 from tests.mechanisms import fourbar
 from tests.oracle import mp

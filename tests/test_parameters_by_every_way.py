@@ -13,8 +13,8 @@ import pytest
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute
 from kinfmu.analysis import check
-from kinfmu.continued import continued
 from kinfmu.errors import FmuError, KinfmuError
+from kinfmu.sweep.continued import continued
 
 LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
 SPREAD = 0.6  # of the logarithm of a length

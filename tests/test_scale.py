@@ -13,7 +13,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Distance, Mechanism, Revolute, Run, Translational, gallery
 from kinfmu.errors import InconsistentError
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Status
+from kinfmu.solver.python import Status
 from tests import oracle
 from tests.oracle import Motion, largest_error, mp
 from tests.scaled import scaled

@@ -12,7 +12,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Mechanism, Run
-from kinfmu.solver import Status
+from kinfmu.solver.python import Status
 from tests.mechanisms import fourbar, reference_fourbar
 
 LOCKED_AT_90_DEGREES = (4.0, 3.0, 2.5, 2.5)

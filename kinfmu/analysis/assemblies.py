@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.analysis.written import degrees, written
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
 from kinfmu.equations.assembly import CLOSED, SINGULAR, Assembled, assemble, close, start_targets
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed

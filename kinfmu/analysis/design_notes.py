@@ -15,10 +15,10 @@ from kinfmu.analysis.written import written
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
-from kinfmu.joints.placement import body_of
+from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.solver import Pose
+from kinfmu.solver.python import Pose
 
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
 _STILL = 1e-9  # [rad, sizes] that a body which does not move goes at most

@@ -11,12 +11,12 @@ import numpy as np
 from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
 from kinfmu.equations.assembly import motion_samples, null_space, rough_start
 from kinfmu.equations.part import Part
+from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import KinfmuError, MobilityError, listed
 from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
-from kinfmu.redundancy import Redundancy
 
 _SAMPLES = 4  # poses of the motion that the joints leave; a row that depends at all of them depends
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero

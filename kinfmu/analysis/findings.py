@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinfmu.analysis.loops import FourBar
 from kinfmu.analysis.singular import DriverRange, LimitPosition
-from kinfmu.redundancy import DependentRow
+from kinfmu.equations.redundancy import DependentRow
 
 if TYPE_CHECKING:
     from kinfmu.analysis.drivers import DriverAdvice

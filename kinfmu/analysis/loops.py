@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from kinfmu.equations.system import size_of
 from kinfmu.joints import Angle, Coordinate, Distance, PointOnLine, Revolute, Translational
-from kinfmu.joints.placement import body_of
+from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 

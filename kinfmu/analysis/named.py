@@ -10,8 +10,8 @@ from kinfmu.analysis.loops import FourBar, SliderCrank, named_loops
 from kinfmu.analysis.transmission import TransmissionAngle, is_led_by_last, transmission_angle
 from kinfmu.analysis.way import Way
 from kinfmu.drivers import AngleDriver
+from kinfmu.equations.redundancy import Redundancy
 from kinfmu.mechanism import Mechanism
-from kinfmu.redundancy import Redundancy
 
 _MOST = 200  # coordinates of a mechanism whose transmission angles are followed, loop by loop
 

@@ -12,10 +12,10 @@ from kinfmu.analysis.matrices import Matrix, moving_jacobian
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.written import written
 from kinfmu.equations.assembly import assemble, close
+from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import listed
 from kinfmu.plan import SolvePlan, localized
-from kinfmu.redundancy import Redundancy
 from kinfmu.sweep import solve
 
 SMALL_TURN = math.radians(1.0)  # [rad]; what restores the rank at a singular point

@@ -18,12 +18,12 @@ from kinfmu.analysis.singular import DriverRange, SingularPoint, driver_range
 from kinfmu.analysis.start_notes import start_notes
 from kinfmu.analysis.text import lines
 from kinfmu.analysis.way import follow
+from kinfmu.equations.redundancy import DependentRow, Redundancy, find_redundancy
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, KinfmuError
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import refuse_other
 from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
-from kinfmu.redundancy import DependentRow, Redundancy, find_redundancy
 
 
 @dataclass(frozen=True)

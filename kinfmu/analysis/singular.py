@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 from kinfmu.analysis.limits import parting
 from kinfmu.analysis.way import Way
-from kinfmu.solver import Pose
-from kinfmu.solver.advance import NO_BLOCK, Limit
-from kinfmu.solver.bridge import Bridge
+from kinfmu.solver.python import Pose
+from kinfmu.solver.python.advance import NO_BLOCK, Limit
+from kinfmu.solver.python.bridge import Bridge
 
 
 @dataclass(frozen=True)

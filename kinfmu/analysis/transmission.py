@@ -11,7 +11,7 @@ from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.way import Way
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan
-from kinfmu.solver import Pose
+from kinfmu.solver.python import Pose
 
 POOR = math.radians(40.0)  # [rad]; the usual bound below which forces and clearances are felt
 LOCKED = math.radians(1e-4)  # [rad]; below which it is 0 but for rounding: the angle is an arc cosine

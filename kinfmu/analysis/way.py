@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 from kinfmu.analysis.held import alone
-from kinfmu.backends.python import load_model
-from kinfmu.joints.measures import DistanceBetween
+from kinfmu.codegen.python import load_model
+from kinfmu.measures import DistanceBetween
 from kinfmu.plan import SolvePlan
-from kinfmu.solver import Pose, Solver
-from kinfmu.solver.advance import NO_BLOCK, Limit, advance
-from kinfmu.solver.bridge import Bridge
+from kinfmu.solver.python import Pose, Solver
+from kinfmu.solver.python.advance import NO_BLOCK, Limit, advance
+from kinfmu.solver.python.bridge import Bridge
 
 STEP = 0.1  # [rad, sizes] between looks at the determinants
 MOST_TURNS = 12  # after which a mechanism that has not come back to its start is left: gears of odd ratios

@@ -10,15 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from kinfmu import gallery
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
+from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.system import System
 from kinfmu.mechanism import Mechanism
 from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.redundancy import find_redundancy
 from kinfmu.run import FloatArray
-from kinfmu.solver import Pose, Solver
-from kinfmu.solver.pose import Vector
+from kinfmu.solver.python import Pose, Solver
+from kinfmu.solver.python.pose import Vector
 from kinfmu.sweep import run_times
 
 STEPS_BETWEEN = 5  # steps of a sweep from one sample of the reference to the next

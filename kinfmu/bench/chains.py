@@ -7,12 +7,12 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 
-from kinfmu.backends.python import load_model
 from kinfmu.bench.rounds import samples_in_turn
-from kinfmu.chains import fourbar_chain, open_chain
+from kinfmu.codegen.python import load_model
+from kinfmu.gallery.chains import fourbar_chain, open_chain
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Solver
+from kinfmu.solver.python import Solver
 
 LOOPS = (1, 10, 100, 1000)
 ROUNDS = 15

@@ -1,4 +1,4 @@
-"""A four-bar in 80 digits, also where its branches cross: the oracle of the bench there. Needs mpmath.
+"""Four-bars in closed form: the reference one, and in 80 digits one whose branches cross. Those need mpmath.
 
     P = a (cos u, sin u),   d = (g, 0) - P,   Q - P = e d + h d_turned_left
     e = (b^2 - c^2 + d.d) / (2 d.d),   h^2 = b^2 / d.d - e^2
@@ -17,6 +17,17 @@ from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
 
 DIGITS = 80  # 1e-16 from a change point two thirds of them are lost
+
+
+def closed_form(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """q, qd, qdd of the reference four-bar, (n, 5): phi2 = 0, phi3 = phi1, x2 = 1 + cos phi1, y2 = sin phi1."""
+    w = np.pi / 180.0
+    phi, none = w * t, np.zeros_like(t)
+    cos, sin = np.cos(phi), np.sin(phi)
+    q = np.stack([phi, 1.0 + cos, sin, none, phi], axis=1)
+    qd = np.stack([none + w, -w * sin, w * cos, none, none + w], axis=1)
+    qdd = np.stack([none, -w * w * cos, -w * w * sin, none, none], axis=1)
+    return q, qd, qdd
 
 
 def exact_fourbar(ground: int, crank: int, coupler: int, rocker: int, u: float) -> FloatArray:

@@ -24,7 +24,7 @@ from kinfmu.log import read, write_mcap, write_rrd
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.mcap_file import sample_template
 from kinfmu.log.record import layout, tables
-from kinfmu.log.thinned import MOST_ROWS
+from kinfmu.log.viewer.decimated import MOST_ROWS
 from kinfmu.run import Run
 from kinfmu.sweep import solve
 

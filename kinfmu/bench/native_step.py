@@ -12,8 +12,8 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
-from kinfmu.backends.c import compiler
 from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.build import build
 from kinfmu.fmu.native.archive import OPTIMIZED

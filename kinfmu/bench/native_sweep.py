@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.backends.c import compiler
-from kinfmu.backends.c.library import FLAGS, Library
 from kinfmu.bench.rounds import in_turn, spread
-from kinfmu.chains import fourbar_chain
+from kinfmu.codegen.c import compiler
 from kinfmu.errors import MissingPackageError
 from kinfmu.gallery import load
+from kinfmu.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.sweep import solve
+from kinfmu.sweep.library import FLAGS, Library
 
 ROUNDS = 9
 SAMPLES = 360_000  # a thousand turns by one degree

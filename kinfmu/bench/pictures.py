@@ -8,12 +8,12 @@ from pathlib import Path
 
 from kinfmu import gallery
 from kinfmu.bench.accuracy import Measured
+from kinfmu.bench.near_singular import Passage, Row, near_singular
 from kinfmu.bench.singular import DISTANCES, Near
+from kinfmu.bench.work_precision import Curve, Panel, work_precision
 from kinfmu.draw.chart import Look
-from kinfmu.draw.near_singular import Passage, Row, near_singular
-from kinfmu.draw.work_precision import Curve, Panel, work_precision
 from kinfmu.plan import compile_plan
-from kinfmu.shapes.palette import BODIES, GROUND, darker
+from kinfmu.scene.palette import BODIES, GROUND, darker
 
 WORK_PRECISION, NEAR_SINGULAR = "accuracy-work-precision", "accuracy-singular"
 ROWS = 2  # of the chart of singular points; the table has them all

@@ -7,15 +7,15 @@ from time import process_time
 
 import numpy as np
 
-from kinfmu.backends.python import load_model
+from kinfmu.bench.exact_fourbar import closed_form
 from kinfmu.bench.rounds import in_turn, spread
-from kinfmu.demo import closed_form
+from kinfmu.codegen.python import load_model
+from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.reference import solve_reference
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.gallery import load
 from kinfmu.plan import compile_plan
-from kinfmu.redundancy import find_redundancy
-from kinfmu.solver import Solver
+from kinfmu.solver.python import Solver
 from kinfmu.sweep import solve
 
 ROUNDS = 9

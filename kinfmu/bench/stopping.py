@@ -19,8 +19,8 @@ import ast
 from types import ModuleType
 from typing import Any
 
-from kinfmu.backends.python import emit
 from kinfmu.bench.setting import Setting
+from kinfmu.codegen.python import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
 
@@ -33,8 +33,8 @@ def model_with(plan: SolvePlan, setting: Setting) -> Any:
     tree = rewriter.visit(ast.parse(emit(plan)))
     if not rewriter.loops and any(block.unknowns for block in plan.blocks):
         raise KinfmuError(f"{plan.mechanism.name}: the generated code has no loop `for iteration in range(...)`")
-    module = ModuleType(f"kinfmu.solver.model_{plan.mechanism.name}")
-    module.__package__ = "kinfmu.solver"  # beside `linear`, as in an FMU
+    module = ModuleType(f"kinfmu.solver.python.model_{plan.mechanism.name}")
+    module.__package__ = "kinfmu.solver.python"  # beside `linear`, as in an FMU
     exec(compile(ast.fix_missing_locations(tree), module.__name__, "exec"), module.__dict__)  # noqa: S102  our own
     return module.bound(tuple(value for _, value in module.PARAMETERS)) if plan.parameters else module
 

@@ -12,7 +12,7 @@ from kinfmu import gallery
 from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
-from kinfmu.suffix import suffix_of
+from kinfmu.files.suffix import suffix_of
 from kinfmu.units import ANGLES, Quantity, factors, in_turns, like_degrees
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def along(text: str | None, option: str, run: Run) -> float | None:
     """A place on the axis of a run [s, rad or the run's unit of length]; a UsageError for a text that is none."""
     if text is None:
         return None
-    from kinfmu.axis import axis_of
+    from kinfmu.run.axis import axis_of
 
     axis = axis_of(run)
     return on_axis(text, option, axis.label, axis.unit, f", {axis.range()}")

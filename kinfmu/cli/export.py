@@ -13,7 +13,7 @@ from kinfmu.cli.arguments import along, names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import RequestError, listed
-from kinfmu.suffix import suffix_of
+from kinfmu.files.suffix import suffix_of
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -54,7 +54,7 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
         return run
     import numpy as np
 
-    from kinfmu.axis import axis_of
+    from kinfmu.run.axis import axis_of
 
     axis, ends = axis_of(run), (along(start, "--start", run), along(stop, "--stop", run))
     first, last = (

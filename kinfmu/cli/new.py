@@ -11,7 +11,7 @@ from kinfmu.cli.arguments import MECHANISM
 from kinfmu.cli.files import OutputFile, exists
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
-from kinfmu.whole_file import write_whole
+from kinfmu.files.whole_file import write_whole
 
 
 @main.command(epilog="Example: kinfmu new fourbar mine.toml")

@@ -23,10 +23,10 @@ def recover(run: Path, output: Path | None) -> None:
 
     RUN is a record (.mcap) that was cut off or damaged, and stays as it is.
     """
-    from kinfmu.axis import axis_of
     from kinfmu.cli.tell import printable
     from kinfmu.cli.verdict import verdict
     from kinfmu.log import recover as recovered
+    from kinfmu.run.axis import axis_of
 
     target = output or run.with_name(f"{run.stem}-recovered.mcap")
     found = recovered(run, target)

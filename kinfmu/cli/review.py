@@ -14,7 +14,7 @@ from kinfmu.cli.tell import note
 from kinfmu.errors import listed
 
 if TYPE_CHECKING:
-    from kinfmu.log.timeline import Timeline
+    from kinfmu.log.viewer.timeline import Timeline
 
 
 @main.command(epilog="Example: kinfmu review logs/fourbar.mcap --screenshot fourbar.png --at 45")

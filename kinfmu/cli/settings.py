@@ -43,7 +43,7 @@ class Settings:
 
         A note on stderr says if that is not possible and it is assembled anew.
         """
-        from kinfmu.continued import continued
+        from kinfmu.sweep.continued import continued
 
         followed = continued(self.written, {**self.parameters, **self.constants})
         if followed.message:
@@ -92,7 +92,7 @@ def settled(
 
 def tolerance_of(settings: Settings) -> float:
     """The tolerance of a solve: what --set says, else the usual one."""
-    from kinfmu.solver.solver import TOLERANCE as USUAL
+    from kinfmu.solver.python.solver import TOLERANCE as USUAL
 
     return float(settings.of_run.get(TOLERANCE, USUAL))
 

@@ -18,7 +18,7 @@ from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, set
 from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.suffix import suffix_of
+from kinfmu.files.suffix import suffix_of
 
 LOGS = Path("logs")
 
@@ -73,9 +73,9 @@ def simulate(
     """
     from tempfile import TemporaryDirectory
 
-    from kinfmu.channels import is_drawn
     from kinfmu.fmu import simulate as simulated
     from kinfmu.log import McapLog, write_rrd
+    from kinfmu.run.channels import is_drawn
 
     if wrap and inputs is None:
         raise click.UsageError("--wrap follows the angles of --input, which is not given")

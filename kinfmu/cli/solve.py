@@ -16,7 +16,7 @@ from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
 from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
-from kinfmu.suffix import suffix_of
+from kinfmu.files.suffix import suffix_of
 from kinfmu.units import Quantity, in_turns, like_degrees
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _tell_of_angles(text: str, first: float, last: float, n: int, wrap: bool) ->
 
 def _warn_of_external(drivers: tuple[Driver, ...]) -> None:
     """Warn of drivers that time does not move."""
-    from kinfmu.joints.laws import External
+    from kinfmu.laws import External
 
     still = [driver.name for driver in drivers if isinstance(driver.law, External)]
     if still:

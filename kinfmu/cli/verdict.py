@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def verdict(run: Run) -> str:
     """'181 samples: 175 ok, 6 bridged; largest residual 1.1e-16'."""
-    from kinfmu.solver.status import Status
+    from kinfmu.solver.python.status import Status
 
     counts = [(status, int((run.status == status).sum())) for status in Status]
     said = listed(f"{count} {status.name.lower().replace('_', ' ')}" for status, count in counts if count)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.axis import axis_of
 from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
 from kinfmu.draw.links import links, shortest
@@ -23,16 +22,17 @@ from kinfmu.draw.slides import rails, slots_and_blocks
 from kinfmu.draw.wheels import racks, wheels
 from kinfmu.draw.writing import house_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
-from kinfmu.joints.placement import body_of
+from kinfmu.files.suffix import suffix_of
+from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
-from kinfmu.shapes import palette
-from kinfmu.shapes.completing import remedy
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.placing import poses_of, world
-from kinfmu.shapes.slides import rods, slides
-from kinfmu.suffix import suffix_of
+from kinfmu.run.axis import axis_of
+from kinfmu.scene import palette
+from kinfmu.scene.completing import remedy
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.placing import poses_of, world
+from kinfmu.scene.slides import rods, slides
 
 if TYPE_CHECKING:
     from PIL.Image import Image

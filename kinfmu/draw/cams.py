@@ -11,9 +11,9 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet
 from kinfmu.draw.wheels import DASHES, MeshName
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.cams import CamShape, cam_shapes
-from kinfmu.shapes.instant import Instant
+from kinfmu.scene import palette
+from kinfmu.scene.cams import CamShape, cam_shapes
+from kinfmu.scene.instant import Instant
 
 
 @dataclass(frozen=True, eq=False)

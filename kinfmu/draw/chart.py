@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinfmu.draw.sheet import FONT, GREY, INK, ink
-from kinfmu.shapes.palette import Colour
+from kinfmu.scene.palette import Colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,8 +21,8 @@ from kinfmu.draw.writing import write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.slides import rods, slides
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.slides import rods, slides
 
 MOST_NAMES = 90  # more would cover the drawing
 _SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture

@@ -11,11 +11,11 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import Sheet
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute
-from kinfmu.joints.placement import body_of
+from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
 
 EDGE = palette.darker(palette.GROUND)
 _HEIGHT, _HALF, _HATCH = 13.0, 8.0, 4.5  # [pt]

@@ -17,8 +17,8 @@ from kinfmu.mechanism import Mechanism, Point
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.run import FloatArray, Run
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.placing import poses_of
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.placing import poses_of
 from kinfmu.sweep import run_times, solve
 
 MOST_SAMPLES = 1000  # of the run; a figure shows no more

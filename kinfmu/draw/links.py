@@ -13,9 +13,9 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import BAR, Sheet
 from kinfmu.joints import Distance
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.outline import points_of, rim
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.outline import points_of, rim
 
 _EDGE = 0.9  # [pt]
 _NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # parts of an edge beside which its name may stand

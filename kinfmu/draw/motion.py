@@ -13,12 +13,12 @@ from kinfmu.draw.sheet import PAPER, Sheet, arc, box
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.equations.system import size_of
 from kinfmu.joints import Revolute
-from kinfmu.joints.placement import body_of, unit_vector
+from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.cylinders import cylinder_shapes
-from kinfmu.shapes.instant import Instant
+from kinfmu.scene import palette
+from kinfmu.scene.cylinders import cylinder_shapes
+from kinfmu.scene.instant import Instant
 
 COLOUR: palette.Colour = (185, 28, 28)
 _RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.draw.sheet import FONT, INK, LINE, Sheet
 from kinfmu.run import FloatArray
-from kinfmu.shapes.palette import Colour
+from kinfmu.scene.palette import Colour
 
 _DIRECTIONS = 16  # in which a name may stand beside its anchor
 _FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt] from where it would touch

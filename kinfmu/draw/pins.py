@@ -14,9 +14,9 @@ from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.slides import Slide
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.slides import Slide
 
 _SAME = 1e-6  # of the size; points nearer than that are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # what is drawn where several are in one place: the last of these

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kinfmu.draw.title import TITLE_FONT, TITLE_LINE, title_lines
 from kinfmu.run import FloatArray
-from kinfmu.shapes.palette import Colour
+from kinfmu.scene.palette import Colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

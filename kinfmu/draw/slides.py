@@ -13,9 +13,9 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import BAR, PAPER, Sheet, box
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.slides import Slide, place, racks_of
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.slides import Slide, place, racks_of
 
 HALF_LENGTH, HALF_WIDTH = 11.0, 7.0  # [pt], of a block
 RACK_BACK = 11.0  # [pt]; from a rack's pitch line to its back

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinfmu.joints import Distance, Translational
-from kinfmu.joints.placement import body_of, unit_vector
+from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
-from kinfmu.shapes.outline import points_of, rim
-from kinfmu.shapes.placing import world
+from kinfmu.scene.outline import points_of, rim
+from kinfmu.scene.placing import world
 
 ENOUGH = 0.04  # part of all links that may be covered without another pose being looked for
 _CANDIDATES = 24  # poses of a run that are looked at

@@ -10,9 +10,9 @@ from kinfmu.draw.mark import Mark
 from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet, box
 from kinfmu.run import FloatArray
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
-from kinfmu.shapes.wheels import WheelShape, gear_pairs, rack_pairs
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.wheels import WheelShape, gear_pairs, rack_pairs
 
 _TEETH = 9.0  # [pt] from tooth to tooth of a rack, where there is room
 _TOOTH, _BACK = 4.0, 6.0  # [pt]; half height of the teeth, thickness of the rack behind them

@@ -1,4 +1,4 @@
-"""Drivers, one a file: a driver is a row whose target moves; how it moves, `joints/laws/` tell.
+"""Drivers, one a file: a driver is a row whose target moves by a law.
 
 Adding one is a file and a line here.
 """

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from kinfmu.drivers.driver import Driver
-from kinfmu.joints.laws import ConstantSpeed, Law
-from kinfmu.joints.measures import AngleBetween
-from kinfmu.joints.placement import BodyName
+from kinfmu.laws import ConstantSpeed, Law
+from kinfmu.measures import AngleBetween
+from kinfmu.measures.placement import BodyName
 from kinfmu.units import Quantity
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from kinfmu.drivers.driver import Driver
-from kinfmu.joints.laws import ConstantSpeed, Law
-from kinfmu.joints.measures import CoordinateOf
-from kinfmu.joints.placement import Axis, PointName
+from kinfmu.laws import ConstantSpeed, Law
+from kinfmu.measures import CoordinateOf
+from kinfmu.measures.placement import Axis, PointName
 from kinfmu.units import Quantity
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.laws import Law
-from kinfmu.joints.measures import Measure
-from kinfmu.joints.placement import Placement
+from kinfmu.laws import Law
+from kinfmu.measures import Measure
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import Placement
 from kinfmu.units import Quantity
 
 

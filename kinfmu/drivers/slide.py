@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from kinfmu.drivers.driver import Driver
-from kinfmu.joints.laws import ConstantSpeed, Law
-from kinfmu.joints.measures import PositionAlong
-from kinfmu.joints.placement import PointPair
+from kinfmu.laws import ConstantSpeed, Law
+from kinfmu.measures import PositionAlong
+from kinfmu.measures.placement import PointPair
 from kinfmu.units import Quantity, Radians
 
 

@@ -12,9 +12,9 @@ import operator
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
-from kinfmu.solver.curve import CurveData
-from kinfmu.solver.curve import curve as curve_value
+from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
+from kinfmu.solver.python.curve import CurveData
+from kinfmu.solver.python.curve import curve as curve_value
 
 Content = float | str | tuple[CurveData, int] | None
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.taylor import Taylor
-from kinfmu.joints import GROUND, Joint, Placement, Pose
+from kinfmu.joints import Joint
+from kinfmu.measures.placement import GROUND, Placement, Pose
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.units import METRES

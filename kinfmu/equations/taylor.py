@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.joints.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
-from kinfmu.solver.curve import CurveData
-from kinfmu.solver.curve import curve as curve_value
+from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
+from kinfmu.solver.python.curve import CurveData
+from kinfmu.solver.python.curve import curve as curve_value
 
 _NOTHING = 1e-100  # in place of a length of 0 whose derivative is asked for: what stands still stays so, nothing fails
 Derivative = Any  # float, or (n,) for n lines at once

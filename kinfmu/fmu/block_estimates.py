@@ -132,7 +132,7 @@ def _columns(table: Array) -> tuple[Array, ...]:
 
 
 def _evaluated(model: Any, u: Sequence[Array], z: Sequence[Array]) -> Any:
-    """As kinfmu.solver.pose.evaluated: what `position` gives for unknowns that are known."""
+    """As kinfmu.solver.python.pose.evaluated: what `position` gives for unknowns that are known."""
     rest = (0.0,) * len(z)
     return model.position(u, z, rest, rest, -0.0, -1, EVERY)
 

@@ -8,13 +8,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
+from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import write_whole
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
-from kinfmu.joints.laws import External
+from kinfmu.laws import External
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import refuse_other
-from kinfmu.suffix import suffix_of
-from kinfmu.whole_file import write_whole
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -98,7 +98,7 @@ def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
 
 def native_obstacle() -> str:
     """Return why no native FMU can be built for this machine; nothing if one can."""
-    from kinfmu.backends.c import compiler
+    from kinfmu.codegen.c import compiler
     from kinfmu.fmu.native.platforms import host
 
     try:

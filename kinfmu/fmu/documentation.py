@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 
 _MIT = """\
 MIT License

@@ -12,7 +12,7 @@ from kinfmu.fmu.input_table import TIME, InputTable
 from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism import RunSettings
 from kinfmu.run import Event
-from kinfmu.short_way import is_long
+from kinfmu.run.unwrap import is_long
 from kinfmu.units import in_turns, like_degrees
 
 

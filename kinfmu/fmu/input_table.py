@@ -16,7 +16,7 @@ from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism.decimal_number import decimal
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.run import MOST_SAMPLES
-from kinfmu.short_way import short_way
+from kinfmu.run.unwrap import short_way
 from kinfmu.units import Quantity, factors, quantity_in
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.naming import derivative_name, quantity_of
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from kinfmu.units import Quantity, display_units, unit_of
 
 if TYPE_CHECKING:

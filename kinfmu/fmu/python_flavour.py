@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from importlib.metadata import distribution
 from importlib.resources import files
 
-from kinfmu.backends.python import emit
+from kinfmu.codegen.python import emit
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
@@ -90,7 +90,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
     """Every file, by its path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
-    solver, room = files("kinfmu.solver"), files("kinfmu.fmu")
+    solver, room = files("kinfmu.solver.python"), files("kinfmu.fmu")
     base = files(pythonfmu)
     contents = {
         "modelDescription.xml": _description(variables, version, guid=""),
@@ -177,6 +177,7 @@ def _named(contents: Mapping[str, bytes], variables: Interface, version: str, di
 
 def _renamed(source: str, package: str) -> str:
     """A module whose imports from kinfmu and pythonfmu come from `package`."""
+    source = re.sub(r"^(\s*)from kinfmu\.solver\.python(?=[.\s])", r"\1from kinfmu.solver", source, flags=re.MULTILINE)
     source = re.sub(r"^(\s*)from kinfmu(?=[.\s])", rf"\1from {package}", source, flags=re.MULTILINE)
     return re.sub(r"^(\s*)from pythonfmu(?=[.\s])", rf"\1from {package}.pythonfmu", source, flags=re.MULTILINE)
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.channels import absent_columns
 from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import Slave
 from kinfmu.run import Event, Run
-from kinfmu.sink import Sink
-from kinfmu.solver.status import Status
+from kinfmu.run.channels import absent_columns
+from kinfmu.run.sink import Sink
+from kinfmu.solver.python.status import Status
 
 PIECE = 1024 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
 FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.channels import kept_samples
 from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
@@ -28,8 +27,9 @@ from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, tex
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
 from kinfmu.mechanism.number import measured
 from kinfmu.run import MOST_SAMPLES, Run
-from kinfmu.sink import Sink
-from kinfmu.solver.status import Status
+from kinfmu.run.channels import kept_samples
+from kinfmu.run.sink import Sink
+from kinfmu.solver.python.status import Status
 from kinfmu.units import quantity_in
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def simulate(
     of arrays by name; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name,
     such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap: angles among the inputs are followed the short way
     where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. channels: what to keep of every
-    sample, such as ["q", "qd"] or ["-error", "-margin"], as kinfmu.channels.absent_columns tells; the FMU is not asked
+    sample, such as ["q", "qd"] or ["-error", "-margin"], as kinfmu.run.channels tells; the FMU is not asked
     for the rest. rate: samples to keep in a second of the run, all if None. sink: takes the run while it goes on, such
     as kinfmu.log.McapLog("run.mcap"), or any other kinfmu.Sink. progress: called with (samples done, samples in all).
 

@@ -28,7 +28,7 @@ from kinfmu.fmu.estimated_rates import (
 )
 from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
 from kinfmu.fmu.layout import UNKNOWN_ERROR, Layout, Places
-from kinfmu.solver import Pose, Status, Stuck, with_parameters
+from kinfmu.solver.python import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory

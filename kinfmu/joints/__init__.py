@@ -15,7 +15,6 @@ from kinfmu.joints.distance import Distance
 from kinfmu.joints.fixed import Fixed
 from kinfmu.joints.gear import Gear
 from kinfmu.joints.joint import Held, Joint
-from kinfmu.joints.placement import GROUND, Placement, Pose
 from kinfmu.joints.point_on_line import PointOnLine
 from kinfmu.joints.rack_and_pinion import RackAndPinion
 from kinfmu.joints.relative_angle import RelativeAngle
@@ -40,7 +39,6 @@ JOINTS: tuple[type[Joint], ...] = (
 )
 
 __all__ = [
-    "GROUND",
     "JOINTS",
     "Angle",
     "CamOscillating",
@@ -53,9 +51,7 @@ __all__ = [
     "Gear",
     "Held",
     "Joint",
-    "Placement",
     "PointOnLine",
-    "Pose",
     "RackAndPinion",
     "RelativeAngle",
     "Revolute",

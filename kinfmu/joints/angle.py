@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.joint import Held
-from kinfmu.joints.measures import AngleBetween
-from kinfmu.joints.placement import BodyName
+from kinfmu.measures import AngleBetween
+from kinfmu.measures.placement import BodyName
 from kinfmu.units import Radians
 
 

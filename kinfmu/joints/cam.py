@@ -6,12 +6,12 @@ from abc import abstractmethod
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.joints.laws import Law
-from kinfmu.joints.laws.law import TURN
-from kinfmu.joints.measures import AngleBetween, Measure
-from kinfmu.joints.placement import Placement
+from kinfmu.laws import Law
+from kinfmu.laws.law import TURN
+from kinfmu.measures import AngleBetween, Measure
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import Placement
 
 _LOOKS = 24  # angles in a turn that a lift is looked at, to see how large it is
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.cam import Cam
-from kinfmu.joints.laws import Law
-from kinfmu.joints.measures import AngleBetween
-from kinfmu.joints.placement import BodyName, BodyPair
+from kinfmu.laws import Law
+from kinfmu.measures import AngleBetween
+from kinfmu.measures.placement import BodyName, BodyPair
 from kinfmu.units import Radians
 
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints.arithmetic import Value, atan2, sqrt
 from kinfmu.joints.cam import closing
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.joints.laws import Law
-from kinfmu.joints.laws.law import TURN
-from kinfmu.joints.placement import Placement, PointPair, body_of
+from kinfmu.laws import Law
+from kinfmu.laws.law import TURN
+from kinfmu.measures.arithmetic import Value, atan2, sqrt
+from kinfmu.measures.placement import Placement, PointPair, body_of
 
 _LOOKS = 360  # angles at which the radius is looked at, one a degree
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.cam import Cam
-from kinfmu.joints.laws import Law
-from kinfmu.joints.measures import PositionAlong
-from kinfmu.joints.placement import BodyName, PointPair, body_of
+from kinfmu.laws import Law
+from kinfmu.measures import PositionAlong
+from kinfmu.measures.placement import BodyName, PointPair, body_of
 from kinfmu.units import Length, Radians
 
 

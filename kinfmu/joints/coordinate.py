@@ -3,10 +3,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from kinfmu.joints.decimal_sum import decimal_sum
 from kinfmu.joints.joint import Held
-from kinfmu.joints.measures import CoordinateOf
-from kinfmu.joints.placement import Axis, PointName
+from kinfmu.measures import CoordinateOf
+from kinfmu.measures.decimal_sum import decimal_sum
+from kinfmu.measures.placement import Axis, PointName
 from kinfmu.units import Length
 
 

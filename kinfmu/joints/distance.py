@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Held
-from kinfmu.joints.measures import DistanceBetween
-from kinfmu.joints.placement import PointPair
+from kinfmu.measures import DistanceBetween
+from kinfmu.measures.placement import PointPair
 from kinfmu.units import Length
 
 SHORTEST = 1e-30  # [length]; squares of anything shorter run out of digits

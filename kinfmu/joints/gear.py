@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.joints.measures import AngleBetween
-from kinfmu.joints.placement import BodyName, BodyPair, Placement
+from kinfmu.measures import AngleBetween
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import BodyName, BodyPair, Placement
 from kinfmu.units import Number, Radians
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.measures.measure import Measure
-from kinfmu.joints.placement import Placement
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.measure import Measure
+from kinfmu.measures.placement import Placement
 
 
 class Condition(NamedTuple):

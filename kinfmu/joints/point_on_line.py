@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.joints.joint import Held
-from kinfmu.joints.measures import OffsetFrom
-from kinfmu.joints.placement import PointPair
+from kinfmu.measures import OffsetFrom
+from kinfmu.measures.placement import PointPair
 from kinfmu.units import Radians
 
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.joints.measures import AngleBetween, PositionAlong
-from kinfmu.joints.placement import BodyName, Placement, PointPair, body_of
+from kinfmu.measures import AngleBetween, PositionAlong
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import BodyName, Placement, PointPair, body_of
 from kinfmu.units import Length, Radians
 
 

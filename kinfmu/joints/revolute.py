@@ -3,9 +3,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Joint
-from kinfmu.joints.placement import Placement, PointPair, body_of
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import Placement, PointPair, body_of
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinfmu.joints.arithmetic import Value
 from kinfmu.joints.joint import Joint
-from kinfmu.joints.measures import AngleBetween, OffsetFrom
-from kinfmu.joints.placement import Placement, PointPair, body_of
+from kinfmu.measures import AngleBetween, OffsetFrom
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import Placement, PointPair, body_of
 from kinfmu.units import Radians
 
 

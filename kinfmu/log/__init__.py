@@ -1,6 +1,6 @@
 """What a run leaves: MCAP as the durable record, Rerun as the picture, tables for everything else.
 
-The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not when this room is imported.
+The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not on import.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from kinfmu.log.mcap_file import write_mcap
     from kinfmu.log.mcap_log import McapLog
     from kinfmu.log.reading import read, recover
-    from kinfmu.log.rerun_file import write_rrd
-    from kinfmu.log.reviewing import review
     from kinfmu.log.table import write_table
+    from kinfmu.log.viewer.rerun_file import write_rrd
+    from kinfmu.log.viewer.reviewing import review
 
 __all__ = ["McapLog", "read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
 
@@ -22,9 +22,9 @@ _HOME = {
     "McapLog": "mcap_log",
     "read": "reading",
     "recover": "reading",
-    "review": "reviewing",
+    "review": "viewer.reviewing",
     "write_mcap": "mcap_file",
-    "write_rrd": "rerun_file",
+    "write_rrd": "viewer.rerun_file",
     "write_table": "table",
 }
 

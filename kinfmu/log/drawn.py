@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.log import robot, ros2
+from kinfmu.log import ros2, urdf
 from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds
 from kinfmu.log.container import McapWriter, Messages
-from kinfmu.log.scene import scene
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import Event, Run
+from kinfmu.scene.scene import scene
 from kinfmu.units import METRES
 
 SOURCE = "kinfmu"  # who speaks in the log: the run's own events
@@ -73,7 +73,7 @@ class LinkTopic:
         if self._template is None:
             return
         template, metres, numbers = self._template, self._metres, []
-        for pose in robot.frames(run, self._mechanism).values():
+        for pose in urdf.frames(run, self._mechanism).values():
             x, y, phi = pose.T
             nothing = np.zeros_like(x)
             place = [metres * x, metres * y, nothing]
@@ -91,13 +91,13 @@ class LinkTopic:
         """The robot description, of the size that the mechanism has in its first pose."""
         first = int(np.argmax(run.good))
         shown = scene(run.part(slice(first, first + 1)), self._mechanism)
-        frames = robot.frames(run.part(slice(0, 0)), self._mechanism)
+        frames = urdf.frames(run.part(slice(0, 0)), self._mechanism)
         if not frames:
             return
-        urdf = Template().string(robot.robot_description(self._name, shown, self._metres))
+        message = Template().string(urdf.robot_description(self._name, shown, self._metres))
         channel = self._writer.channel("/robot_description", "cdr", "std_msgs/msg/String", ros2.STRING, {})
         at = stamps[:1]
-        self._writer.write(channel, Messages(np.zeros(1, int), at, urdf.length, lambda out: urdf.fill(out, at)))
+        self._writer.write(channel, Messages(np.zeros(1, int), at, message.length, lambda out: message.fill(out, at)))
         self._template = Template().uint32(len(frames))
         for name in frames:
             self._template.stamp().string(ros2.ROOT).string(name).words(7)

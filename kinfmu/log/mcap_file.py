@@ -25,8 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu import VERSION
-from kinfmu.axis import axis_of
-from kinfmu.channels import is_drawn, select
 from kinfmu.errors import MechanismError
 from kinfmu.log import ros2
 from kinfmu.log.cdr import Template
@@ -38,6 +36,8 @@ from kinfmu.log.target import replacing
 from kinfmu.log.verdict import sentence, status_events, unexplained
 from kinfmu.mechanism import toml_file
 from kinfmu.run import Event, Run
+from kinfmu.run.axis import axis_of
+from kinfmu.run.channels import is_drawn, select
 
 ROWS = 4096  # samples in a chunk of a run that is there as a whole; more take memory, fewer time
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
@@ -52,7 +52,7 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
     """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time.
 
     channels: what to keep of every sample, all if None, such as ["q", "drawn"] or ["-error"]; ["-drawn"]: the record
-    alone, less than half as large. rate: samples to keep in a second of the run. Both as kinfmu.channels tells.
+    alone, less than half as large. rate: samples to keep in a second of the run. Both as kinfmu.run.channels tells.
 
     Raises a LogError for a file that cannot be written, which leaves an older one as it was, and for times that a log
     cannot hold; a RequestError for channels and rates that cannot be meant.

@@ -9,13 +9,13 @@ from io import FileIO
 from pathlib import Path
 from shlex import quote
 
+from kinfmu.files.whole_file import hold
 from kinfmu.log.clock import zero_of
 from kinfmu.log.mcap_file import Content
 from kinfmu.log.target import check_room, checked, replacing, unwritable
 from kinfmu.log.verdict import status_events, unexplained
 from kinfmu.run import Event, Run
-from kinfmu.solver.status import Status
-from kinfmu.whole_file import hold
+from kinfmu.solver.python.status import Status
 
 
 class McapLog:

@@ -19,7 +19,7 @@ from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.run import Event, Run
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 
 FORMAT = "2"  # raised when files written before can no longer be read the same way
 _INTEGERS = ("status", "iterations")

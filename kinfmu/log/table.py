@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from kinfmu.channels import select
 from kinfmu.errors import LogError, MissingPackageError, listed
+from kinfmu.files.suffix import suffix_of
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
-from kinfmu.run import Column, Run, arrow_table
-from kinfmu.suffix import suffix_of
+from kinfmu.run import Column, Run
+from kinfmu.run.channels import select
+from kinfmu.run.run import arrow_table
 
 ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import LogError
-from kinfmu.whole_file import beside, check_is_free, replacement
+from kinfmu.files.whole_file import beside, check_is_free, replacement
 
 
 @contextmanager

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.axis import axis_of
 from kinfmu.log.clock import nanoseconds
 from kinfmu.run import Event, Run
-from kinfmu.solver.status import Status
+from kinfmu.run.axis import axis_of
+from kinfmu.solver.python.status import Status
 
 _WHEN = re.compile(r"^at t = \S+ s: ")
 _LEVELS = {Status.OK: "info", Status.BRIDGED: "info", Status.NEAR_SINGULAR: "warning"}  # the others: "error"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
-from kinfmu.joints.measures import Measure
-from kinfmu.joints.placement import Reference, is_pair
+from kinfmu.measures import Measure
+from kinfmu.measures.placement import Reference, is_pair
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.places import hints_of, told
 from kinfmu.mechanism.quoted import quoted

@@ -9,9 +9,9 @@ import re
 from dataclasses import MISSING, fields
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from kinfmu.joints.laws import Law, LawQuantity, Segment
-from kinfmu.joints.measures import Measure
-from kinfmu.joints.placement import Reference
+from kinfmu.laws import Law, LawQuantity, Segment
+from kinfmu.measures import Measure
+from kinfmu.measures.placement import Reference
 from kinfmu.units import Quantity
 
 Takes = Literal["number", "text", "pair", "truth", "numbers", "points", "segments", "measure", "law"]

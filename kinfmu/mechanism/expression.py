@@ -18,7 +18,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.arithmetic import Value, atan2, cos, sin, sqrt
+from kinfmu.measures.arithmetic import Value, atan2, cos, sin, sqrt
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.quoted import quoted

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from kinfmu.drivers import Driver
-from kinfmu.joints.laws.law import Path
+from kinfmu.laws.law import Path
 from kinfmu.mechanism.places import Place
 from kinfmu.units import Quantity
 

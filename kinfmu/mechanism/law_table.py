@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints.laws import RISES, Law, MotionSequence, Polynomial, Segment, Spline
-from kinfmu.joints.laws.law import number_fields
+from kinfmu.laws import RISES, Law, MotionSequence, Polynomial, Segment, Spline
+from kinfmu.laws.law import number_fields
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_tables import text_of

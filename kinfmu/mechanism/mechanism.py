@@ -11,7 +11,7 @@ from typing import Any
 from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints import Joint
-from kinfmu.joints.arithmetic import Value
+from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression

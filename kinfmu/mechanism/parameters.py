@@ -8,7 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 
 from kinfmu.errors import MechanismError, listed
-from kinfmu.joints.arithmetic import Value
+from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
 from kinfmu.mechanism.number import written

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.laws import Law
-from kinfmu.joints.measures import Measure
+from kinfmu.laws import Law
+from kinfmu.measures import Measure
+from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.units import Quantity
 

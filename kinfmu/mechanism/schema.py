@@ -11,10 +11,10 @@ from typing import Any
 
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
-from kinfmu.joints.laws import LAWS, RISES, External, Law, LawQuantity, Spline
-from kinfmu.joints.laws.sequence import DWELL
-from kinfmu.joints.measures import MEASURES, Measure
-from kinfmu.joints.placement import Reference
+from kinfmu.laws import LAWS, RISES, External, Law, LawQuantity, Spline
+from kinfmu.laws.sequence import DWELL
+from kinfmu.measures import MEASURES, Measure
+from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST

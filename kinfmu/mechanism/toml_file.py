@@ -12,9 +12,9 @@ from typing import Any, get_type_hints
 from kinfmu.drivers import DRIVERS, Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
-from kinfmu.joints.laws import LAWS, External, Law
-from kinfmu.joints.measures import MEASURES, Measure
-from kinfmu.joints.placement import is_pair
+from kinfmu.laws import LAWS, External, Law
+from kinfmu.measures import MEASURES, Measure
+from kinfmu.measures.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.law_table import law_keys, read_law
 from kinfmu.mechanism.mechanism import Mechanism

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from kinfmu.joints.measures import Measure
+from kinfmu.measures import Measure
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.law_table import law_lines
 from kinfmu.mechanism.mechanism import Mechanism

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinfmu.equations.part import Part
+from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
-from kinfmu.redundancy import Redundancy
 
 _POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way
 _STEP = 0.2  # [rad, sizes]; between them

@@ -11,10 +11,11 @@ from kinfmu.drivers import Driver
 from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start, start_targets
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
+from kinfmu.equations.redundancy import Redundancy, find_redundancy
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, RequestError, listed, suggestion
-from kinfmu.joints.arithmetic import Value
-from kinfmu.joints.measures import DistanceBetween
+from kinfmu.measures import DistanceBetween
+from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, Rates, build_block
@@ -22,7 +23,6 @@ from kinfmu.plan.conditions import PlanCondition, find_conditions
 from kinfmu.plan.origin import localized
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
-from kinfmu.redundancy import Redundancy, find_redundancy
 from kinfmu.units import Quantity
 
 
@@ -54,7 +54,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SolvePlan:
-    """A value: everything that a back end needs to print the code of a mechanism. Equal plans have equal `text`.
+    """A value: everything needed to print the code of a mechanism. Equal plans have equal `text`.
 
     origin: where the plan's own origin lies in the world; only outputs, `fixed` and start values know of the world's.
     outputs: the generalized coordinates q, then the points of interest; fixed_nodes: coordinates that never move, as

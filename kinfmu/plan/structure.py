@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 from kinfmu.equations.blocks import ordered_blocks
 from kinfmu.equations.graph import Node, symbols
+from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import MobilityError, listed
 from kinfmu.plan.companions import BlockStructure, with_companions
 from kinfmu.plan.trace import Tracer, is_parameter
-from kinfmu.redundancy import Redundancy
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.graph import Graph, Node
-from kinfmu.joints import GROUND, Joint, Placement, Pose
+from kinfmu.joints import Joint
+from kinfmu.measures.placement import GROUND, Placement, Pose
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 

@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import row_reduced
-from kinfmu.chains import fourbar_chain
+from kinfmu.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from kinfmu.backends.python import load_model
 from kinfmu.bench import stopping
 from kinfmu.bench.setting import Setting
 from kinfmu.bench.stopping import model_with
+from kinfmu.codegen.python import load_model
 from kinfmu.errors import KinfmuError
 from kinfmu.gallery import load
 from kinfmu.plan import SolvePlan, compile_plan

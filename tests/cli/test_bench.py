@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from kinfmu import gallery
-from kinfmu.backends.c import compiler
 from kinfmu.bench import accuracy, case, chains, log_files, logged_step, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, Shipped
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
+from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError
 from tests import oracle
 from tests.cli.conftest import Command
@@ -211,7 +211,7 @@ def test_a_sweep_is_set_beside_the_closed_form(monkeypatch: pytest.MonkeyPatch, 
     except CompilerError as error:
         pytest.skip(str(error))
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
-    monkeypatch.setattr("kinfmu.backends.c.library.FLAGS", ("-O1",))
+    monkeypatch.setattr("kinfmu.sweep.library.FLAGS", ("-O1",))
     monkeypatch.setattr(native_sweep, "FLAGS", ("-O1",))
     table = native_sweep.run(rounds=1, samples=2000, loops=3)
     assert table.splitlines()[2].split()[-1] == "1.00"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinfmu.files.suffix import suffix_of
 from kinfmu.log import write_mcap
-from kinfmu.suffix import suffix_of
 from tests.cli.conftest import Command
 from tests.log.runs import fourbar
 

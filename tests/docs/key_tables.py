@@ -8,8 +8,8 @@ from typing import Any
 
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
-from kinfmu.joints.laws import LAWS, LawQuantity
-from kinfmu.joints.measures import MEASURES
+from kinfmu.laws import LAWS, LawQuantity
+from kinfmu.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
 

@@ -16,7 +16,7 @@ from kinfmu.bench.pictures import LOOKS, NEAR_SINGULAR, SUFFIXES, WORK_PRECISION
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.cli import main
 from kinfmu.gallery import load
-from kinfmu.solver import Status
+from kinfmu.solver.python import Status
 
 DOCS = Path(__file__).parents[2] / "docs"
 ROOT = DOCS.parent

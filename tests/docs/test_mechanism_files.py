@@ -10,7 +10,7 @@ import pytest
 import kinfmu
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
-from kinfmu.joints.laws import LAWS
+from kinfmu.laws import LAWS
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.checks import MOST_BODIES
 from kinfmu.mechanism.expression import DEEPEST, LONGEST

@@ -12,10 +12,10 @@ from mcap.reader import make_reader
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.channels import absent_columns
 from kinfmu.cli import main
 from kinfmu.errors import RequestError
 from kinfmu.log import McapLog, read
+from kinfmu.run.channels import absent_columns
 
 PAGE = (gallery.folder().parent / "docs" / "records.md").read_text(encoding="utf-8")
 CODE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0]

@@ -15,8 +15,8 @@ from kinfmu.draw.animation import _film, _marks, _placed
 from kinfmu.draw.motion import Cylinder
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
-from kinfmu.shapes import palette
-from kinfmu.shapes.instant import Instant
+from kinfmu.scene import palette
+from kinfmu.scene.instant import Instant
 from kinfmu.sweep import run_times
 from tests.log.runs import fourbar, with_gap
 

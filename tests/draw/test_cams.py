@@ -11,8 +11,8 @@ from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, RunSet
 from kinfmu.draw.instant import instant
 from kinfmu.joints import CamOscillating, CamRoller, CamTranslating
 from kinfmu.joints.joint import Joint
-from kinfmu.joints.laws import Law, MotionSequence, Polynomial, Segment
-from kinfmu.shapes.cams import CamShape, cam_shapes
+from kinfmu.laws import Law, MotionSequence, Polynomial, Segment
+from kinfmu.scene.cams import CamShape, cam_shapes
 
 QUARTER = 0.5 * math.pi
 

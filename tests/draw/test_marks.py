@@ -31,7 +31,7 @@ from kinfmu.draw.motion import Cylinder, Push, Turn, motion
 from kinfmu.draw.pins import Pin, pins
 from kinfmu.draw.slides import Block, Slot, rails, slots_and_blocks
 from kinfmu.draw.wheels import Belt, Rack, Wheel, racks, wheels
-from kinfmu.shapes.slides import rods, slides
+from kinfmu.scene.slides import rods, slides
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.axis import axis_of
-from kinfmu.channels import select
 from kinfmu.draw import plot
 from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
+from kinfmu.run.axis import axis_of
+from kinfmu.run.channels import select
 from tests.log.runs import fourbar, with_gap
 
 

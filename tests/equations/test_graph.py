@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from kinfmu.equations.graph import Graph, evaluate, reachable, symbols
-from kinfmu.joints.arithmetic import atan2, atan2_like, cos, curve, floor, sin, sqrt
+from kinfmu.measures.arithmetic import atan2, atan2_like, cos, curve, floor, sin, sqrt
 from tests import power_series
 from tests.power_series import Series
 

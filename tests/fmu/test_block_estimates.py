@@ -14,7 +14,7 @@ from kinfmu.fmu import build, simulate
 from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from tests.fmu.conftest import GALLERY
 
 SIMULATE = sys.modules["kinfmu.fmu.simulate"]

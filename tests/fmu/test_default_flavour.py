@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 import kinfmu
-from kinfmu.backends.c import compiler
 from kinfmu.cli import main
+from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError
 from kinfmu.fmu.build import default_flavour
 from kinfmu.fmu.native.platforms import host

@@ -14,13 +14,13 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Cycloidal, Distance, Gear, Mechanism, Revolute
-from kinfmu.backends.python import load_module
+from kinfmu.codegen.python import load_module
 from kinfmu.errors import AssemblyError, FmuError, InconsistentError, KinfmuError, MechanismError, MobilityError
 from kinfmu.fmu.build import FLAVOURS
 from kinfmu.mechanism import Point
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Stuck, with_parameters
+from kinfmu.solver.python import Stuck, with_parameters
 from tests.oracle import fourbar as exact_fourbar
 
 LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
@@ -54,7 +54,7 @@ def linkage(lengths: Mapping[str, float] = LENGTHS) -> Mechanism:
 def code(request: pytest.FixtureRequest) -> Iterator[None]:
     """Both forms of generated code bind parameters."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(import_module("kinfmu.backends.python.emit"), "MANY", request.param)
+        patch.setattr(import_module("kinfmu.codegen.python.emit"), "MANY", request.param)
         yield
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from kinfmu.solver import Solver, Status
+from kinfmu.solver.python import Solver, Status
 from tests.fmu.host import DISCARD, LAST_SUCCESSFUL_TIME, TERMINATED, Host
 
 Start = Callable[..., Host]

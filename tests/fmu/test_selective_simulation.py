@@ -14,7 +14,7 @@ from kinfmu.fmu import simulate
 from kinfmu.fmu.samples import PIECE
 from kinfmu.fmu.slaves import Slave2
 from kinfmu.run import Run
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 
 
 @pytest.fixture

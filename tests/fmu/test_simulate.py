@@ -17,7 +17,7 @@ from kinfmu.fmu import simulate
 from kinfmu.fmu.samples import Samples
 from kinfmu.mechanism import toml_file
 from kinfmu.run import Run
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 
 
 def test_fourbar_meets_its_closed_form_at_every_second_both_ends_included(fourbar: Path) -> None:

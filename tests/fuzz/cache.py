@@ -10,13 +10,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from tests.fuzz.summary import Summary, seeds
 
 PATIENCE = 120.0  # [s] for a process that loads
 _FILES = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
 _OTHER = {"a.c": "int f(void);\nint f(void) { return 8; }\n"}
-_LOAD = f"from kinfmu.backends.c import compiler; print(compiler.load({_FILES!r}).f())"
+_LOAD = f"from kinfmu.codegen.c import compiler; print(compiler.load({_FILES!r}).f())"
 _KINDS = (
     "cut short",
     "changed",

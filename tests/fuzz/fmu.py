@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import kinfmu
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from kinfmu.fmu.interface import Drive, interface
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan

@@ -12,8 +12,8 @@ import pytest
 
 import kinfmu
 from kinfmu import Distance, Mechanism, Revolute, Run, gallery
-from kinfmu.joints import Joint, Placement, Pose
-from kinfmu.joints.placement import GROUND
+from kinfmu.joints import Joint
+from kinfmu.measures.placement import GROUND, Placement, Pose
 from tests.gallery.conftest import Member
 from tests.gallery.reference_file import row, samples
 from tests.gallery.references import REFERENCES

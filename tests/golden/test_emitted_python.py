@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.backends.python import emit
+from kinfmu.codegen.python import emit
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan import compile_plan

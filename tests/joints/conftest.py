@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinfmu.joints import arithmetic
+from kinfmu.measures import arithmetic
 from tests import power_series
 
 arithmetic.sin.register(power_series.Series, power_series.sin)

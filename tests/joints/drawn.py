@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from kinfmu.drivers import Driver
 from kinfmu.equations.system import System, placement
 from kinfmu.joints import CamRoller, Coupling, Joint
-from kinfmu.joints.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
-from kinfmu.joints.laws.law import number_fields
-from kinfmu.joints.laws.spline import ENDS, PERIODIC
-from kinfmu.joints.measures import MEASURES, DistanceBetween, Measure
-from kinfmu.joints.placement import Reference, is_pair
+from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
+from kinfmu.laws.law import number_fields
+from kinfmu.laws.spline import ENDS, PERIODIC
+from kinfmu.measures import MEASURES, DistanceBetween, Measure
+from kinfmu.measures.placement import Reference, is_pair
 from kinfmu.mechanism import Body, Mechanism, Point, Start
 from kinfmu.units import Quantity
 from tests.power_series import Series

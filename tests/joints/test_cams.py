@@ -34,7 +34,7 @@ from kinfmu import (
 )
 from kinfmu.errors import AssemblyError, MechanismError
 from kinfmu.joints import Joint
-from kinfmu.joints.laws import Law
+from kinfmu.laws import Law
 from kinfmu.mechanism.toml_file import parse
 from tests.oracle import cos, fourbar, largest_error, mp, sin, solve
 from tests.power_series import Series, atan2
@@ -218,7 +218,7 @@ def test_a_gap_of_a_roller_is_its_way_to_the_pitch_curve_along_the_radius() -> N
 
 
 def placed(poses: dict[str, tuple[float, float, float]]) -> Any:
-    from kinfmu.joints import Placement, Pose
+    from kinfmu.measures.placement import Placement, Pose
 
     return Placement(
         {name: Pose.of(*pose) for name, pose in poses.items()}, {"cam.O": (0.0, 0.0), "follower.R": (0.0, 0.0)}

@@ -17,7 +17,7 @@ from kinfmu.equations.assembly import CLOSED, close
 from kinfmu.equations.graph import evaluate
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.joints import JOINTS, CamRoller, Coupling, Joint
-from kinfmu.joints.placement import Reference
+from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text
 from kinfmu.plan.trace import Tracer

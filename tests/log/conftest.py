@@ -11,7 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import LogError
-from kinfmu.log import headless
+from kinfmu.log.viewer import headless
 from kinfmu.run import Run
 from tests.log.runs import KINDS, fourbar, with_gap
 

@@ -11,10 +11,10 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.channels import select
 from kinfmu.log import McapLog, read, write_mcap, write_rrd
-from kinfmu.log.headless import executable
+from kinfmu.log.viewer.headless import executable
 from kinfmu.run import Run
+from kinfmu.run.channels import select
 from tests.log.runs import fourbar, without_samples
 from tests.log.test_mcap import assert_same
 

@@ -16,7 +16,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log import McapLog, read, recover, write_mcap
-from kinfmu.log.headless import executable
+from kinfmu.log.viewer.headless import executable
 from kinfmu.run import Event, Run
 from tests.log.runs import KINDS, fourbar, without_samples
 from tests.log.test_mcap import assert_same, messages

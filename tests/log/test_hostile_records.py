@@ -19,7 +19,7 @@ from kinfmu.draw import animate
 from kinfmu.errors import FigureError, LogError
 from kinfmu.log import mcap_file, read, record, record_text, recover, scan, write_mcap
 from kinfmu.log.container import MESSAGE, ZSTD, Opcode
-from kinfmu.log.series import groups
+from kinfmu.log.viewer.series import groups
 from kinfmu.run import Run
 
 NAMES = 600_000  # more than a record may hold

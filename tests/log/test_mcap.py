@@ -13,13 +13,13 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from kinfmu.channels import select
 from kinfmu.errors import LogError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.container import McapWriter
-from kinfmu.log.headless import executable
 from kinfmu.log.ros2 import field_names
+from kinfmu.log.viewer.headless import executable
 from kinfmu.run import Event, Run
+from kinfmu.run.channels import select
 from tests.log.runs import fourbar, with_gap, without_samples
 
 

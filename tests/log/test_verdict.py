@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from kinfmu.log.card import card
 from kinfmu.log.verdict import happenings, sentence
+from kinfmu.log.viewer.card import card
 from kinfmu.run import Event, Run
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from tests.log.runs import fourbar, with_gap
 
 

@@ -13,7 +13,7 @@ from kinfmu import gallery
 from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Joint, Revolute
-from kinfmu.joints.laws import ConstantSpeed
+from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
 from kinfmu.mechanism.quoted import LONGEST, quoted
 

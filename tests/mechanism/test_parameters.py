@@ -13,7 +13,7 @@ from kinfmu.drivers import AngleDriver
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError, RequestError
 from kinfmu.joints import Coordinate, Distance, Gear, PointOnLine, Revolute, Translational
-from kinfmu.joints.laws import ConstantSpeed
+from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, RunSettings
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.toml_file import parse
@@ -213,7 +213,7 @@ def test_a_tilted_guide_may_have_a_symbol_for_its_angle() -> None:
     assert mechanism.expressions == {("joints", "guide", "axis"): Expression("tilt")}
     graph = Graph()
     (guide,) = mechanism.at({"tilt": graph.symbol("tilt")}).joints
-    from kinfmu.joints import GROUND, Placement, Pose
+    from kinfmu.measures.placement import GROUND, Placement, Pose
 
     at = Placement({"ground": GROUND, "bar": Pose.of(2.0, 3.0, 0.0)}, mechanism.body_points)
     (row,) = guide.residual(at)

@@ -17,8 +17,8 @@ from kinfmu.cli import main
 from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
-from kinfmu.joints.laws import LAWS
-from kinfmu.joints.measures import MEASURES
+from kinfmu.laws import LAWS
+from kinfmu.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
 from kinfmu.mechanism.schema import schema, schema_text
 from kinfmu.mechanism.toml_file import parse

@@ -18,7 +18,7 @@ from kinfmu import gallery
 from kinfmu.drivers import AngleDriver
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Revolute
-from kinfmu.joints.laws import ConstantSpeed
+from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Parameter, Point, RunSettings, Start, expression
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text

@@ -87,7 +87,7 @@ def test_equal_mechanisms_have_equal_plans_and_others_have_not() -> None:
 
 def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
     script = (
-        "import hashlib, kinfmu; from kinfmu.plan import compile_plan; from kinfmu.backends.python import emit\n"
+        "import hashlib, kinfmu; from kinfmu.plan import compile_plan; from kinfmu.codegen.python import emit\n"
         "from tests.mechanisms import six_bar, bar_as_body\n"
         "for m in (kinfmu.load('fourbar'), six_bar(), bar_as_body(0.3)):\n"
         "    p = compile_plan(m); print(hashlib.sha256((p.text + emit(p)).encode()).hexdigest())\n"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Pose, Solver
+from kinfmu.solver.python import Pose, Solver
 from tests.oracle import largest_error, reference_fourbar
 
 COORDINATES = ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]

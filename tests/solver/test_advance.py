@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver import Pose, Solver, Status
+from kinfmu.solver.python import Pose, Solver, Status
 from tests import oracle
 from tests.mechanisms import slider_crank, tight_jaw, with_arm
 from tests.solver.change_points import fourbar

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.equations.taylor import Taylor
-from kinfmu.joints.arithmetic import atan2, curve, floor
-from kinfmu.solver.curve import CurveData
-from kinfmu.solver.curve import curve as value
+from kinfmu.measures.arithmetic import atan2, curve, floor
+from kinfmu.solver.python.curve import CurveData
+from kinfmu.solver.python.curve import curve as value
 from tests import power_series
 from tests.power_series import Series
 

@@ -11,7 +11,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Body, Point, Run
-from kinfmu.solver import Pose, Solver, Status
+from kinfmu.solver.python import Pose, Solver, Status
 from tests.error_estimates import FAMILIES, ORDERS, Number, measured, told
 from tests.mechanisms import fourbar as fourbar_of_bars
 

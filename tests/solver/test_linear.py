@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinfmu.solver.linear import (
+from kinfmu.solver.python.linear import (
     Singular,
     column_part,
     factor,

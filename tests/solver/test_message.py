@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver.advance import Limit, limit_message
-from kinfmu.solver.message import LOCATED, place
-from tests.backends.native import Native
+from kinfmu.solver.python.advance import Limit, limit_message
+from kinfmu.solver.python.message import LOCATED, place
+from tests.solver.c.native import Native
 
 DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)^2
 

@@ -15,11 +15,11 @@ import pytest
 
 import kinfmu
 from kinfmu import Body
-from kinfmu.backends.c import compiler
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.c import compiler
+from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
-from kinfmu.solver import Pose, Solver, Status
+from kinfmu.solver.python import Pose, Solver, Status
 from tests.fmu.host import Host as PythonHost
 from tests.fmu.native.host import Host as NativeHost
 from tests.mechanisms import (
@@ -294,7 +294,7 @@ def test_a_track_has_every_constant_of_a_model_that_following_it_reads() -> None
     plan = compile_plan(with_second(fourbar("4", "1", "3", "2").mechanism))
     solver = Solver(load_model(plan))
     of_the_whole = {"ANGLES", "BLOCK_DRIVERS", "OUTPUTS"}
-    folder = Path(str(import_module("kinfmu.solver").__file__)).parent
+    folder = Path(str(import_module("kinfmu.solver.python").__file__)).parent
     read = {name for file in folder.glob("*.py") for name in re.findall(r"model\.([A-Z_]+)\b", file.read_text("utf-8"))}
     pose = solver.solve(solver.anchor, (1.2, 1.3 + math.pi))
     assert [name for track, _ in pose.tracks for name in sorted(read - of_the_whole) if not hasattr(track, name)] == []

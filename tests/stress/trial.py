@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import kinfmu
 from kinfmu import Run
-from kinfmu.backends.python import load_model
+from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError
 from kinfmu.naming import derivative_name
 from kinfmu.plan import compile_plan

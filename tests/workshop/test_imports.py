@@ -30,7 +30,7 @@ def loaded_by(statement: str) -> set[str]:
     [
         ("import kinfmu", HEAVY | {"click"}),
         ("import kinfmu; kinfmu.load; kinfmu.Mechanism; kinfmu.Body", HEAVY | {"click"}),
-        ("import kinfmu.solver", HEAVY | {"click"}),
+        ("import kinfmu.solver.python", HEAVY | {"click"}),
         ("import kinfmu.cli", HEAVY),
         ("import kinfmu.log", HEAVY - {"numpy", "importlib.metadata"}),
         ("import kinfmu.draw", HEAVY - {"numpy", "scipy", "importlib.metadata"}),

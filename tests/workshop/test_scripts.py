@@ -23,14 +23,14 @@ def test_a_first_call_makes_the_environment_installs_and_runs(miniature: Miniatu
     assert miniature.asked == [
         f"python3 -m venv {miniature.root}/.venv",
         f"{INSTALL}.",
-        "python -m kinfmu.demo",
+        "python -m kinfmu.cli.demo",
     ]
 
 
 def test_a_second_call_only_runs(miniature: Miniature) -> None:
     miniature.run("demo")
     assert miniature.run("demo") == (0, "")
-    assert miniature.asked == ["python -m kinfmu.demo"]
+    assert miniature.asked == ["python -m kinfmu.cli.demo"]
 
 
 def test_tests_need_more_than_the_demo_and_the_demo_nothing_more_than_tests(miniature: Miniature) -> None:
@@ -38,7 +38,7 @@ def test_tests_need_more_than_the_demo_and_the_demo_nothing_more_than_tests(mini
     miniature.run("test")
     assert miniature.asked == [f"{INSTALL}.[dev]", "python -m pytest --numprocesses auto"]
     miniature.run("demo")
-    assert miniature.asked == ["python -m kinfmu.demo"]
+    assert miniature.asked == ["python -m kinfmu.cli.demo"]
 
 
 def test_a_changed_pyproject_is_installed_again(miniature: Miniature) -> None:
@@ -63,14 +63,14 @@ def test_a_failed_installation_is_said_and_begun_again(miniature: Miniature) -> 
     assert said.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
     assert miniature.asked[-1] == f"{INSTALL}."
     assert miniature.run("demo")[0] == 0
-    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.demo"]
+    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.cli.demo"]
 
 
 def test_an_interrupted_update_is_begun_again(miniature: Miniature) -> None:
     miniature.run("demo")
     assert miniature.run("test", PIP_FAILS="1")[0] == 1
     miniature.run("demo")
-    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.demo"]
+    assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.cli.demo"]
 
 
 def test_a_broken_environment_is_made_anew(miniature: Miniature) -> None:
@@ -86,7 +86,7 @@ def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature)
     shutil.copy(miniature.python, tools / "python")
     (tools / "theirs").touch()
     miniature.run("demo")
-    assert miniature.asked == [f"{INSTALL}.", "python -m kinfmu.demo"]
+    assert miniature.asked == [f"{INSTALL}.", "python -m kinfmu.cli.demo"]
     assert (tools / "theirs").exists()
 
 

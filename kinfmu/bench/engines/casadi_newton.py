@@ -12,7 +12,7 @@ from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import Engine, Way
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
-from kinfmu.joints import arithmetic
+from kinfmu.measures import arithmetic
 
 FINEST = 1e-13
 

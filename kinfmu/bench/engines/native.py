@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinfmu.backends.c.library import Library
 from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import Engine, Way
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import CompilerError, MissingPackageError
+from kinfmu.sweep.library import Library
 
 
 class Native(Engine):

@@ -11,13 +11,13 @@ from functools import lru_cache
 from itertools import chain
 from typing import Any
 
-from kinfmu.backends.python import load_model
 from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import GAP, Engine, Way
 from kinfmu.bench.setting import Setting
+from kinfmu.codegen.python import load_model
 from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
-from kinfmu.solver.pose import evaluated
+from kinfmu.solver.python.pose import evaluated
 
 DEFAULT = 1.49012e-8  # xtol of fsolve, if nothing is said
 FINEST = 1e-15

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.backends.python import load_model
 from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.engines.engine import GAP, Engine, Way
 from kinfmu.bench.setting import Setting
-from kinfmu.solver import Solver
+from kinfmu.codegen.python import load_model
+from kinfmu.solver.python import Solver
 
 
 class Shipped(Engine):

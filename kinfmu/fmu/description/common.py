@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
 from kinfmu.mechanism import RunSettings
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from kinfmu.units import METRES, display_units
 
 TOOL = "kinfmu"  # name of the annotation that tells our FMUs from others

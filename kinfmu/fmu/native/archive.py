@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.description import Description, FmiVersion

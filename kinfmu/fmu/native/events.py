@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kinfmu.backends.c.text import FUNCTIONS, function
-from kinfmu.backends.writer import Names, Writer, identifier
+from kinfmu.codegen.c.text import FUNCTIONS, function
+from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import parameter_symbol
 

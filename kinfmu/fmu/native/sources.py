@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 
-from kinfmu.backends.c import compiler, emit
-from kinfmu.backends.c.text import array, booleans, string
+from kinfmu.codegen.c import compiler, emit
+from kinfmu.codegen.c.text import array, booleans, string
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface

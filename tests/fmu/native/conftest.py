@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import kinfmu
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from kinfmu.mechanism import Mechanism
 from tests.fmu.native.host import Host
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import kinfmu
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError, FmuError, RequestError
 from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native import archive

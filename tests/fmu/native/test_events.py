@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from kinfmu import MotionSequence, Spline
-from kinfmu.joints.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
+from kinfmu.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
 from kinfmu.mechanism import Mechanism
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from tests.fmu.native.conftest import Start
 from tests.fmu.native.host import OK, Host, answer
 from tests.fmu.test_laws import arms

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import kinfmu
-from kinfmu.backends.c import compiler
+from kinfmu.codegen.c import compiler
 from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan

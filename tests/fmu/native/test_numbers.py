@@ -12,7 +12,7 @@ import pytest
 import kinfmu
 from kinfmu import gallery
 from kinfmu.errors import FmuError
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from tests.fmu.native.conftest import Build
 from tests.fmu.test_parameters import OTHERS, linkage
 

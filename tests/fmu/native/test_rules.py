@@ -14,7 +14,7 @@ import pytest
 import kinfmu
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.sources import HEADERS, headers
-from kinfmu.solver.status import Status
+from kinfmu.solver.python.status import Status
 from tests.fmu.native.conftest import Build, Start
 from tests.fmu.native.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
 from tests.fmu.test_parameters import OTHERS, linkage

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.backends.c import compiler, emit
+from kinfmu.codegen.c import compiler, emit
 from kinfmu.fmu import description
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform
 from kinfmu.plan import compile_plan

@@ -1,1 +1,0 @@
-"""Back ends: each prints the one SolvePlan in a language."""

@@ -1,0 +1,93 @@
+"""The main job on the reference four-bar: check, FMU, simulation, comparison with the report, logs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from kinfmu.analysis import check
+from kinfmu.bench.exact_fourbar import closed_form
+from kinfmu.fmu import build, simulate
+from kinfmu.gallery import load
+from kinfmu.log import write_mcap, write_rrd
+from kinfmu.run import Run
+from kinfmu.solver.python.status import Status
+
+# The report's printed table (Alzaga 1999): t [s], then phi1, x2, y2, phi2, phi3 to four digits.
+PRINTED = (
+    (30, (0.5236, 1.8660, 0.5000, 0.0, 0.5236)),
+    (60, (1.0472, 1.5000, 0.8660, 0.0, 1.0472)),
+    (90, (1.5708, 1.0000, 1.0000, 0.0, 1.5708)),
+    (120, (2.0944, 0.5000, 0.8660, 0.0, 2.0944)),
+    (150, (2.6180, 0.1340, 0.5000, 0.0, 2.6180)),
+)
+LETTERS = ("phi1", "x2", "y2", "phi2", "phi3")
+EXACT = 1e-12  # largest difference from the closed form in q, qd, qdd
+
+
+def compare_with_report(run: Run) -> tuple[str, bool]:
+    """The report's table beside ours with percent errors, and whether all 25 numbers agree to their four digits."""
+    lines = ["  t [s]" + "".join(f"{letter:>10}{'error %':>10}" for letter in LETTERS)]
+    agree = True
+    for t, printed in PRINTED:
+        row = run.q[int(np.flatnonzero(run.t == t)[0])]
+        cells = []
+        for ours, theirs in zip(row, printed, strict=True):
+            agree &= bool(abs(ours - theirs) <= 0.5e-4 * (1.0 + 1e-9))
+            percent = 100.0 * (theirs - ours) / ours if theirs else 100.0 * ours
+            cells.append(f"{round(ours, 4) + 0.0:10.4f}{abs(percent):10.4f}")
+        lines.append(f"{t:7d}" + "".join(cells))
+    return "\n".join(lines), agree
+
+
+def compare_with_closed_form(run: Run) -> tuple[str, bool]:
+    """Largest differences from the closed form, and whether all are within EXACT."""
+    worst = [
+        float(np.abs(ours - exact).max())
+        for ours, exact in zip((run.q, run.qd, run.qdd), closed_form(run.t), strict=True)
+    ]
+    text = ", ".join(f"{name} {value:.1e}" for name, value in zip(("q", "qd", "qdd"), worst, strict=True))
+    return text, max(worst) <= EXACT
+
+
+def main() -> int:
+    """Run the job in the current folder; exit status 1 if a comparison fails."""
+    mechanism = load("fourbar")
+    print(check(mechanism))
+
+    fmu = build(mechanism, Path("fmus/fourbar/fourbar.fmu"))
+    run = simulate(fmu)
+    bridged = listed_times(run, Status.BRIDGED)
+    print(f"\nsimulated {fmu} with fmpy: t = {run.t[0]:g} ... {run.t[-1]:g} s, {len(run)} samples")
+    print(f"interpolated across the singular points (status bridged) at t = {bridged} s")
+
+    table, agrees = compare_with_report(run)
+    print(
+        "\nours beside the table printed in R. A. Alzaga's report (1999), with the percent errors of its four digits:"
+    )
+    print("all 25 numbers agree" if agrees else "DIFFERENT")
+    print(table)
+    difference, exact = compare_with_closed_form(run)
+    print(f"\nlargest difference from the closed form: {difference} ({'fine' if exact else 'TOO LARGE'})")
+
+    logs = Path("logs")
+    logs.mkdir(exist_ok=True)
+    write_mcap(run, logs / "fourbar.mcap")
+    write_rrd(run, logs / "fourbar.rrd")
+    print(
+        "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; look at them with\n"
+        "  .venv/bin/kinfmu review logs/fourbar.mcap\n"
+        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (no screen: scripts/graphics, once)"
+    )
+    return 0 if agrees and exact and bool(run.good.all()) else 1
+
+
+def listed_times(run: Run, status: Status) -> str:
+    """Times of the samples of a status, such as '0, 1, 179, 180'."""
+    return ", ".join(f"{t:g}" for t in run.t[run.status == status])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

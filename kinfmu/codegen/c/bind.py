@@ -1,0 +1,41 @@
+"""kf_bind: parameters and what depends on them alone; why they cannot be had, if they cannot."""
+
+from __future__ import annotations
+
+from kinfmu.codegen.c.parts import Parts
+from kinfmu.codegen.c.text import function, string
+from kinfmu.codegen.writer import Writer, identifier
+from kinfmu.solver.python.continuation import NO_NUMBER
+
+_SIGNATURE = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room)"
+_HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
+
+
+def bind(parts: Parts) -> list[str]:
+    """The function: true if all that follows from the parameters is finite and the plan's conditions hold."""
+    derived, conditions = parts.derived, parts.plan.conditions
+    writer = Writer(parts.names, (), derived)
+    known = [f"{line};" for line in writer.statements([*derived, *(condition.node for condition in conditions)])]
+    numbers = [writer.expression(condition.node) for condition in conditions]
+    used = {node.name for node in writer.used if node.op == "symbol"}
+    lines = [
+        *(f"model->parameters[{k}] = parameters[{k}];" for k in parts.parameters.values()),
+        *(f"{identifier(name)} = parameters[{k}];" for name, k in parts.parameters.items() if name in used),
+        *known,
+        *(f"model->derived[{k}] = {writer.expression(node)};" for k, node in enumerate(derived)),
+    ]
+    terms = [f"fabs({number})" for number, (_, node, _) in zip(numbers, conditions, strict=True) if node not in derived]
+    if derived:
+        lines += ["for (k = 0; k < KF_DERIVED; ++k) {", "    total += fabs(model->derived[k]);", "}"]
+        terms.insert(0, "total")
+    if terms:
+        lines += _refused_unless(f"{' + '.join(terms)} < INFINITY", string(NO_NUMBER))
+    for number, (name, _, meant) in zip(numbers, conditions, strict=True):
+        told = string(f"{name.replace('%', '%%')} = %.15g must be {meant}")
+        lines += _refused_unless(_HOLDS[meant].format(number), f"{told}, {number}")
+    variables = ("double total = 0.0;", "int k;") if derived else ()
+    return function(_SIGNATURE, [*lines, "return true;"], ("model", "parameters", "why", "room"), variables)
+
+
+def _refused_unless(condition: str, told: str) -> list[str]:
+    return [f"if (!({condition})) {{", f"    snprintf(why, room, {told});", "    return false;", "}"]

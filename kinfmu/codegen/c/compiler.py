@@ -1,0 +1,202 @@
+"""A shared library from generated C: compiled once by the system's compiler (or zig's), then taken from the cache.
+
+A library is found again by its sources, the flags, the compiler and the processor: see library_cache.py.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from kinfmu.codegen.c import library_cache
+from kinfmu.errors import CompilerError
+
+RUNTIME = Path(__file__).parents[2] / "solver" / "c"
+MODEL = ("kinfmu.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a model needs of the run time
+SOLVER = (*MODEL, "solver.h", "way.h", "turns.c", "pose.c", "hermite.c", "span.c", "bridge.c", "road.c", "survey.c",
+          "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c", "continuation.c", "softness.c",
+          "estimate.c")  # fmt: skip
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
+
+_ZIG = (sys.executable, "-m", "ziglang", "cc")
+
+
+def sources(names: Sequence[str]) -> dict[str, str]:
+    """Texts of files of the run time, by name."""
+    return {name: (RUNTIME / name).read_text("utf-8") for name in names}
+
+
+def runtime() -> dict[str, str]:
+    """Texts of all files of the run time, by name."""
+    return sources(sorted(path.name for path in RUNTIME.iterdir() if path.suffix in (".c", ".h")))
+
+
+def units(files: Mapping[str, str]) -> list[str]:
+    """Names of the C files to be compiled, in order: all but headers and what another one includes."""
+    included = {name for text in files.values() for name in _included(text)}
+    return sorted(name for name in files if name.endswith(".c") and name not in included)
+
+
+def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
+    """Return a shared library of C files (and the headers that they include), by name; compile it if it is not cached.
+
+    target: a platform in zig's words, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
+    CompilerError if there is no compiler, if it fails, or if the cache cannot be used.
+    """
+    build = _Build(files, flags, target)
+    return library_cache.find(build.key, build.suffix) or library_cache.store(build.key, build.suffix, build.compile())
+
+
+def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> bytes:
+    """Return the content of such a library, also where the cache cannot be used.
+
+    CompilerError if there is no compiler, or if it fails.
+    """
+    build = _Build(files, flags, target)
+    with suppress(CompilerError, OSError):
+        cached = library_cache.find(build.key, build.suffix)
+        if cached is not None:
+            return cached.read_bytes()
+    data = build.compile()
+    with suppress(CompilerError):
+        library_cache.store(build.key, build.suffix, data)
+    return data
+
+
+def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
+    """Load a shared library of C files. CompilerError as in shared_library, or if the system refuses to load it."""
+    path = shared_library(files, flags)
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise CompilerError(
+            f"the compiled library cannot be loaded: {error}; set KINFMU_CACHE to a folder where programs may run"
+        ) from None
+
+
+class _Build:
+    """What is compiled, by which compiler with which flags; key: what identifies the result."""
+
+    def __init__(self, files: Mapping[str, str], flags: Sequence[str], target: str | None) -> None:
+        self._files = files
+        self._compiler = command() if target is None else zig(target)
+        self._flags = (*FLAGS, *flags)
+        content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags]
+        content += [part for name in sorted(files) for part in (name, files[name])]
+        self.key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
+        self.suffix = _suffix(target)
+
+    def compile(self) -> bytes:
+        """Return the compiled library."""
+        try:
+            with tempfile.TemporaryDirectory() as scratch:
+                made = Path(scratch) / f"{self.key}{self.suffix}"
+                compiled(self._compiler, self._files, self._flags, made)
+                return made.read_bytes()
+        except OSError as error:
+            raise CompilerError(f"{self._compiler[0]} cannot compile the generated C: {error}") from None
+
+
+def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
+    """Run a compiler on C files; CompilerError with its first complaint if it fails."""
+    with tempfile.TemporaryDirectory() as scratch:
+        for name, text in files.items():
+            (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
+        names = units(files)
+        libraries = [] if os.name == "nt" else ["-lm"]
+        if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles side by side itself
+            _run([[*compiler, *flags, "-c", *share] for share in _shares(files, names, os.cpu_count() or 1)], scratch)
+            names = [f"{name.removesuffix('.c')}.o" for name in names]
+        _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
+
+
+def _shares(files: Mapping[str, str], names: Sequence[str], count: int) -> list[list[str]]:
+    """C files in so many shares, or fewer, of about the same length: the longest first, each to the shortest share."""
+    whole = {name: _length(files, name) for name in names}
+    shares: list[list[str]] = [[] for _ in range(min(count, len(names)))]
+    for name in sorted(names, key=lambda name: (-whole[name], name)):
+        min(shares, key=lambda share: sum(whole[one] for one in share)).append(name)
+    return shares
+
+
+def _length(files: Mapping[str, str], name: str) -> int:
+    """Of a C file with what it includes of other C files."""
+    return len(files[name]) + sum(_length(files, one) for one in _included(files[name]))
+
+
+def _included(text: str) -> list[str]:
+    """The C files that a C file includes."""
+    return re.findall(r'^#include "(\w+\.c)"', text, re.MULTILINE)
+
+
+def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
+    """Run compilers side by side; CompilerError with the first complaint if one fails."""
+    running = [
+        subprocess.Popen(  # noqa: S603  a compiler that we looked up, on sources of our own
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8"
+        )
+        for command in commands
+    ]
+    told = [process.communicate()[1] for process in running]
+    for process, command, text in zip(running, commands, told, strict=True):
+        if process.returncode != 0:
+            lines = text.splitlines() or ["no word of why"]
+            complaint = next((line for line in lines if "error" in line), lines[0])
+            raise CompilerError(f"{command[0]} cannot compile the generated C: {complaint}")
+
+
+@cache
+def command() -> tuple[str, ...]:
+    """What CC names, cc, gcc, clang, or zig's from the extra `native`; CompilerError if none is there."""
+    named = os.environ.get("CC")
+    for name in [named] if named else ["cc", "gcc", "clang"]:
+        found = shutil.which(name)
+        if found:
+            return (found,)
+    if find_spec("ziglang") is not None:
+        return _ZIG
+    looked = f"CC names {named!r}, which is not there" if named else "neither cc, gcc nor clang is there"
+    raise CompilerError(f"no C compiler: {looked}; pip install 'kinfmu[native]' brings one")
+
+
+def zig(target: str) -> tuple[str, ...]:
+    """Zig's compiler for a platform; CompilerError if it is not installed."""
+    if find_spec("ziglang") is None:
+        raise CompilerError("compiling for other platforms needs ziglang; pip install 'kinfmu[native]'")
+    return (*_ZIG, "-target", target)
+
+
+def _suffix(target: str | None) -> str:
+    system = target or {"win32": "windows", "darwin": "macos"}.get(sys.platform, "")
+    return ".dll" if "windows" in system else ".dylib" if "macos" in system else ".so"
+
+
+@cache
+def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
+    with tempfile.TemporaryDirectory() as scratch:  # for some platforms zig leaves a file behind
+        done = subprocess.run(  # noqa: S603  a compiler that we looked up
+            [*compiler, "--version"], cwd=scratch, capture_output=True, text=True, check=False
+        )
+    return (*compiler, done.stdout)
+
+
+@cache
+def _processor() -> str:
+    """What -march=native compiles for: the processor's features where the system tells them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())

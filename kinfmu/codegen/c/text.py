@@ -1,0 +1,74 @@
+"""C text: numbers, strings, arrays, declarations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+_WIDTH = 110
+
+FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos"}  # of solver/c/sincos.h
+
+
+def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") -> list[str]:
+    """'head a, b, c tail' on as many lines as it takes."""
+    lines, line = [], head
+    for k, item in enumerate(items):
+        piece = item if k == len(items) - 1 else f"{item},"
+        if len(line) + len(piece) + 1 > _WIDTH and line.strip():
+            lines.append(line.rstrip())
+            line = indent
+        line += piece if line.endswith(("{", "(", indent)) else f" {piece}"
+    return [*lines, line + tail]
+
+
+def string(text: str) -> str:
+    """A string literal. Names are ASCII letters, digits, underscores and full stops: nothing is to be escaped."""
+    return f'"{text}"'
+
+
+def array(declaration: str, items: Iterable[object]) -> list[str]:
+    """'const double a[2] = {1.0, 2.0};' of 'double a' and its items; without items there is room for one, zero."""
+    texts = [repr(item) if isinstance(item, float) else str(item) for item in items]
+    storage = "static const" if declaration.startswith("static ") else "const"
+    declaration = declaration.removeprefix("static ")
+    return wrapped(f"{storage} {declaration}[{max(len(texts), 1)}] = {{", texts or ["0"], "};")
+
+
+def booleans(values: Iterable[object]) -> list[str]:
+    """C's words for what counts as true or false in Python."""
+    return ["true" if value else "false" for value in values]
+
+
+def declared(names: Iterable[str]) -> list[str]:
+    """'double a, b;' of names, each once; nothing for no names."""
+    unique = list(dict.fromkeys(names))
+    return wrapped("double", unique, ";", "       ") if unique else []
+
+
+def assigned(lines: Iterable[str]) -> list[str]:
+    """Names that the statements of a function give values to."""
+    found = [re.match(r"\s*(\w+) = |\s*kf_sincos\(.*, &(\w+), &(\w+)\);", line) for line in lines]
+    return [name for match in found if match for name in match.groups() if name]
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines one step further in."""
+    return [f"    {line}" for line in lines]
+
+
+def function(
+    signature: str, lines: Sequence[str], arguments: Iterable[str] = (), variables: Sequence[str] = ()
+) -> list[str]:
+    """A function, and an empty line: what its statements assign is declared as double.
+
+    arguments: names of those that it may do without, which is told where it does; variables: further declarations.
+    """
+    text = "\n".join([*variables, *lines])
+    unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    return [signature, "{", *indented([*declared(assigned(lines)), *variables, *unused, *lines]), "}", ""]
+
+
+def repeated(count: int, lines: Sequence[str]) -> list[str]:
+    """The lines, in a loop over k unless they are to be gone through once."""
+    return list(lines) if count == 1 else [f"for (k = 0; k < {count}; ++k) {{", *indented(lines), "}"]

@@ -1,0 +1,343 @@
+"""The C functions of a kind of units: what kinfmu.codegen.python.loops writes in Python.
+
+    position(model, row, x, hold, z, held, determinant, newton)    true if Newton arrived
+    velocity(model, row, x, hold, given, held, x1)                 rates of the unit's coordinates
+    acceleration(model, row, x, hold, given, held, x1, x2)         their accelerations
+    jacobian(model, row, x, hold, entries), residuals(...)
+
+A row tells the places of the unit's givens in the lists, the numbers that are its own, and the places of its
+coordinates. Units without a solved block do without z, held, given and determinant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from kinfmu.codegen.alike import Kind, Run, positions
+from kinfmu.codegen.c.text import FUNCTIONS, function, indented
+from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.newton import (
+    ITERATIONS,
+    SETTLED,
+    determinant,
+    is_small,
+    opposite_solution,
+    solution,
+    square,
+)
+from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.naming import derivative_name
+from kinfmu.plan import Block
+from kinfmu.plan.trace import is_parameter
+from kinfmu.solver.python.curve import CurveData
+
+
+class Units:
+    """Writes the functions of one kind.
+
+    curves: names of the constants that hold the data of curves; parameters: places of the parameters by the names of
+    their symbols; derived: places of what depends on parameters alone.
+    """
+
+    def __init__(
+        self,
+        kind: Kind,
+        curves: Mapping[CurveData, str],
+        parameters: Mapping[str, int],
+        derived: Mapping[Node, int],
+    ) -> None:
+        self.kind = kind
+        self.label = kind.label
+        self.names = Names(kind.coordinates, curves, FUNCTIONS)
+        for block in kind.blocks:
+            for name, motion in block.assigned:
+                self.names.assign(motion[0], name)
+        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        self.known = {*self.positions, *derived}  # what later functions find computed
+        self.given, self.constants, own = fields(kind)
+        self.own = dict(zip(kind.coordinates, own, strict=True))
+        self.parameters = parameters
+        self.derived = derived
+        self.place = places(kind)
+        self.hold: dict[str, Node] = {}  # numbers that later functions take from the position
+        self.keeps_determinant = False
+        self.later = self._later()
+
+    # What the functions are made of
+
+    def room(self) -> int:
+        """How many numbers a unit hands on."""
+        return len(self.hold) + int(self.keeps_determinant) + self._factors_room()
+
+    def _factors_room(self) -> int:
+        block = self.kind.solved
+        if block is None or is_small(block):
+            return 0
+        m, k = len(block.residuals), len(block.unknowns)
+        return k * k + 2 * k if m == k else 2 * m * k
+
+    def handed_on(self, node: Node) -> int:
+        """Place of a node of the position stage among the numbers that a unit hands on, from now on if not before."""
+        name = self.names.of(node)
+        self.hold.setdefault(name, node)
+        return list(self.hold).index(name)
+
+    def _hold(self, name: str) -> str:
+        return f"hold[{list(self.hold).index(name)}]"
+
+    @property
+    def _kept(self) -> str:
+        """Where the determinant of a small block stands, or the factors of a larger one."""
+        return f"hold[{len(self.hold)}]" if self.keeps_determinant else f"hold + {len(self.hold)}"
+
+    def _loads(self, writer: Writer, found: Iterable[str]) -> list[str]:
+        """Assignments of what the statements use and have not found themselves."""
+        known = set(found)
+        lines = []
+        for node in writer.used:
+            name = self.names.of(node)
+            if node in self.derived:
+                lines.append(f"{name} = model->derived[{self.derived[node]}];")
+            elif node.op != "symbol":
+                self.hold.setdefault(name, node)
+                lines.append(f"{name} = <{name}>;")  # the place is told when all of them are known
+            elif node.name in known:
+                continue
+            elif is_parameter(node):
+                lines.append(f"{name} = model->parameters[{self.parameters[node.name]}];")
+            elif node.name in self.constants:
+                lines.append(f"{name} = row->{name};")
+            else:
+                place = self.place[node.name]
+                lines.append(f"{name} = {LISTS[place[0]]}[row->{place[1]}];")
+        return lines
+
+    # The functions
+
+    def source(self) -> list[str]:
+        text = "\n".join([*row_type(self.kind), "", *self._position(), *self.later])
+        for name in self.hold:
+            text = text.replace(f"<{name}>", self._hold(name))
+        return text.replace("<kept>", self._kept).split("\n")
+
+    def _later(self) -> list[str]:
+        block = self.kind.solved
+        if block is not None:
+            self.keeps_determinant = is_small(block)
+        lines = self._rates("velocity", 1) + self._rates("acceleration", 2)
+        if block is not None:
+            lines += self._entries("jacobian", [entry for row in block.jacobian for entry in row], None)
+            lines += self._entries("residuals", block.residuals, block.row_scales)
+        return lines
+
+    def _position(self) -> list[str]:
+        writer = Writer(self.names, self.derived, self.hold.values())
+        block = self.kind.solved
+        lines: list[str] = []
+        for one in self.kind.blocks:
+            lines += self._newton(writer, one) if one.unknowns else self._given_outright(writer, one)
+        found = [name for one in self.kind.blocks for name, _ in one.assigned]
+        lines = self._loads(writer, found) + lines
+        lines += [f"x[row->{field}] = {identifier(name)};" for name, field in self.own.items()]
+        lines += [f"{self._hold(name)} = {name};" for name in self.hold]
+        if block is None:
+            arguments = ["model", "row", "x", "hold"]
+            signature = (
+                f"static void position{self.label}(const kf_model *model, const row{self.label} *row, double *x,"
+                " double *hold)"
+            )
+            return function(signature, lines, arguments)
+        lines += [f"{self._kept} = det;"] if self.keeps_determinant else []
+        lines += ["*determinant = det;", "newton->iterations += iteration;"]
+        lines += [
+            "newton->largest = newton->largest > error ? newton->largest : error;",
+            "newton->total += error; /* a NaN stays */",
+        ]
+        lines.append("return true;")
+        signature = (
+            f"static bool position{self.label}(const kf_model *model, const row{self.label} *row, double *x,\n"
+            "    double *hold, const double *z, bool held, double *determinant, kf_newton *newton)"
+        )
+        variables = ["int iteration;"] if is_small(block) else ["double det;", "int iteration;"]
+        return function(signature, lines, ("model", "hold"), variables)
+
+    def _given_outright(self, writer: Writer, block: Block) -> list[str]:
+        lines = []
+        for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
+            new = writer.statements([motion[0]])
+            given = writer.expression(motion[0])
+            if given != identifier(name):
+                new.append(f"{identifier(name)} = {given}")
+            lines += [f"{line};" for line in new[:-1]]
+            lines += [f"{line}; /* {row} */" for line in new[-1:]]
+        return lines
+
+    def _newton(self, writer: Writer, block: Block) -> list[str]:
+        entries = [entry for row in block.jacobian for entry in row]
+        unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
+        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
+        before = [f"{line};" for line in writer.statements(writer.independent(looped, unknowns))]
+        turned = [node for node in reachable(looped) if node.op in ("sin", "cos") and node.args[0].op == "symbol"]
+        inside = [f"{line};" for line in writer.statements(turned)]
+        inside += self._given_outright(writer, block)
+        inside += [f"{line};" for line in writer.statements([*block.residuals, *entries])]
+        r = [f"r{k}" for k in range(len(block.residuals))]
+        inside += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
+        inside.append(f"error = {square(r, block.row_scales)};")
+        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        inside += self._determinant(jacobian, block.usual)
+        starts = [f"z[row->{self.own[name]}]" for name in block.unknowns]
+        angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
+        names = [identifier(name) for name in block.unknowns]
+        return [
+            f"/* {', '.join(block.unknowns)} from {', '.join(block.row_names)} */",
+            *before,
+            "last = INFINITY;",
+            f"for (iteration = 0; iteration < {ITERATIONS}; ++iteration) {{",
+            *indented(inside),
+            "    if (error <= newton->enough || held",
+            f"        || (16.0 * error > last && error <= {SETTLED**2!r} * ({angles}))) {{",
+            "        break;",
+            "    }",
+            "    last = error;",
+            *indented(self._correction(jacobian, r, names)),
+            "}",
+            f"if (iteration == {ITERATIONS}) {{",
+            "    newton->failed = error;",
+            "    return false;",
+            "}",
+        ]
+
+    def _determinant(self, jacobian: Sequence[Sequence[str]], usual: Sequence[float]) -> list[str]:
+        m, k = len(jacobian), len(jacobian[0])
+        if m == k <= 2:
+            return [f"det = {determinant(jacobian)};"]
+        flat = ", ".join(entry for row in jacobian for entry in row)
+        part = f"kf_row_part({k}, matrix, usual)" if m == k else f"kf_column_part({m}, {k}, matrix, usual)"
+        call = f"kf_lu({k}, matrix, <kept>, &det)" if m == k else f"kf_qr({m}, {k}, matrix, <kept>, &det)"
+        return [
+            "{",
+            f"    const double matrix[{m * k}] = {{{flat}}};",
+            f"    static const double usual[{k}] = {{{', '.join(map(repr, usual))}}};",
+            f"    if (!{call}) {{",
+            "        newton->failed = error;",
+            "        return false;",
+            "    }",
+            f"    det *= {part};",
+            "}",
+        ]
+
+    def _correction(self, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
+        """z -= J^-1 r."""
+        m, k = len(jacobian), len(z)
+        if m == k <= 2:
+            return [f"{name} -= {step};" for name, step in zip(z, solution(jacobian, r, "det"), strict=True)]
+        return self._solve(m, k, r, [f"{name} -= step[{i}];" for i, name in enumerate(z)])
+
+    def _solve(self, m: int, k: int, right: Sequence[str], then: Sequence[str]) -> list[str]:
+        sizes, name = (f"{k}", "kf_lu_solve") if m == k else (f"{m}, {k}", "kf_qr_solve")
+        return [
+            "{",
+            f"    const double right[{m}] = {{{', '.join(right)}}};",
+            f"    double step[{k}];",
+            f"    {name}({sizes}, <kept>, right, step);",
+            *indented(then),
+            "}",
+        ]
+
+    def _rates(self, name: str, order: int) -> list[str]:
+        """Rates (order 1) or accelerations (2) of all coordinates of the unit."""
+        writer = Writer(self.names, self.known)
+        lines: list[str] = []
+        found: list[str] = []
+        for block in self.kind.blocks:
+            if block.unknowns:
+                lines += self._linear(writer, block, order)
+            for coordinate, motion in block.assigned:
+                lines += [f"{line};" for line in writer.statements([motion[order]])]
+                lines.append(f"{identifier(derivative_name(coordinate, order))} = {writer.expression(motion[order])};")
+            found += [derivative_name(coordinate, order) for coordinate in block.coordinates]
+        lines = self._loads(writer, found) + lines
+        out = LISTS[order]
+        lines += [
+            f"{out}[row->{field}] = {identifier(derivative_name(one, order))};" for one, field in self.own.items()
+        ]
+        solving = " const double *given, bool held," if self.kind.solved else ""
+        ready = " const double *x1," if order == 2 else ""
+        signature = (
+            f"static void {name}{self.label}(const kf_model *model, const row{self.label} *row, const double *x,"
+            f" const double *hold,\n   {solving}{ready} double *{out})"
+        )
+        arguments = ["model", "x", "hold", *(["x1"] if order == 2 else [])]
+        return function(signature, lines, arguments)
+
+    def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
+        """The linear solve of a block, or what is given in its place."""
+        right = (block.velocity, block.acceleration)[order - 1]
+        m, k = len(block.residuals), len(block.unknowns)
+        entries = [entry for row in block.jacobian for entry in row] if k == 2 and is_small(block) else []
+        before = [f"{line};" for line in writer.statements([*right, *entries])]
+        b = [f"b{i}" for i in range(m)]
+        z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
+        taken = [f"    {one} = given[row->{self.own[name]}];" for one, name in zip(z, block.unknowns, strict=True)]
+        solved = [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
+        if is_small(block):
+            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian] if entries else []
+            kept, by_det = ("det = <kept>;", "/ det") if order == 1 else ("per_det = 1.0 / <kept>;", "* per_det")
+            values = opposite_solution(jacobian, b, by_det)
+            solved += [kept, *(f"{one} = {value};" for one, value in zip(z, values, strict=True))]
+        else:
+            opposite = [f"-{one}" for one in b]
+            solved += self._solve(m, k, opposite, [f"{one} = step[{i}];" for i, one in enumerate(z)])
+        return [*before, "if (held) {", *taken, "} else {", *indented(solved), "}"]
+
+    def _entries(self, name: str, nodes: Sequence[Node], scales: Sequence[float] | None) -> list[str]:
+        """A function that writes numbers of the position stage one after another."""
+        writer = Writer(self.names, self.derived if scales else self.known)
+        lines = [f"{line};" for line in writer.statements(nodes)]
+        for k, node in enumerate(nodes):
+            scale = "" if scales is None else f" / {scales[k]!r}"
+            text = writer.expression(node)
+            lines.append(f"entries[{k}] = ({text}){scale};" if scale else f"entries[{k}] = {text};")
+        lines = self._loads(writer, ()) + lines
+        signature = (
+            f"static void {name}{self.label}(const kf_model *model, const row{self.label} *row, const double *x,"
+            " const double *hold,\n    double *entries)"
+        )
+        return function(signature, lines, ("model", "row", "x", "hold"))
+
+
+def fields(kind: Kind) -> tuple[list[str], list[str], list[str]]:
+    """Names in a row: of the places of what is given, of the numbers, and of the places of the unit's coordinates."""
+    given = [f"g{k}" for k in range(len(kind.given))]
+    return given, [f"c{k}" for k in range(kind.constants)], [f"k{k}" for k in range(len(kind.coordinates))]
+
+
+def row_type(kind: Kind) -> list[str]:
+    """The struct of a row."""
+    given, constants, own = fields(kind)
+    members = [f"    int {', '.join(given)};"] if given else []
+    members += [f"    double {', '.join(constants)};"] if constants else []
+    return ["typedef struct {", *members, f"    int {', '.join(own)};", f"}} row{kind.label};"]
+
+
+def places(kind: Kind) -> dict[str, tuple[int, str]]:
+    """Of each symbol of a unit its order of derivative and the row's field that tells its place in that list."""
+    given, _, own = fields(kind)
+    found: dict[str, tuple[int, str]] = {}
+    for field, names in zip(given, kind.given, strict=True):
+        found |= {name: (order, field) for order, name in enumerate(names)}
+    for field, name in zip(own, kind.coordinates, strict=True):
+        found |= {derivative_name(name, order): (order, field) for order in range(3)}
+    return found
+
+
+def rows_of(number: int, run: Run, place: Mapping[str, int]) -> list[str]:
+    """The table of a run."""
+    rows = []
+    for member in run.members:
+        given, own = ([str(place[name]) for name in names] for names in (member.given, member.own))
+        told = f" /* {', '.join(member.own)} */"
+        rows.append(f"    {{{', '.join([*given, *map(repr, member.constants), *own])}}},{told}")
+    return [f"static const row{run.kind.label} run_{number}[{len(rows)}] = {{", *rows, "};", ""]

@@ -1,0 +1,56 @@
+"""Where every number of a plan stands when coordinates are kept in lists: in Python's loops, in C, and in C's lanes.
+
+The lists hold the unknowns first, in the order of z, then the coordinates that are given outright, then the drivers: x
+their positions, x1 their rates, x2 their accelerations.
+"""
+
+from __future__ import annotations
+
+from kinfmu.codegen.alike import Run, runs_of
+from kinfmu.codegen.parametric import parametric
+from kinfmu.equations.graph import Node
+from kinfmu.naming import derivative_name
+from kinfmu.plan import SolvePlan
+from kinfmu.plan.trace import parameter_symbol
+
+LISTS = ("x", "x1", "x2")  # coordinates, their rates, their accelerations
+
+
+class Lists:
+    """The lists of a plan and what their numbers are made by.
+
+    runs: its blocks as runs of alike units; order: names in the lists, `place` the place of each; given_outright: how
+    many coordinates need no solving; parameters, derived: places of the parameters by their symbols, and of what
+    depends on them alone.
+    """
+
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        self._rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
+        self.runs = runs_of(plan.blocks, self.rate_of)
+        self.kinds = {run.kind.label: run.kind for run in self.runs}
+        assigned = [name for block in plan.blocks for name, _ in block.assigned]
+        self.given_outright = len(assigned)
+        self.order = [*plan.unknowns, *assigned, *(driver.inputs[0] for driver in plan.drivers)]
+        self.place = {name: k for k, name in enumerate(self.order)}
+        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
+        _, derived = parametric(plan)
+        self.derived = {node: k for k, node in enumerate(derived)}
+
+    def rate_of(self, name: str, order: int) -> str:
+        """Name of a derivative of a coordinate or of a driver's value."""
+        return self._rates[name][order] if name in self._rates else derivative_name(name, order)
+
+    def numbered(self) -> list[tuple[int, Run]]:
+        """The runs with their numbers, from 1."""
+        return list(enumerate(self.runs, start=1))
+
+    def stands(self, order: int) -> dict[str, int]:
+        """Place in its list of each symbol of an order."""
+        return {self.rate_of(name, order): k for name, k in self.place.items()}
+
+    def outputs(self, order: int) -> list[tuple[Node, int | None]]:
+        """Each output of an order with its place in the list, None for a formula."""
+        stands = self.stands(order)
+        nodes: list[Node] = [motion[1:][order] for motion in self.plan.outputs_motion]
+        return [(node, stands.get(node.name) if node.op == "symbol" else None) for node in nodes]

@@ -1,0 +1,60 @@
+"""A single driver at speed 1 and acceleration 0: what is constant then is folded before code is written."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+
+from kinfmu.codegen.writer import identifier
+from kinfmu.equations.graph import Node, reachable
+from kinfmu.plan import Block
+
+_OPERATIONS: dict[str, Callable[..., Node]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "neg": operator.neg,
+}
+
+
+class Alone:
+    """Right sides and formulas of a plan whose only driver has speed 1 and acceleration 0.
+
+    formulas: rates and accelerations of assigned coordinates by name, in the order of evaluation.
+    """
+
+    def __init__(self, speed: str, acceleration: str, formulas: Mapping[str, Node]) -> None:
+        self._given = {speed: 1.0, acceleration: 0.0}
+        self.formulas: dict[str, Node] = {}
+        for name, node in formulas.items():
+            (folded,) = self._folded([node])
+            self.formulas[name] = folded
+            if folded.constant is not None:
+                self._given[name] = folded.constant
+
+    def velocity(self, block: Block) -> tuple[Node, ...]:
+        """The block's right side for velocities, folded."""
+        return tuple(self._folded(block.velocity))
+
+    def acceleration(self, block: Block) -> tuple[Node, ...]:
+        """The block's right side for accelerations, folded."""
+        return tuple(self._folded(block.acceleration))
+
+    def spoken(self, name: str) -> str:
+        """A rate as an argument: a number where it is one."""
+        return repr(self._given[name]) if name in self._given else identifier(name)
+
+    def _folded(self, targets: Sequence[Node]) -> list[Node]:
+        """The targets with numbers in place of the symbols that are given; the graph simplifies what it can."""
+        new: dict[Node, Node] = {}
+        for node in reachable(targets):
+            if node.op == "symbol" and node.name in self._given:
+                new[node] = node.graph.constant(self._given[node.name])
+            elif node.op in _OPERATIONS:
+                new[node] = _OPERATIONS[node.op](*(new[arg] for arg in node.args))
+            elif node.args:
+                new[node] = node.graph.function(node.op, *(new[arg] for arg in node.args), value=node.value)
+            else:
+                new[node] = node
+        return [new[target] for target in targets]

@@ -1,0 +1,133 @@
+"""The statements of one block: Newton's loop and the linear solves, unrolled for one and two unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from kinfmu.codegen.newton import (
+    ITERATIONS,
+    SETTLED,
+    determinant,
+    is_small,
+    opposite_solution,
+    solution,
+    square,
+)
+from kinfmu.codegen.writer import Writer, identifier
+from kinfmu.equations.graph import symbols
+from kinfmu.plan import Block
+
+
+def assigned_lines(writer: Writer, block: Block) -> list[str]:
+    """Statements for the coordinates that a block gives outright, each with the row that gives it."""
+    lines = []
+    for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
+        new = writer.statements([motion[0]])
+        given = writer.expression(motion[0])
+        if given != identifier(name):
+            new.append(f"{identifier(name)} = {given}")
+        lines += new[:-1]
+        lines += [f"{line}  # {row}" for line in new[-1:]]
+    return lines
+
+
+def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str], held: str, number: str) -> list[str]:
+    """Newton's loop of a block from predictions that stand in its unknowns.
+
+    label: ends the names that outlive the loop (det, factors); starts: names of the unknowns before the prediction;
+    held: an expression that is true where the unknowns are not to be solved for; number: of the block, for the error.
+    The code reads `enough`, the squared residual that it may end at.
+    """
+    entries = [entry for row in block.jacobian for entry in row]
+    unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
+    looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
+    before = writer.statements(writer.independent(looped, unknowns))
+    inside = assigned_lines(writer, block)
+    inside += writer.statements([*block.residuals, *entries])
+    r = [f"r{i}" for i in range(len(block.residuals))]
+    inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
+    inside.append(f"error = {square(r, block.row_scales)}")
+    jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+    z = [identifier(name) for name in block.unknowns]
+    inside += _determinant(label, jacobian, block.usual)
+    # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
+    angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
+    settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
+    done = f"error <= enough or {held} or ({settled})"
+    return [
+        *before,
+        "last = inf",
+        f"for iteration in range({ITERATIONS}):",
+        *indented(inside),
+        f"    if {done}:",
+        "        break",
+        "    last = error",
+        *indented(_correction(label, jacobian, r, z)),
+        "else:",
+        f"    raise ArithmeticError({number}, sqrt(error))",
+    ]
+
+
+def kept_name(block: Block, label: str) -> str:
+    """What a block hands on for its linear solves: its determinant, or its factors."""
+    return f"det{label}" if is_small(block) else f"factors{label}"
+
+
+def _determinant(label: str, jacobian: Sequence[Sequence[str]], usual: Sequence[float]) -> list[str]:
+    m, n = len(jacobian), len(jacobian[0])
+    if m == n <= 2:
+        return [f"det{label} = {determinant(jacobian)}"]
+    factor, part = ("factor", "row_part") if m == n else ("qr_factor", "column_part")
+    return [
+        f"jacobian = {matrix(jacobian)}",
+        f"factors{label} = {factor}(jacobian)",
+        f"det{label} = factors{label}.determinant * {part}(jacobian, {tuple(usual)!r})",
+    ]
+
+
+def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
+    """z -= J^-1 r."""
+    m, n = len(jacobian), len(z)
+    if m == n <= 2:
+        return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, f"det{label}"), strict=True)]
+    solve = "lu_solve" if m == n else "qr_solve"
+    steps = [f"d{i}" for i in range(n)]
+    lines = [f"{tupled(steps)} = {solve}(factors{label}, [{', '.join(r)}])"]
+    return lines + [f"{name} -= {step}" for name, step in zip(z, steps, strict=True)]
+
+
+def solution_lines(
+    label: str, order: int, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]
+) -> list[str]:
+    """Z = -J^-1 b, of velocities (order 1) or accelerations (2)."""
+    m, n = len(jacobian), len(z)
+    if m == n <= 2:
+        if order == 1:  # a quotient, rounded once: where bodies turn alike their speeds do to the bit
+            solved, before = opposite_solution(jacobian, b, f"/ det{label}"), []
+        else:
+            solved, before = opposite_solution(jacobian, b, "* per_det"), [f"per_det = 1.0 / det{label}"]
+        return [*before, *(f"{name} = {value}" for name, value in zip(z, solved, strict=True))]
+    solve = "lu_solve" if m == n else "qr_solve"
+    return [f"{tupled(z)} = {solve}(factors{label}, [{', '.join(f'-{name}' for name in b)}])"]
+
+
+def matrix(rows: Sequence[Sequence[str]]) -> str:
+    """'[[a, b], [c, d]]'."""
+    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
+
+
+def tupled(items: Iterable[str]) -> str:
+    """'(a, b)', '(a,)', '()'."""
+    items = list(items)
+    return f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+
+
+def unpacking(names: Iterable[str], source: str) -> list[str]:
+    """Assignment of a tuple's items to names, indented as in a function; nothing for no names."""
+    names = list(names)
+    return [f"    {tupled(names)} = {source}"] if names else []
+
+
+def indented(lines: Iterable[str], spaces: int = 4) -> list[str]:
+    """The lines, further to the right."""
+    return [f"{' ' * spaces}{line}" for line in lines]

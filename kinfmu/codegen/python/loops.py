@@ -1,0 +1,200 @@
+"""The functions of a kind of units: each a loop over a run of them, on lists that hold all coordinates.
+
+    position(run, x, z, held, enough, number, determinants, largest, iterations) -> holds, largest, iterations
+    velocity(run, holds, x1, given, held, number)                        rates of the unit's coordinates, into x1
+    acceleration(run, holds, x1, x2, given, held, number)                accelerations, into x2
+    rates(run, holds, x1)                                                of the coordinates that are given outright
+    accelerations(run, holds, x1, x2)                                    the same
+    jacobian(run, holds, found), residual(run, holds, found)             appended to `found`
+
+A row of a run tells the places of the unit's givens in the lists, the numbers that are its own, and the places of its
+coordinates. holds: what the later functions need of the position, one tuple a unit; number: of the unit's block. Kinds
+without a solved block have the shorter position(run, x) -> holds, rates and accelerations only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from kinfmu.codegen.alike import Kind, positions
+from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.python.block_code import (
+    assigned_lines,
+    indented,
+    kept_name,
+    matrix,
+    newton_lines,
+    solution_lines,
+    tupled,
+)
+from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable
+from kinfmu.naming import derivative_name
+from kinfmu.plan import Block
+from kinfmu.plan.trace import is_parameter
+from kinfmu.solver.python.curve import CurveData
+
+
+class Loops:
+    """Writes the functions of one kind. curves: names of the constants that hold the data of curves."""
+
+    def __init__(self, kind: Kind, curves: Mapping[CurveData, str]) -> None:
+        self.kind = kind
+        self.label = kind.label
+        self.names = Names(kind.coordinates, curves)
+        for block in kind.blocks:
+            for name, motion in block.assigned:
+                self.names.assign(motion[0], name)
+        self.positions = reachable([node for group in positions(kind.blocks) for node in group])
+        own = {name: f"k{i}" for i, name in enumerate(kind.coordinates)}
+        self.row = tupled(
+            [*(f"g{i}" for i in range(len(kind.given))), *(f"c{i}" for i in range(kind.constants)), *own.values()]
+        )
+        self.places = {
+            names[order]: f"{LISTS[order]}[g{i}]" for i, names in enumerate(kind.given) for order in range(3)
+        }
+        for order in range(3):
+            self.places |= {derivative_name(name, order): f"{LISTS[order]}[{place}]" for name, place in own.items()}
+        self.own = own
+        self.hold: dict[str, Node | None] = {}  # names that later functions take from the position
+
+    def source(self) -> list[str]:
+        """All functions, those of the position stage first."""
+        kind, later = self.kind, []
+        if kind.solved:
+            later += self._linear("velocity", 1) + self._linear("acceleration", 2)
+            later += self._matrices(kind.solved) + self._residuals(kind.solved)
+        if kind.has_assigned:
+            later += self._assigned("rates", 1) + self._assigned("accelerations", 2)
+        parts = self._position()
+        hold = tupled(self.hold)
+        return [*parts, *(line.replace(_HOLD, hold) for line in later)]
+
+    def _position(self) -> list[str]:
+        keep = [node for node in self.hold.values() if node is not None]
+        writer = Writer(self.names, (), keep)
+        solved, label = self.kind.solved, self.label
+        lines: list[str] = []
+        for block in self.kind.blocks:
+            if not block.unknowns:
+                lines += assigned_lines(writer, block)
+                continue
+            starts = [f"z[{self.own[name]}]" for name in block.unknowns]
+            lines += newton_lines(writer, block, label, starts, f"({_HELD})", "number")
+            lines += ["iterations += iteration", "if error > largest:", "    largest = error"]
+            lines += [f"determinants.append(det{label})", "number += 1"]
+        found = [name for block in self.kind.blocks for name, _ in block.assigned]
+        lines = self._loaded(writer, found) + lines
+        lines += [f"{self.places[name]} = {identifier(name)}" for name in self.kind.coordinates]
+        arguments, results = ["run", "x"], ["holds"]
+        about = "Coordinates that are given outright."
+        if solved:
+            arguments += ["z", "held", "enough", "number", "determinants", "largest", "iterations"]
+            results += ["largest", "iterations"]
+            about = f"{len(solved.residuals)} x {len(solved.unknowns)} from rows {', '.join(solved.row_names)}."
+        return [
+            "",
+            f"def position{label}({', '.join(arguments)}):",
+            f'    """{about}"""',
+            "    holds = []",
+            f"    for {self.row} in run:",
+            *indented(lines, 8),
+            f"        holds.append({tupled(self.hold)})",
+            f"    return {', '.join(results)}",
+            "",
+        ]
+
+    def _loaded(self, writer: Writer, known: Iterable[str]) -> list[str]:
+        """Statements that take from the lists what the written ones use and do not know."""
+        known = set(map(identifier, known))
+        names = [node.name for node in writer.used if node.op == "symbol" and node.name in self.places]
+        return [f"{identifier(name)} = {self.places[name]}" for name in names if identifier(name) not in known]
+
+    def _later(self, name: str, arguments: Sequence[str], lines: Sequence[str], *, counted: bool = False) -> list[str]:
+        """A function that loops over units with what the position handed on."""
+        return [
+            "",
+            f"def {name}{self.label}({', '.join(['run', 'holds', *arguments])}):",
+            f"    for {self.row}, {_HOLD} in zip(run, holds):",
+            *indented(lines, 8),
+            *(["        number += 1"] if counted else []),
+            "",
+        ]
+
+    def _linear(self, name: str, order: int) -> list[str]:
+        """Rates (order 1) or accelerations (2) of all coordinates of the units."""
+        writer = Writer(self.names, self.positions)
+        lines: list[str] = []
+        found: list[str] = []
+        for block in self.kind.blocks:
+            if block.unknowns:
+                lines += self._solution(writer, block, order)
+            lines += self._assignments(writer, block, order)
+            found += [derivative_name(coordinate, order) for coordinate in block.coordinates]
+        self._import(writer)
+        lines = self._loaded(writer, [*self.hold, *found]) + lines
+        lists = LISTS[1 : order + 1]
+        return self._later(name, [*lists, "given", "held", "number"], lines, counted=True)
+
+    def _solution(self, writer: Writer, block: Block, order: int) -> list[str]:
+        """The linear solve of a block, or what is given in its place."""
+        right = (block.velocity, block.acceleration)[order - 1]
+        lines = writer.statements([*right, *(entry for row in block.jacobian for entry in row)])
+        b = [f"b{i}" for i in range(len(right))]
+        lines += [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
+        z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
+        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        self.hold.setdefault(kept_name(block, self.label), None)
+        taken = [f"given[{self.own[name]}]" for name in block.unknowns]
+        stand = [self.places[derivative_name(name, order)] for name in block.unknowns]
+        return [
+            *lines,
+            f"if {_HELD}:",
+            *(f"    {one} = {value}" for one, value in zip(z, taken, strict=True)),
+            "else:",
+            *indented(solution_lines(self.label, order, jacobian, b, z)),
+            *(f"{place} = {one}" for place, one in zip(stand, z, strict=True)),
+        ]
+
+    def _assignments(self, writer: Writer, block: Block, order: int) -> list[str]:
+        lines = []
+        for coordinate, motion in block.assigned:
+            name = derivative_name(coordinate, order)
+            lines += writer.statements([motion[order]])
+            lines.append(f"{identifier(name)} = {self.places[name]} = {writer.expression(motion[order])}")
+        return lines
+
+    def _assigned(self, name: str, order: int) -> list[str]:
+        writer = Writer(self.names, self.positions)
+        lines = [line for block in self.kind.blocks for line in self._assignments(writer, block, order)]
+        self._import(writer)
+        found = [derivative_name(coordinate, order) for block in self.kind.blocks for coordinate, _ in block.assigned]
+        return self._later(name, LISTS[1 : order + 1], self._loaded(writer, [*self.hold, *found]) + lines)
+
+    def _matrices(self, block: Block) -> list[str]:
+        writer = Writer(self.names, self.positions)
+        lines = writer.statements([entry for row in block.jacobian for entry in row])
+        rows = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        self._import(writer)
+        return self._later("jacobian", ["found"], [*lines, f"found.append({matrix(rows)})"])
+
+    def _residuals(self, block: Block) -> list[str]:
+        writer = Writer(self.names, self.positions)
+        lines = writer.statements(block.residuals)
+        scaled = zip(block.residuals, block.row_scales, strict=True)
+        row = ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled)
+        self._import(writer)
+        return self._later("residual", ["found"], [*lines, f"found.append([{row}])"])
+
+    def _import(self, writer: Writer) -> None:
+        """Note what a later function takes from the position."""
+        told = {*self.own, *(names[0] for names in self.kind.given)}
+        for node in writer.used:
+            if node.op != "symbol":
+                self.hold.setdefault(self.names.of(node), node)
+            elif node.name in told and not is_parameter(node):
+                self.hold.setdefault(identifier(node.name), None)
+
+
+_HOLD = "<hold>"
+_HELD = "held and held >> number & 1"  # as a rule nothing is held

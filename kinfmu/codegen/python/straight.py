@@ -1,0 +1,354 @@
+"""The model module of a plan of few blocks: everything unrolled, every number under its own name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from kinfmu.codegen.newton import ROUND_OFF
+from kinfmu.codegen.parametric import parametric
+from kinfmu.codegen.python.alone import Alone
+from kinfmu.codegen.python.binding import bound
+from kinfmu.codegen.python.block_code import (
+    assigned_lines,
+    indented,
+    kept_name,
+    matrix,
+    newton_lines,
+    solution_lines,
+    tupled,
+    unpacking,
+)
+from kinfmu.codegen.python.definitions import Definitions
+from kinfmu.codegen.python.differences import differences
+from kinfmu.codegen.python.header import curve_names, drive, header, places
+from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.naming import derivative_name
+from kinfmu.plan import Block, SolvePlan
+
+
+def straight(plan: SolvePlan) -> str:
+    """Source text of the module; equal plans give equal text."""
+    return _Straight(plan).module()
+
+
+class _Straight:
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        self.solved = [block for block in plan.blocks if block.unknowns]
+        self.curves = curve_names(plan)
+        self.unknowns = plan.unknowns
+        self.places = places(self.solved)
+        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
+        self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
+        self.position_nodes: list[Node] = []
+        self.formulas: dict[str, Node] = {}  # of rates and accelerations of assigned coordinates
+        for block in plan.blocks:
+            for name, motion in block.assigned:
+                self.names.assign(motion[0], name)
+                self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
+            self.position_nodes += [motion[0] for _, motion in block.assigned]
+            self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+        self.parametric, self.prolog = parametric(plan)
+        known = [node for node in reachable(self.position_nodes) if node not in self.parametric]
+        self.known = {*known, *self.prolog}  # what later stages find computed
+        self.definitions = Definitions(self.formulas)
+        self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
+        self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
+
+    def _rate_of(self, name: str, order: int) -> str:
+        """Name of a derivative of a coordinate or of a driver's value."""
+        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
+
+    def module(self) -> str:
+        """Constants and functions; with parameters the functions stand in `bound`, which binds their values."""
+        later = [
+            self._velocity(),
+            self._acceleration(),
+            *(self._alone() if len(self.plan.drivers) == 1 else ()),
+            self._stage("outputs", "Positions of the outputs.", (0,)),
+            self._stage("rates", "Rates of the outputs.", (1,)),
+            self._stage("accelerations", "Accelerations of the outputs.", (2,)),
+            self._stage("motion", "Positions, rates and accelerations of the outputs in one row.", (0, 1, 2)),
+            self._watches(),
+            self._jacobians(),
+            self._residuals(),
+        ]
+        position = self._position()  # after the later stages, which say what it has to hand on
+        unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
+        functions = [*drive(self.plan, self.curves), *position, *differences(self.plan)]
+        for lines in later:
+            functions += [unpacked if line is _VALUES else line for line in lines]
+        if self.plan.parameters:
+            functions = bound(self.plan, self.names, self.prolog, functions)
+        return "\n".join([*header(self.plan, self.curves), *functions]) + "\n"
+
+    def _position(self) -> list[str]:
+        keep = [node for node in self.exports.values() if node is not None]
+        writer = Writer(self.names, self.prolog, keep)
+        lines = [
+            "",
+            f"def position(u, z, zd, zdd, s, held=0, enough={ROUND_OFF**2}):",
+            '    """Unknowns by Newton from a prediction, block by block; or ArithmeticError(block, residual)."""',
+            *unpacking(map(identifier, self.inputs[0]), "u"),
+        ]
+        if self.solved:
+            lines += ["    half = 0.5 * s"]
+            if len(self.solved) > 1:
+                lines += ["    largest, iterations = 0.0, 0"]
+            lines += self._predicted()
+        number = 0
+        for block in self.plan.blocks:
+            if block.unknowns:
+                lines += indented(self._solved(writer, number, block))
+                number += 1
+            else:
+                lines += indented(assigned_lines(writer, block))
+        z = tupled(identifier(name) for name in self.unknowns)
+        values = tupled(self.exports)
+        margin, determinants = "1.0", "()"
+        if self.solved:
+            lines += [
+                f"    m{k} = det{k} * {1.0 / block.determinant_scale!r}" for k, block in enumerate(self.solved, start=1)
+            ]
+            determinants = tupled(f"m{k}" for k in range(1, len(self.solved) + 1))
+            sizes = [f"abs(m{k})" for k in range(1, len(self.solved) + 1)]
+            margin = f"min({', '.join(sizes)})" if len(sizes) > 1 else sizes[0]
+        summary = "1.0, 0.0, 0, 0.0"
+        if self.solved:
+            error, count = ("largest", "iterations") if len(self.solved) > 1 else ("error", "iteration")
+            summary = f"{margin}, sqrt({error}), {count}, {self._moved()} if {count} else 0.0"
+        rows = [node for _, node in self.plan.watches]
+        lines += indented(writer.statements(rows))
+        watched = [f"abs({writer.expression(node)})" for node in rows]
+        summary += ", " + (f"max({', '.join(watched)})" if len(watched) > 1 else "".join(watched) or "0.0")
+        return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
+
+    def _predicted(self) -> list[str]:
+        """Unknowns as predicted, by their names."""
+        lines = []
+        for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
+            lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
+        for k, name in enumerate(self.unknowns):
+            lines.append(f"    {identifier(name)} = p{k} = z{k} + s * (d{k} + half * a{k})")
+        return lines
+
+    def _moved(self) -> str:
+        """The largest correction of a prediction, in radians and sizes."""
+        moves = []
+        for k, name in enumerate(self.unknowns):
+            move = f"abs({identifier(name)} - p{k})"
+            moves.append(move if name.endswith(".phi") else f"{move} / {self.plan.size!r}")
+        return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
+
+    def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
+        """Statements of a block that needs Newton."""
+        starts = [f"z{place}" for place in range(*self.places[k])]
+        lines = [f"# block {k + 1}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}"]
+        lines += newton_lines(writer, block, str(k + 1), starts, f"held & {1 << k}", str(k))
+        if len(self.solved) > 1:
+            lines += ["iterations += iteration", "largest = max(largest, error)"]
+        return lines
+
+    def _velocity(self) -> list[str]:
+        lines = [
+            "",
+            "def velocity(values, ud, given=(), held=0):",
+            '    """Rates of the unknowns: J zd = -rate of the rows with z at rest."""',
+        ]
+        lines += [_VALUES, *unpacking(map(identifier, self.inputs[1]), "ud")]
+        return lines + self._linear(1, lambda block: block.velocity)
+
+    def _acceleration(self) -> list[str]:
+        lines = [
+            "",
+            "def acceleration(values, ud, udd, zd, given=(), held=0):",
+            '    """Accelerations of the unknowns: J zdd = -second rate of the rows with zdd = 0."""',
+        ]
+        lines += [
+            _VALUES,
+            *unpacking(map(identifier, self.inputs[1]), "ud"),
+            *unpacking(map(identifier, self.inputs[2]), "udd"),
+        ]
+        lines += unpacking([identifier(derivative_name(name, 1)) for name in self.unknowns], "zd")
+        return lines + self._linear(2, lambda block: block.acceleration)
+
+    def _alone(self) -> list[list[str]]:
+        """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
+        writer = Writer(self.names, self.known)
+        alone = Alone(self.inputs[1][0], self.inputs[2][0], self.formulas)
+        definitions = Definitions(alone.formulas)
+        lines, done = [], set[str]()
+        for order, right in ((1, alone.velocity), (2, alone.acceleration)):
+            lines += indented(self._linear_lines(writer, order, right, definitions, done))
+        self._import(writer)
+        first, second = (tupled(identifier(derivative_name(name, order)) for name in self.unknowns) for order in (1, 2))
+        told = "First and second derivative of the unknowns with respect to the driver."
+        tangent = [
+            "",
+            "def tangent(values):",
+            f'    """{told}"""',
+            _VALUES,
+            *lines,
+            f"    return {first}, {second}",
+            "",
+        ]
+        motion = self._stage("motion", "", (0, 1, 2))
+        head, row = motion.index(_VALUES) + 1, motion[-2].removeprefix("    return ")
+        first_read = [
+            "",
+            "def first_motion(values, ud, udd):",
+            '    """Tangent and motion in one go, for the first reading of a pose."""',
+            _VALUES,
+            *lines,
+            f"    first, second = {first}, {second}",
+            *motion[head:-2],
+            f"    return (first, second), {row}",
+            "",
+        ]
+        return [tangent, first_read]
+
+    def _linear(self, order: int, right: _Right) -> list[str]:
+        """Linear solves of one order as a function's body."""
+        writer = Writer(self.names, self.known)
+        lines = self._linear_lines(writer, order, right, self.definitions, set(), held=True)
+        self._import(writer)
+        result = tupled(identifier(derivative_name(name, order)) for name in self.unknowns)
+        return [*indented(lines), f"    return {result}", ""]
+
+    def _linear_lines(
+        self,
+        writer: Writer,
+        order: int,
+        right: _Right,
+        definitions: Definitions,
+        done: set[str],
+        *,
+        held: bool = False,
+    ) -> list[str]:
+        """Linear solves of one order, block after block, with the definitions that they need on the way."""
+        lines = []
+        for k, block in enumerate(self.solved):
+            z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+            vector, entries = right(block), [entry for row in block.jacobian for entry in row]
+            lines += definitions.lines(writer, _names(vector), done)
+            lines += writer.statements([*vector, *entries])
+            b = [f"b{i}" for i in range(len(vector))]
+            lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
+            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+            self.exports.setdefault(kept_name(block, str(k + 1)), None)
+            solution = solution_lines(str(k + 1), order, jacobian, b, z)
+            if held:
+                first, last = self.places[k]
+                lines.append(f"if held & {1 << k}:")
+                lines.append(f"    {tupled(z)} = given[{first}:{last}]")
+                lines += ["else:", *indented(solution)]
+            else:
+                lines += solution
+        return lines
+
+    def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
+        """A function that returns all outputs at some orders of derivative, one after another."""
+        targets: list[Node] = [motion[1:][order] for order in orders for motion in self.plan.outputs_motion]
+        highest = max(orders)
+        arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
+        lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', _VALUES]
+        for argument, names in (("ud", self.inputs[1]), ("udd", self.inputs[2])):
+            if argument in arguments:
+                lines += unpacking(map(identifier, names), argument)
+        if highest:
+            lines += self._chained(highest)
+        writer = Writer(self.names, self.known)
+        body = self.definitions.lines(writer, _names(targets), set()) + writer.statements(targets)
+        returned = tupled(writer.expression(node) for node in targets)
+        self._import(writer)
+        return [*lines, *indented(body), f"    return {returned}", ""]
+
+    def _chained(self, order: int) -> list[str]:
+        """Rates (and accelerations, of order 2) of the unknowns from `first` (and `second`).
+
+        With one driver by the chain rule: zd = z' ud, zdd = z'' ud^2 + z' udd.
+        """
+        rates, accelerations = ([identifier(derivative_name(unknown, k)) for unknown in self.unknowns] for k in (1, 2))
+        if len(self.plan.drivers) != 1:
+            lines = unpacking(rates, "first")
+            return lines if order == 1 else lines + unpacking(accelerations, "second")
+        speed, more = identifier(self.inputs[1][0]), identifier(self.inputs[2][0])
+        lines = unpacking([f"d{k}" for k in range(len(rates))], "first")
+        lines += [f"    {rate} = d{k} * {speed}" for k, rate in enumerate(rates)]
+        if order == 2:
+            lines += unpacking([f"a{k}" for k in range(len(rates))], "second")
+            lines += [f"    {name} = a{k} * {speed} * {speed} + d{k} * {more}" for k, name in enumerate(accelerations)]
+        return lines
+
+    def _watches(self) -> list[str]:
+        writer = Writer(self.names, self.known)
+        targets = [node for _, node in self.plan.watches]
+        body = writer.statements(targets)
+        returned = tupled(writer.expression(node) for node in targets)
+        self._import(writer)
+        return [
+            "",
+            "def watches(values):",
+            '    """Rows set aside as redundant, relative to the size: zero as long as they hold."""',
+            _VALUES,
+            *indented(body),
+            f"    return {returned}",
+            "",
+        ]
+
+    def _jacobians(self) -> list[str]:
+        writer = Writer(self.names, self.known)
+        matrices = []
+        body: list[str] = []
+        for block in self.solved:
+            body += writer.statements([entry for row in block.jacobian for entry in row])
+            matrices.append(matrix([[writer.expression(entry) for entry in row] for row in block.jacobian]))
+        self._import(writer)
+        return [
+            "",
+            "def jacobians(values):",
+            '    """Jacobian of each block."""',
+            _VALUES,
+            *indented(body),
+            f"    return {tupled(matrices)}",
+            "",
+        ]
+
+    def _residuals(self) -> list[str]:
+        writer = Writer(self.names, self.known)
+        rows, body = [], []
+        for block in self.solved:
+            body += writer.statements(block.residuals)
+            scaled = zip(block.residuals, block.row_scales, strict=True)
+            rows.append("[" + ", ".join(f"({writer.expression(r)}) / {scale!r}" for r, scale in scaled) + "]")
+        self._import(writer)
+        return [
+            "",
+            "def residuals(values):",
+            '    """Residuals of each block, relative to the size."""',
+            _VALUES,
+            *indented(body),
+            f"    return {tupled(rows)}",
+            "",
+        ]
+
+    def _import(self, writer: Writer) -> None:
+        """Note what a later stage takes from the position stage."""
+        coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
+        for node in writer.used:
+            if node in self.parametric:
+                continue
+            if node.op != "symbol":
+                self.exports.setdefault(self.names.of(node), node)
+            elif node.name in coordinates:
+                self.exports.setdefault(identifier(node.name), None)
+
+
+_VALUES = "    <values>"
+_Right = Callable[[Block], tuple[Node, ...]]
+
+
+def _names(targets: Sequence[Node]) -> list[str]:
+    """Names of the symbols that the targets are made of."""
+    return [symbol.name for symbol in symbols(targets)]

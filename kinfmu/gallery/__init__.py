@@ -1,0 +1,7 @@
+"""The gallery: mechanisms that come with kinfmu, and finding a mechanism by name or file."""
+
+from __future__ import annotations
+
+from kinfmu.gallery.load import folder, has, load, names, save
+
+__all__ = ["folder", "has", "load", "names", "save"]

@@ -1,0 +1,57 @@
+"""The gallery: mechanisms that come with kinfmu, and finding a mechanism by name or file."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from kinfmu.errors import MechanismError, RequestError, listed, suggestion
+from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import write_whole
+from kinfmu.gallery.chains import CHAINS, chain
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.toml_file import read
+from kinfmu.mechanism.toml_text import text
+
+
+def folder() -> Path:
+    """Where the gallery lies: `fmus/` of a checkout, or inside the installed package."""
+    package = Path(str(files("kinfmu")))
+    installed, checkout = package / "fmus", package.parent / "fmus"
+    return installed if installed.is_dir() else checkout
+
+
+def names() -> list[str]:
+    """Names of the gallery's mechanisms."""
+    return sorted(path.parent.name for path in folder().glob("*/mechanism.toml"))
+
+
+def has(name: str) -> bool:
+    """True for a name that `load` knows: one of the gallery, or a chain of any length such as 'fourbar_chain:1000'."""
+    return name in names() or (name.partition(":")[0] in CHAINS and ":" in name)
+
+
+def load(mechanism: str | Path) -> Mechanism:
+    """A mechanism by its gallery name or from a .toml file; chains also as 'fourbar_chain:1000', of any length."""
+    if isinstance(mechanism, str) and suffix_of(mechanism) != ".toml" and "/" not in mechanism:
+        name, colon, count = mechanism.partition(":")
+        if colon and name in CHAINS:
+            return chain(name, count)
+        known = names()
+        if mechanism not in known:
+            raise RequestError(
+                f"'{mechanism}' is not in the gallery{suggestion(mechanism, known)}; gallery: {listed(known)}; "
+                f"files end in .toml"
+            )
+        return read(folder() / mechanism / "mechanism.toml")
+    return read(mechanism)
+
+
+def save(mechanism: Mechanism, path: str | Path) -> Path:
+    """Write a mechanism file; `load` gives the same mechanism back."""
+    path = Path(path)
+    try:
+        write_whole(path, text(mechanism).encode())
+    except OSError as error:
+        raise MechanismError(f"{path}: cannot be written ({error.strerror})") from None
+    return path

@@ -1,0 +1,115 @@
+"""The contract of a law: u = f(x), in plain arithmetic; rate and acceleration follow."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from functools import cache
+from typing import Annotated, Any, ClassVar, NamedTuple, get_type_hints
+
+from kinfmu.errors import MechanismError
+from kinfmu.laws.jumps import Jumps
+from kinfmu.measures.arithmetic import Value
+from kinfmu.units import Quantity
+
+
+class LawQuantity(NamedTuple):
+    """What a number of a law measures, whatever the law leads: a driver over time, or a follower over a cam's angle."""
+
+    of: str  # "led" like u, "argument" like x, "angle" or "number"
+    order: int = 0  # ... per x^order
+    is_positive: bool = False
+
+    def quantity(self, led: str, argument: str) -> Quantity:
+        """The quantity when u is of the kind `led` and x of the kind `argument` ('length', 'angle', 'time')."""
+        kind = {"led": led, "argument": argument}.get(self.of, self.of)
+        if self.order and kind == argument:  # radians per radian are a number
+            return Quantity("number", self.order - 1, argument if self.order > 1 else "time")
+        return Quantity(kind, self.order, argument if self.order else "time")
+
+
+Led = Annotated[float, LawQuantity("led")]
+LedRate = Annotated[float, LawQuantity("led", 1)]
+Argument = Annotated[float, LawQuantity("argument")]
+Duration = Annotated[float, LawQuantity("argument", is_positive=True)]
+Phase = Annotated[float, LawQuantity("angle")]
+Frequency = Annotated[float, LawQuantity("angle", 1)]
+
+Path = tuple[str | int, ...]
+TURN = 2.0 * math.pi  # [rad]
+NEARLY = 1e-9  # of a turn; by how much a law may miss it, so that degrees and rounding do no harm
+
+
+class Constant(NamedTuple):
+    """A number of a law and what it measures."""
+
+    value: Any  # a float; in a mechanism that is being made, whatever was written
+    measures: LawQuantity
+
+
+class Law(ABC):
+    """How one quantity follows another: a driver's over time, a follower's over the angle of its cam.
+
+        u = f(x)
+
+    A leaf is a frozen dataclass; its fields are keys of the driver's or joint's table in a mechanism file, and their
+    annotations say how the reader takes them. Its constants become FMU parameters `<driver>.<name>`.
+    """
+
+    type: ClassVar[str]  # how mechanism files call it
+
+    @abstractmethod
+    def target(self, x: Value, **constants: Value) -> Value:
+        """f(x), in plain arithmetic, with the constants given by name."""
+
+    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
+        """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
+        return Jumps()
+
+    def numbers(self) -> dict[Path, Constant]:
+        """Every number of the law, by its path in the law's table; here the fields that are numbers."""
+        return {(key,): Constant(getattr(self, key), said) for key, said in number_fields(type(self)).items()}
+
+    def with_numbers(self, values: Mapping[Path, Any]) -> Law:
+        """The law with these numbers in place of its own."""
+        return replace(self, **{str(path[0]): value for path, value in values.items()})  # type: ignore[type-var]
+
+    def constants(self) -> dict[str, Constant]:
+        """The numbers that stay open until the law is evaluated, by name."""
+        return {str(path[0]): constant for path, constant in self.numbers().items()}
+
+    def at(self, x: Value) -> Value:
+        """f(x) with the law's own constants."""
+        return self.target(x, **{name: constant.value for name, constant in self.constants().items()})
+
+    def check(self, where: str) -> None:
+        """Raise a MechanismError for numbers that cannot be meant; `where` names the table, as in '[drivers.crank]'."""
+        for path, (value, measures) in self.numbers().items():
+            if measures.is_positive and not value > 0.0:
+                raise MechanismError(f"{where} {path[0]} = {float(value)!r} must be positive")
+
+    @property
+    def repeats(self) -> bool:
+        """True if it is meant to repeat: if its table says so."""
+        return False
+
+    def zeros(self) -> Mapping[str, Value]:
+        """Numbers that are 0 where f(x + 2 pi) is f(x), by what they are; in any arithmetic, as parameters may be."""
+        return {}
+
+    def why_no_turn(self) -> str:
+        """Why f(x + 2 pi) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
+
+        For laws of an angle: the lift of a cam, the radius of a pitch curve.
+        """
+        return f"law '{self.type}' does not repeat"
+
+
+@cache
+def number_fields(cls: type[Law]) -> Mapping[str, LawQuantity]:
+    """The fields of a law class that are numbers, with what they measure."""
+    hints = get_type_hints(cls, include_extras=True)
+    said = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}  # type: ignore[arg-type]
+    return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, LawQuantity)}

@@ -1,0 +1,144 @@
+"""Rises and dwells one after another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
+
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.laws.cycloidal import Cycloidal
+from kinfmu.laws.jumps import Jumps, jumping_breaks
+from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
+from kinfmu.laws.modified_sine import ModifiedSine
+from kinfmu.laws.modified_trapezoid import ModifiedTrapezoid
+from kinfmu.laws.polynomial_345 import Polynomial345
+from kinfmu.laws.polynomial_4567 import Polynomial4567
+from kinfmu.laws.rise import Rise
+from kinfmu.laws.simple_harmonic import SimpleHarmonic
+from kinfmu.measures.arithmetic import Value, curve, sqrt, without_periods
+
+RISES: tuple[type[Rise], ...] = (
+    SimpleHarmonic,
+    Cycloidal,
+    ModifiedSine,
+    ModifiedTrapezoid,
+    Polynomial345,
+    Polynomial4567,
+)
+DWELL = "dwell"
+_SHAPES = {rise.type: rise.shape for rise in RISES}
+_RISE, _DURATION = LawQuantity("led"), LawQuantity("argument", is_positive=True)
+
+
+class Segment(NamedTuple):
+    """One part of a sequence: a rise by the law of that name, or a "dwell", which stays where it is."""
+
+    law: str
+    duration: float
+    rise: float = 0.0  # how far, down if negative
+
+
+@dataclass(frozen=True)
+class MotionSequence(Law):
+    """Rises and dwells one after another.
+
+        u = start + sum_k rise_k N_k((x - begin_k) / duration_k),   begin_1 = begin,   begin_k+1 = begin_k + duration_k
+
+    N_k: normalized curves, 0 before and 1 after. segments: the parts in order; start: value before; begin: x where the
+    first one begins; repeat: the sequence begins again whenever it is over, and did so before `begin`; each time from
+    where the last one ended. Constants: start, begin, duration_1, rise_1, duration_2, ...
+    """
+
+    type: ClassVar[str] = "sequence"
+
+    segments: tuple[Segment, ...]
+    start: Led = 0.0
+    begin: Argument = 0.0
+    repeat: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "segments", tuple(Segment(*segment) for segment in self.segments))
+
+    def numbers(self) -> dict[Path, Constant]:
+        found = super().numbers()
+        for k, segment in enumerate(self.segments, start=1):
+            if segment.law != DWELL:
+                found[(f"rise_{k}",)] = Constant(segment.rise, _RISE)
+            found[(f"duration_{k}",)] = Constant(segment.duration, _DURATION)
+        return found
+
+    def with_numbers(self, values: Mapping[Path, Any]) -> MotionSequence:
+        segments = tuple(
+            segment._replace(
+                rise=values.get((f"rise_{k}",), segment.rise),
+                duration=values.get((f"duration_{k}",), segment.duration),
+            )
+            for k, segment in enumerate(self.segments, start=1)
+        )
+        own = {key: values.get((key,), getattr(self, key)) for key in ("start", "begin")}
+        return replace(self, segments=segments, **own)
+
+    def target(self, x: Value, **constants: Value) -> Value:
+        numbered = list(enumerate(self.segments, start=1))
+        rises = {k: constants[f"rise_{k}"] for k, segment in numbered if segment.law != DWELL}
+        durations = {k: constants[f"duration_{k}"] for k, _ in numbered}
+        value, begin = constants["start"], constants["begin"]
+        if self.repeat:
+            times, x = without_periods(x, begin, *durations.values())
+            value = value + sum(rises.values()) * times
+        since = x - begin
+        begin = 0.0
+        for k, segment in numbered:
+            if k in rises:
+                value = value + rises[k] * curve((since - begin) / durations[k], _SHAPES[segment.law])
+            begin = begin + durations[k]
+        return value
+
+    def jumps(self, **constants: Value) -> Jumps:
+        found: list[Value] = []
+        begin = constants["begin"]
+        for k, segment in enumerate(self.segments, start=1):
+            duration = constants[f"duration_{k}"]
+            if segment.law != DWELL:
+                found += [begin + duration * x for x in jumping_breaks(_SHAPES[segment.law])]
+            begin = begin + duration
+        return Jumps(tuple(found), begin - constants["begin"] if self.repeat else 0.0)
+
+    def check(self, where: str) -> None:
+        super().check(where)
+        if not self.segments:
+            raise MechanismError(f"{where} segments must hold at least one segment")
+        words = (*_SHAPES, DWELL)
+        for k, segment in enumerate(self.segments, start=1):
+            if segment.law not in words:
+                near = suggestion(str(segment.law), words)
+                raise MechanismError(
+                    f"{where} segments: law {segment.law!r} of segment {k} is not known{near}; known: {listed(words)}"
+                )
+            if segment.law == DWELL and segment.rise != 0.0:
+                raise MechanismError(f"{where} segments: segment {k} is a dwell, which has no rise")
+
+    @property
+    def repeats(self) -> bool:
+        return self.repeat
+
+    def zeros(self) -> Mapping[str, Value]:
+        whole = sum(segment.duration for segment in self.segments)
+        rises = [segment.rise for segment in self.segments if segment.law != DWELL]
+        found = {"durations in all over a turn, less 1,": whole / TURN - 1.0}
+        if rises:
+            found["rises in all over their size"] = sum(rises) / sqrt(sum(rise * rise for rise in rises))
+        return found
+
+    def why_no_turn(self) -> str:
+        if not self.repeat:
+            return "its sequence does not repeat; say repeat = true"
+        whole = sum(segment.duration for segment in self.segments)
+        if abs(whole - TURN) > NEARLY * TURN:
+            return f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"
+        rise = sum(segment.rise for segment in self.segments)
+        if abs(rise) > NEARLY * max(abs(segment.rise) for segment in self.segments):
+            return f"the rises of its sequence add up to {rise:.9g}, not to 0"
+        return ""

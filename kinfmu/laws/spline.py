@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar
+
+from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.laws.jumps import Jumps, jumping_breaks
+from kinfmu.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
+from kinfmu.measures.arithmetic import Value, curve, without_periods
+from kinfmu.measures.placement import Reference
+from kinfmu.solver.python.curve import CurveData, Piece
+
+NOT_A_KNOT, NATURAL, PERIODIC = ENDS = ("not_a_knot", "natural", "periodic")
+FEWEST = {NOT_A_KNOT: 4, NATURAL: 3, PERIODIC: 4}
+EDGE = 1e-12  # of the table's width; times k h miss the last point by rounding, and still belong to the table
+SAME = 1e-9  # of the largest value; by how much the ends of a periodic table may differ
+_X, _U = LawQuantity("argument"), LawQuantity("led")
+
+
+@dataclass(frozen=True)
+class Spline(Law):
+    """The cubic spline through the points of a table.
+
+        u = u_k + b_k s + c_k s^2 + d_k s^3,   s = x - x_k,        u'' continuous
+
+    points: (x_k, u_k), x ascending; ends: "not_a_knot" (the first two pieces are one cubic, and the last two),
+    "natural" (u'' = 0 at both ends) or "periodic" (repeats after the table's width, u' and u'' continuous there too).
+    Unless it is periodic, u stays at the first value before the table and at the last one after it.
+    De Boor, A Practical Guide to Splines, chapter IV.
+    """
+
+    type: ClassVar[str] = "spline"
+
+    points: tuple[tuple[float, float], ...]
+    ends: Annotated[str, Reference("choice", ENDS)] = NOT_A_KNOT
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", tuple(_pair(point) for point in self.points))
+
+    def numbers(self) -> dict[Path, Constant]:
+        return {
+            ("points", k, i): Constant(point[i], said)
+            for k, point in enumerate(self.points)
+            for i, said in enumerate((_X, _U))
+        }
+
+    def with_numbers(self, values: Mapping[Path, Any]) -> Spline:
+        points = tuple(
+            tuple(values.get(("points", k, i), point[i]) for i in (0, 1)) for k, point in enumerate(self.points)
+        )
+        return replace(self, points=points)
+
+    def constants(self) -> dict[str, Constant]:
+        return {}
+
+    @cached_property
+    def data(self) -> CurveData:
+        """The spline as a curve."""
+        return spline_data(self.points, self.ends)
+
+    def target(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
+        if self.ends == PERIODIC:
+            first, last = self.points[0][0], self.points[-1][0]
+            x = without_periods(x, first, last, -first)[1]
+        return curve(x, self.data)
+
+    def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
+        width = self.points[-1][0] - self.points[0][0]
+        return Jumps(jumping_breaks(self.data), width if self.ends == PERIODIC else 0.0)
+
+    def check(self, where: str) -> None:
+        if self.ends not in ENDS:
+            near = suggestion(str(self.ends), ENDS)
+            raise MechanismError(f"{where} ends = {self.ends!r} is not known{near}; known: {listed(ENDS)}")
+        fewest = FEWEST[self.ends]
+        if len(self.points) < fewest:
+            raise MechanismError(
+                f"{where} points: {len(self.points)} points are too few for ends = '{self.ends}'; at least {fewest}"
+            )
+        if any(type(value) is not float for point in self.points for value in point):
+            raise MechanismError(f"{where} points must be numbers; a table cannot hold expressions of parameters")
+        for k, ((x, _), (following, _)) in enumerate(pairwise(self.points), start=2):
+            if not following > x:
+                why = "is there twice" if following == x else f"comes after {x!r}"
+                raise MechanismError(f"{where} points: x = {following!r} of point {k} {why}; x must ascend")
+        if self.ends == PERIODIC:
+            first, last = self.points[0][1], self.points[-1][1]
+            if abs(last - first) > SAME * max(abs(u) for _, u in self.points):
+                raise MechanismError(
+                    f"{where} points: the last value {last!r} must be the first, {first!r}, with ends = 'periodic'"
+                )
+
+    @property
+    def repeats(self) -> bool:
+        return self.ends == PERIODIC
+
+    def why_no_turn(self) -> str:
+        if self.ends != PERIODIC:
+            return "its table does not repeat; say ends = 'periodic'"
+        width = self.points[-1][0] - self.points[0][0]
+        times = round(TURN / width)
+        if times < 1 or abs(width * times - TURN) > NEARLY * TURN:
+            return f"its table spans {math.degrees(width):.9g} deg, not a turn of 360 deg or a whole part of it"
+        return ""
+
+
+def _pair(point: Any) -> tuple[Any, Any]:
+    try:
+        x, u = tuple(point) if not isinstance(point, str) else ()
+    except (TypeError, ValueError):
+        raise MechanismError(f"points of a spline: {point!r} must be two numbers [x, u]") from None
+    return x, u
+
+
+def spline_data(points: Sequence[tuple[float, float]], ends: str) -> CurveData:
+    """The cubic spline through the points, from its second derivatives m_k at them.
+
+    h_k-1 m_k-1 + 2 (h_k-1 + h_k) m_k + h_k m_k+1 = 6 ((u_k+1 - u_k) / h_k - (u_k - u_k-1) / h_k-1)
+    """
+    x = [point[0] for point in points]
+    u = [point[1] for point in points]
+    if ends == PERIODIC:
+        u[-1] = u[0]
+    h = [b - a for a, b in pairwise(x)]
+    slope = [(b - a) / width for (a, b), width in zip(pairwise(u), h, strict=True)]
+    m = {NOT_A_KNOT: _not_a_knot, NATURAL: _natural, PERIODIC: _periodic}[ends](h, slope)
+    pieces: list[Piece] = []
+    for k, width in enumerate(h):
+        b = slope[k] - width * (2.0 * m[k] + m[k + 1]) / 6.0
+        pieces.append((x[k], ((m[k + 1] - m[k]) / (6.0 * width), 0.5 * m[k], b, u[k]), 0.0, 0.0, 0.0))
+    if ends == PERIODIC:
+        return tuple(x[1:-1]), tuple(pieces)
+    edge = EDGE * (x[-1] - x[0])
+    before, after = (0.0, (u[0],), 0.0, 0.0, 0.0), (0.0, (u[-1],), 0.0, 0.0, 0.0)
+    return (x[0] - edge, *x[1:-1], x[-1] + edge), (before, *pieces, after)
+
+
+def _rows(h: Sequence[float], slope: Sequence[float]) -> tuple[list[float], list[float], list[float], list[float]]:
+    """Lower, main and upper diagonal and right side for the inner points 1 to n - 1."""
+    inner = range(1, len(h))
+    main = [2.0 * (h[k - 1] + h[k]) for k in inner]
+    right = [6.0 * (slope[k] - slope[k - 1]) for k in inner]
+    return [h[k - 1] for k in inner], main, [h[k] for k in inner], right
+
+
+def _natural(h: Sequence[float], slope: Sequence[float]) -> list[float]:
+    return [0.0, *tridiagonal(*_rows(h, slope)), 0.0]
+
+
+def _not_a_knot(h: Sequence[float], slope: Sequence[float]) -> list[float]:
+    """m_0 lies on the line through m_1 and m_2, so that the first two pieces are one cubic; the end alike."""
+    lower, main, upper, right = _rows(h, slope)
+    first, last = h[0] / h[1], h[-1] / h[-2]
+    main[0] += h[0] * (1.0 + first)
+    upper[0] -= h[0] * first
+    main[-1] += h[-1] * (1.0 + last)
+    lower[-1] -= h[-1] * last
+    m = tridiagonal(lower, main, upper, right)
+    return [(1.0 + first) * m[0] - first * m[1], *m, (1.0 + last) * m[-1] - last * m[-2]]
+
+
+def _periodic(h: Sequence[float], slope: Sequence[float]) -> list[float]:
+    """m_0 = m_n: the row of point 0 reaches round to the last piece; m = y - m_0 z with y, z from the inner rows."""
+    lower, main, upper, right = _rows(h, slope)
+    y = tridiagonal(lower, main, upper, right)
+    z = tridiagonal(lower, main, upper, [h[0], *(0.0 for _ in right[2:]), h[-1]])
+    whole = 2.0 * (h[-1] + h[0]) - h[-1] * z[-1] - h[0] * z[0]
+    m_0 = (6.0 * (slope[0] - slope[-1]) - h[-1] * y[-1] - h[0] * y[0]) / whole
+    return [m_0, *(a - m_0 * b for a, b in zip(y, z, strict=True)), m_0]
+
+
+def tridiagonal(
+    lower: Sequence[float], main: Sequence[float], upper: Sequence[float], right: Sequence[float]
+) -> list[float]:
+    """Solution of a tridiagonal system with a dominant main diagonal, (n,); lower[0] and upper[n - 1] are not used."""
+    pivots, sides = [main[0]], [right[0]]
+    for k in range(1, len(main)):
+        factor = lower[k] / pivots[-1]
+        pivots.append(main[k] - factor * upper[k - 1])
+        sides.append(right[k] - factor * sides[-1])
+    solution = [sides[-1] / pivots[-1]]
+    for k in range(len(main) - 2, -1, -1):
+        solution.append((sides[k] - upper[k] * solution[-1]) / pivots[k])
+    return solution[::-1]

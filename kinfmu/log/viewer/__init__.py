@@ -1,0 +1,1 @@
+"""Rerun: recordings of runs, their blueprint, comparison and pictures."""

@@ -1,0 +1,225 @@
+"""How a recording is laid out on the screen: linkage, card and log on the left, plots on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from kinfmu.log.verdict import happenings
+from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
+from kinfmu.log.viewer.series import KINDS, ORDERS, Group
+from kinfmu.log.viewer.timeline import Timeline
+from kinfmu.run import Run
+from kinfmu.scene.scene import Scene
+
+if TYPE_CHECKING:
+    import rerun.blueprint as rrb
+
+SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
+SWEEP_SHOW = 10.0  # [s] that it takes where there is no time
+EDGE = 0.01  # of the run's time, left free before and after the curves
+LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
+PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
+LEAST_ROOM, MOST_ROOM = 0.15, 0.6  # of the run's time, left free behind the curves for the legend
+
+
+def single(
+    timeline: Timeline,
+    run: Run,
+    scene: Scene | None,
+    curves: Mapping[tuple[str, str], Group],
+    solver: Sequence[Group],
+) -> rrb.Blueprint:
+    """One run: what moves on the left, what it measures on the right, one row an order, one column a unit; below that
+    what the solver tells.
+    """
+    import rerun.blueprint as rrb
+
+    rows: list[rrb.Container | rrb.View] = []
+    for order in ORDERS:
+        found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
+        if found:
+            rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
+    shares = [2.0] * len(rows)
+    if solver:
+        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))
+        shares.append(1.5)
+    rows.append(status_view([""], timeline, [run]))
+    left = _left(linkage_view(["/linkage"], timeline, [run], [scene]), [""], [run])
+    right = rrb.Vertical(*rows, row_shares=[*shares, 1.0])
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, [run])
+
+
+def compared(
+    timeline: Timeline,
+    runs: tuple[Run, Run],
+    scenes: Sequence[Scene | None],
+    curves: Sequence[Mapping[tuple[str, str], Group]],
+    difference: Mapping[tuple[str, str], Group],
+) -> rrb.Blueprint:
+    """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
+    import rerun.blueprint as rrb
+
+    overlaid = [row for order in ORDERS if (row := _overlaid(order, timeline, runs, curves))]
+    rows: list[rrb.Container | rrb.View] = [*overlaid[:1]]
+    for order in ORDERS:
+        found = [difference[order, kind] for kind in KINDS if (order, kind) in difference]
+        if found:
+            rows.append(
+                rrb.Horizontal(
+                    *[plot(f"B - A: {group.title}", [("/difference", group)], timeline, runs) for group in found]
+                )
+            )
+    rows.append(status_view(["/a", "/b"], timeline, runs))
+    left = _left(linkage_view(["/a/linkage", "/b/linkage"], timeline, runs, scenes), ["/a", "/b"], runs)
+    apart = rrb.Vertical(*rows, row_shares=[2.0] * (len(rows) - 1) + [1.6], name="B - A")
+    both = rrb.Vertical(*overlaid, name="A and B")
+    right = rrb.Tabs(apart, both)
+    return arranged(rrb.Horizontal(left, right, column_shares=[1, 1.25]), timeline, runs)
+
+
+def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
+    """What moves, the card, and below it what happened, if anything did.
+
+    The log shows a line of each text, so it is as wide as it can be; the card breaks them.
+    """
+    import rerun.blueprint as rrb
+
+    if any(happenings(run) for run in runs):
+        return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
+    return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])
+
+
+def _overlaid(
+    order: str, timeline: Timeline, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
+) -> rrb.Container | None:
+    """The curves of both runs in the same plots, one for each unit; None if they have none of that order."""
+    import rerun.blueprint as rrb
+
+    plots = []
+    for kind in KINDS:
+        pair = [(root, of[order, kind]) for root, of in zip(("/a", "/b"), curves, strict=True) if (order, kind) in of]
+        if pair:
+            plots.append(plot(f"{pair[0][1].title} of A (wide) and B", pair, timeline, runs))
+    return rrb.Horizontal(*plots) if plots else None
+
+
+def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
+    """The content with Rerun's own panels out of the way, ready to play."""
+    import rerun.blueprint as rrb
+
+    length = max((float(run.t.max() - run.t.min()) for run in runs if len(run)), default=0.0)
+    show = min(max(length, SHORTEST_SHOW), LONGEST_SHOW) if timeline.parts is None else SWEEP_SHOW
+    speed = float(f"{length / show:.2g}") or 1.0
+    return rrb.Blueprint(
+        content,
+        rrb.TimePanel(
+            timeline=timeline.name,
+            state="collapsed",
+            play_state="paused",
+            loop_mode="all",
+            playback_speed=speed if timeline.parts is None else None,
+            fps=speed if timeline.parts else None,
+        ),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def time_axis(timeline: Timeline, runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
+    """The time of the whole runs, not the half minute around the cursor that is Rerun's default."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    start = min((float(run.t.min()) for run in runs if len(run)), default=0.0)
+    stop = max((float(run.t.max()) for run in runs if len(run)), default=0.0)
+    length = stop - start or 1.0
+    boundary = rr.encodings.TimeRangeBoundary.absolute
+    first, last = timeline.number(start - EDGE * length), timeline.number(stop + room * length)
+    shown = rr.TimeRange(start=boundary(**first), end=boundary(**last))
+    return rrb.TimeAxis(view_range=shown)
+
+
+def plot(
+    title: str,
+    groups: Sequence[tuple[str, Group]],
+    timeline: Timeline,
+    runs: Sequence[Run],
+    width: float = PLOT,
+) -> rrb.TimeSeriesView:
+    """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group); width: of
+    the plot [points].
+    """
+    import rerun.blueprint as rrb
+
+    names = [name for _, group in groups for name in group.names]
+    has_legend = len(names) > 1  # one that is longer than the plot is high scrolls
+    ranges = [group.shown for _, group in groups if group.shown]
+    axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
+    return rrb.TimeSeriesView(
+        name=title,
+        origin="/",
+        contents=[f"{root}/{group.path}" for root, group in groups],
+        axis_x=time_axis(timeline, runs, _legend_room(names, width) if has_legend else EDGE),
+        axis_y=axis_y,
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
+    )
+
+
+def _legend_room(names: Sequence[str], width: float) -> float:
+    """Part of the run's time that the legend of these curves hides in a plot of this width [points]."""
+    legend = LEGEND_EDGE + LETTER * max(map(len, names))
+    return min(max(legend / max(width - legend, 1.0), LEAST_ROOM), MOST_ROOM)
+
+
+def linkage_view(
+    roots: Sequence[str], timeline: Timeline, runs: Sequence[Run], scenes: Sequence[Scene | None]
+) -> rrb.Spatial2DView:
+    """The linkages, framed, with trails; the view stands at the root so that the flip of the plane takes effect."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    drawn = [(root, run, scene) for root, run, scene in zip(roots, runs, scenes, strict=True) if scene]
+    boxes = [view_box(scene) for _, _, scene in drawn]
+    bounds = None
+    if boxes:
+        x = (min(box[0][0] for box in boxes), max(box[0][1] for box in boxes))
+        y = (min(box[1][0] for box in boxes), max(box[1][1] for box in boxes))
+        bounds = rrb.VisualBounds2D(x_range=x, y_range=y)
+    relative = rr.encodings.TimeRangeBoundary.cursor_relative
+    trails: dict[Any, Any] = {}
+    for root, run, scene in drawn:
+        for point in scene.paths:
+            back = relative(**timeline.number(-trail_time(run, scene, point)))
+            ranges = rrb.VisibleTimeRange(timeline.name, start=back, end=relative(**timeline.number(0.0)))
+            trails[trail_path(root, point)] = rrb.VisibleTimeRanges([ranges])
+    contents = [f"{root}/**" for root in roots]
+    return rrb.Spatial2DView(name="linkage", origin="/", contents=contents, visual_bounds=bounds, overrides=trails)
+
+
+def card_view() -> rrb.TextDocumentView:
+    """Mechanism, run and verdict."""
+    import rerun.blueprint as rrb
+
+    return rrb.TextDocumentView(name="run", origin="/card")
+
+
+def status_view(roots: Sequence[str], timeline: Timeline, runs: Sequence[Run]) -> rrb.StateTimelineView:
+    """A lane of solver states for every run."""
+    import rerun.blueprint as rrb
+
+    contents = [f"{root}/solver/status" for root in roots]
+    name = "solver status" if timeline.parts is None else f"solver status over {timeline.name}"
+    return rrb.StateTimelineView(name=name, origin="/", contents=contents, time_view=time_axis(timeline, runs))
+
+
+def log_view(roots: Sequence[str]) -> rrb.TextLogView:
+    """What happened when."""
+    import rerun.blueprint as rrb
+
+    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    if len(roots) > 1:
+        columns = rrb.TextLogColumns(text_log_columns=["EntityPath", "LogLevel", "Body"])
+    return rrb.TextLogView(name="log", origin="/", contents=[f"{root}/log" for root in roots], columns=columns)

@@ -1,0 +1,71 @@
+"""Which names a linkage shows all the time, so that none is printed over another; the others show when pointed at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinfmu.run import FloatArray
+from kinfmu.scene.placing import world
+from kinfmu.scene.scene import Scene
+
+SUPPORT = 0.05  # height of a support, as a part of the size
+_WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame
+_LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: a letter, what is around them, its height
+_LOOKS = 40  # poses that are looked at
+_OFTEN = 0.35  # of them; names that cover each other in more are not shown both
+
+
+def dots(scene: Scene) -> float:
+    """Points of the screen to one unit of length, where the view shows the whole linkage."""
+    width, height = np.maximum(scene.high - scene.low, 1e-9 * scene.size)
+    return float(min(_WIDTH / width, _HEIGHT / height))
+
+
+def places_below(scene: Scene) -> FloatArray:
+    """Return where names of supports are written, (k, 2): below each, and further down where another would cover it."""
+    depth = 1.7 * SUPPORT * scene.stroke
+    line, placed = _LINE / dots(scene), list[FloatArray]()
+    for at in scene.supports.values():
+        here = np.array(at) - [0.0, depth]
+        while any(_covers(scene, here[None], a[None], b, c).any() for a, b, c in _pairs(scene, placed)):
+            here = here - [0.0, line]
+        placed.append(here)
+    return np.array(placed).reshape(-1, 2)
+
+
+def _pairs(scene: Scene, placed: Sequence[FloatArray]) -> list[tuple[FloatArray, str, str]]:
+    """Names of supports that are placed, each with that of the next one."""
+    names = list(scene.supports)
+    return [(at, names[len(placed)], name) for at, name in zip(placed, names, strict=False)]
+
+
+def shown_names(scene: Scene) -> frozenset[str]:
+    """Names of bodies and bars that are shown all the time: those of supports and points of interest come first."""
+    count = max((len(body.pose) for body in scene.bodies), default=0)
+    rows = np.unique(np.linspace(0, max(count - 1, 0), _LOOKS).astype(int)) if count else np.zeros(0, int)
+    taken = [(name, path[rows]) for name, path in scene.paths.items()]
+    taken += [(name, np.tile(at, (len(rows), 1))) for name, at in zip(scene.supports, places_below(scene), strict=True)]
+    found = []
+    middles = [(body.name, world(body.pose[rows], _middle(body.outline))) for body in scene.bodies if len(body.outline)]
+    middles += [(bar.name, bar.ends[rows].mean(axis=1)) for bar in scene.bars]
+    for name, track in middles:
+        covered = [_covers(scene, track, other, name, text) for text, other in taken]
+        if all(overlap.sum() <= _OFTEN * len(rows) for overlap in covered):
+            taken.append((name, track))
+            found.append(name)
+    return frozenset(found)
+
+
+def _middle(outline: FloatArray) -> tuple[float, float]:
+    """Where the viewer puts the name of a line."""
+    x, y = outline.mean(axis=0)
+    return float(x), float(y)
+
+
+def _covers(scene: Scene, a: FloatArray, b: FloatArray, first: str, second: str) -> FloatArray:
+    """Where two names (n, 2) lie on one another, (n,); False in gaps."""
+    apart = np.abs(a - b) * dots(scene)
+    width = 0.5 * _LETTER * (len(first) + len(second)) + _EDGE
+    return np.asarray((apart[:, 0] < width) & (apart[:, 1] < _LINE), float)

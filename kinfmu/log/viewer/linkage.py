@@ -1,0 +1,237 @@
+"""The moving linkage of a recording, y up: lines that stand still in the frames of bodies, and the frames that move."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.log.viewer.blocks import send
+from kinfmu.log.viewer.frames import Frames
+from kinfmu.log.viewer.ground import MOST_NAMES, log_ground
+from kinfmu.log.viewer.labels import shown_names
+from kinfmu.log.viewer.timeline import Timeline
+from kinfmu.run import FloatArray, Run
+from kinfmu.scene import palette
+from kinfmu.scene.scene import DrawnBody, Scene
+from kinfmu.scene.strokes import BROAD, LINK, Stroke
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+MARGIN = 0.12  # around the linkage, as a part of its size
+TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
+LONGEST_TRAIL = 0.2  # of the run's time
+_TRAIL_PIECES = 1500  # of a path over the whole run
+_BAR, _PIN, _POINT = 0.006, 0.012, 0.015  # radii, as parts of the size
+_SUPPORT_NAMES = 0.04  # more room below, for the names of supports
+
+
+def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Ranges of x and of the flipped y that show everything with a margin."""
+    margin = MARGIN * scene.size
+    below = np.array([0.0, _SUPPORT_NAMES * scene.size if scene.supports else 0.0])
+    low, high = scene.low - margin - below, scene.high + margin
+    return (float(low[0]), float(high[0])), (float(-high[1]), float(-low[1]))
+
+
+def trail_path(root: str, point: str) -> str:
+    """Entity of the trail behind a point of interest."""
+    return f"{root}/trails/{point}"
+
+
+def trail_time(run: Run, scene: Scene, point: str) -> float:
+    """How long the trail behind a point reaches back, on the timeline: usually for TRAIL of the linkage's size."""
+    steps = np.hypot(*np.diff(scene.paths[point], axis=0).T)
+    way, span = float(np.nansum(steps)), float(np.ptp(run.t)) if len(run) else 0.0
+    return span * min(TRAIL * scene.size / way, LONGEST_TRAIL) if way > 0.0 else 0.0
+
+
+def log_linkage(
+    rec: rr.RecordingStream,
+    root: str,
+    timeline: Timeline,
+    run: Run,
+    scene: Scene,
+    colour: palette.Colour | None = None,
+    width: float = 1.0,
+    layer: float = 0.0,
+) -> None:
+    """The linkage of a placed run under the entity `root`: all in `colour`, or each body in its own.
+
+    `width` scales the lines, and what has a higher `layer` covers what has a lower one.
+    Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
+    nothing to draw.
+    """
+    _Linkage(rec, root, timeline, run, scene, colour, width, layer).log()
+
+
+class _Linkage:
+    """What is being logged, and how."""
+
+    def __init__(
+        self,
+        rec: rr.RecordingStream,
+        root: str,
+        timeline: Timeline,
+        run: Run,
+        scene: Scene,
+        colour: palette.Colour | None,
+        width: float,
+        layer: float,
+    ) -> None:
+        self.rec, self.root, self.timeline, self.run, self.scene = rec, root, timeline, run, scene
+        self.colour, self.layer = colour, layer
+        self.size = width * scene.stroke
+        self.width = width
+        self.frames = Frames(rec, timeline, run, self.size, layer)
+        is_named = colour is None and len(scene.bodies) <= MOST_NAMES
+        self.names = shown_names(scene) if is_named else frozenset[str]()
+
+    def log(self) -> None:
+        """Everything, the ground first."""
+        import rerun as rr
+
+        # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
+        self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
+        log_ground(self.rec, self.root, self.scene, _PIN * self.size)
+        for body in self.scene.bodies:
+            self._body(body)
+        for bar in self.scene.bars:
+            path = f"{self.root}/bars/{bar.name}"
+            along = bar.ends[:, 1] - bar.ends[:, 0]
+            self.frames.move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
+            line = np.array([[0.0, 0.0], [bar.length, 0.0]])
+            self.frames.line(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name, bar.name in self.names)
+        self._cylinders()
+        for index, (name, points) in enumerate(self.scene.paths.items()):
+            own = self.colour or palette.body(len(self.scene.bodies) + index)
+            self._path(f"{self.root}/paths/{name}", points, own)
+            self._trail(trail_path(self.root, name), points, own)
+        self._notice()
+
+    def _body(self, body: DrawnBody) -> None:
+        """Its link, what joints add to it, its pins, and its points of interest."""
+        path = f"{self.root}/bodies/{body.name}"
+        own = self.colour or palette.body(body.index)
+        order = 20.0 + body.index / 100.0
+        self.frames.move(path, body.pose)
+        has_link = len(body.outline) > 1
+        if has_link:
+            self.frames.line(path, body.outline, LINK, own, order, body.name, body.name in self.names)
+        for k, stroke in enumerate(body.strokes):
+            label = body.name if k == 0 and not has_link else None
+            self._stroke(path, stroke, own, order, label)
+        self._pins(f"{path}/pins", body.pins)
+        first = len(self.scene.bodies)
+        names = list(self.scene.paths)
+        for name, at in body.points.items():
+            tint = self.colour or palette.body(first + names.index(name))
+            self.frames.points(f"{path}/points/{name}", at[None], _POINT, tint, 40.0, [name], self.colour is None)
+
+    def _stroke(self, path: str, stroke: Stroke, own: palette.Colour, order: float, label: str | None = None) -> None:
+        tones = {"own": own, "grey": palette.GROUND, "dark": palette.BACKDROP}
+        tint = self.colour if self.colour and stroke.tone != "dark" else tones[stroke.tone]
+        below = -0.5 if stroke.tone == "own" and not stroke.layer else 0.0  # a cam lies under the link through its pins
+        self.frames.line(
+            f"{path}/{stroke.name}",
+            stroke.points,
+            stroke.radius,
+            tint,
+            order + stroke.layer + below,
+            label,
+            label in self.names,
+        )
+
+    def _cylinders(self) -> None:
+        for cylinder in self.scene.cylinders:
+            path, shape = f"{self.root}/cylinders/{cylinder.shape.driver}", cylinder.shape
+            a, b = cylinder.ends[:, 0], cylinder.ends[:, 1]
+            angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
+            rod = np.array([[-shape.rod, 0.0], [0.0, 0.0]])
+            self.frames.move(f"{path}/rod", np.column_stack([b, angle]))
+            self.frames.line(f"{path}/rod", rod, _BAR, self.colour or palette.lighter(palette.BAR), 26.0)
+            barrel = np.array([[0.0, 0.0], [shape.barrel, 0.0]])
+            self.frames.move(f"{path}/barrel", np.column_stack([a, angle]))
+            self.frames.line(f"{path}/barrel", barrel, 0.8 * BROAD, self.colour or palette.GROUND, 27.0)
+            pin = np.zeros((1, 2))
+            for part in ("rod", "barrel"):
+                self.frames.points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
+
+    def _pins(self, path: str, pins: tuple[tuple[str, FloatArray], ...]) -> None:
+        """Pins with the names of their joints, which show when pointed at."""
+        if pins:
+            names, at = zip(*pins, strict=True)
+            self.frames.points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
+
+    def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
+        """Where a point goes over the run, in one piece for each stretch without a gap."""
+        import rerun as rr
+
+        pieces = [piece.astype(np.float32) for piece in stretches(points)]
+        if pieces:
+            line = rr.LineStrips2D(pieces, colors=[colour], radii=self._thin(1.0), draw_order=self.layer + 5.0)
+            self.rec.log(path, line, static=True)
+
+    def _trail(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
+        """Pieces of the path at their own times; the view shows those of a short time back."""
+        import rerun as rr
+
+        step = max(-(-len(points) // _TRAIL_PIECES), 1)
+        ends = np.arange(step, len(points), step)
+        pieces = [points[end - step : end + 1] for end in ends]
+        known = np.array([bool(np.isfinite(piece).all()) for piece in pieces], bool)
+        if not known.any():
+            return
+        look = rr.LineStrips2D.from_fields(radii=self._thin(2.4), colors=[colour], draw_order=self.layer + 6.0)
+        self.rec.log(path, look, static=True)
+        strips = np.stack([piece for piece, is_known in zip(pieces, known, strict=True) if is_known])
+        self._strips(path, self.run.t[ends[known]], strips)
+
+    def _thin(self, points: float) -> Any:
+        """Radius of a line that is thin at any zoom; of two runs that lie on one another the lower one is wide."""
+        import rerun as rr
+
+        return rr.Radius.ui_points(points if self.colour is None else 2.0 * self.width * points)
+
+    def _strips(self, path: str, t: FloatArray, strips: FloatArray) -> None:
+        """One polyline a sample: strips (n, k, 2)."""
+        import rerun as rr
+
+        columns = lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32))  # noqa: E731  short
+        send(self.rec, path, self.timeline, t, columns)
+
+    def _notice(self) -> None:
+        """Above the linkage, while the run has no numbers."""
+        import rerun as rr
+
+        run, scene, path = self.run, self.scene, f"{self.root}/notice"
+        if run.good.all():
+            return
+        place = [(scene.low[0] + scene.high[0]) / 2, scene.high[1] + 0.6 * MARGIN * scene.size]
+        look = rr.Points2D.from_fields(colors=[palette.STATUS[3]], radii=[0.0], show_labels=True)
+        self.rec.log(path, look, static=True)
+        turns = self.frames.turns()
+        lost = ~run.good[turns]
+        before = ~np.maximum.accumulate(run.good)[turns]
+        texts = [
+            "no pose yet" if early else "no pose: the last one that closed, in grey"
+            for early, gone in zip(before, lost, strict=True)
+            if gone
+        ]
+
+        def columns(rows: slice) -> Any:
+            counts = lost[rows].astype(int)
+            first = int(lost[: rows.start].sum())
+            labels = texts[first : first + int(counts.sum())]
+            positions = np.tile(np.array(place, np.float32), (len(labels), 1))
+            return [*rr.Points2D.columns(positions=positions, labels=labels).partition(counts)]
+
+        send(self.rec, path, self.timeline, run.t[turns], columns)
+
+
+def stretches(points: FloatArray) -> list[FloatArray]:
+    """The parts of a path (n, 2) between its gaps, those of more than one point."""
+    known = np.isfinite(points).all(axis=1)
+    pieces = [piece[np.isfinite(piece).all(axis=1)] for piece in np.split(points, np.flatnonzero(~known)) if len(piece)]
+    return [piece for piece in pieces if len(piece) > 1]

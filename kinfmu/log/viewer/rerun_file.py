@@ -1,0 +1,194 @@
+"""Rerun recording: the picture of a run, with its blueprint inside.
+
+    /linkage/...        bodies with what joints add to them, pins, bars, cylinders, supports, rails; y up
+    /linkage/paths/...  where points of interest go; /linkage/trails/...: where they just came from
+    /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
+                        one curve a coordinate, in rad and the mechanism's unit of length
+    /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors; /solver/margin
+    /solver/iterations  of Newton's method
+    /solver/status      a lane of states
+    /log                changes of status and events
+    /card               mechanism, run and verdict
+
+Recordings of one application share a blueprint in the viewer, whatever their own says: so runs that need the same one,
+of the same mechanism and time, are of one application, and what a person arranges for them stays; others are not.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+from uuid import uuid4
+from zlib import crc32
+
+import numpy as np
+
+from kinfmu.errors import LogError
+from kinfmu.log.clock import nanoseconds
+from kinfmu.log.target import replacing
+from kinfmu.log.verdict import changes, happenings, label, sentence
+from kinfmu.log.viewer.blocks import APPLICATION, send
+from kinfmu.log.viewer.blueprint import single
+from kinfmu.log.viewer.card import card
+from kinfmu.log.viewer.decimated import thinned
+from kinfmu.log.viewer.linkage import log_linkage
+from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
+from kinfmu.log.viewer.timeline import Timeline, timeline_of
+from kinfmu.run import Run
+from kinfmu.scene import palette
+from kinfmu.scene.scene import drawable
+from kinfmu.solver.python.status import Status
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+_LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
+
+_ENCODING = "Failed to encode LogMsg: "  # Rerun's words
+
+
+def write_rrd(run: Run, path: str | Path) -> None:
+    """Write `run` as a Rerun recording with the blueprint to review it.
+
+    Of more than decimated.MOST_ROWS samples the recording holds that many and all that tell something, and says so; the
+    lane of states and the log come from all of them. Raises a LogError for a file that cannot be written, which leaves
+    an older one as it was, and for times that a log cannot hold.
+    """
+    nanoseconds(run.t)  # says what is wrong with a time before a file is begun
+    timeline = timeline_of([run])
+    shown = timeline.placed(thinned(run))
+    scene, note = drawable(shown)
+    curves = groups(shown)
+    solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
+    name = run.info.get("title") or run.info.get("name") or Path(path).stem
+    layout = single(timeline, shown, scene, curves, solver)
+    with recording(path, name, layout, application([shown], curves.values())) as rec:
+        rec.send_property("kinfmu", _properties(run))
+        if scene:
+            log_linkage(rec, "/linkage", timeline, shown, scene)
+        for group in (*curves.values(), *solver):
+            log_group(rec, "", timeline, shown, group)
+        log_status(rec, "", timeline, timeline.placed(run))
+        log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))
+
+
+def left_out(run: Run, shown: Run) -> list[str]:
+    """A sentence on samples that the recording leaves out, none if it holds all."""
+    if len(shown) == len(run):
+        return []
+    return [f"{len(shown)} of {len(run)} samples are drawn, peaks and gaps among them; the MCAP holds all."]
+
+
+def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
+    """Name of the application that recordings of such runs and curves belong to, such as 'kinfmu_fourbar_12ab34cd'."""
+    ranges = [(group.path, group.shown) for group in groups]
+    spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
+    facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(happenings(run))) for run in runs]))
+    names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
+    return "_".join([APPLICATION, *dict.fromkeys(names), f"{crc32(facts.encode()):08x}"])
+
+
+@contextmanager
+def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: str) -> Iterator[rr.RecordingStream]:
+    """A recording that is at `path` as a whole when the block ends."""
+    import rerun as rr
+
+    with replacing(path) as temporary:
+        rec = rr.RecordingStream(application, recording_id=f"{Path(path).stem}-{uuid4()}")
+        rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
+        rec.set_log_tick_enabled(False)
+        try:
+            rec.save(temporary, default_blueprint=layout)
+        except RuntimeError as error:  # what Rerun makes of an OSError
+            raise LogError(f"{path}: cannot be written ({str(error).removeprefix(_ENCODING)})") from error
+        rec.send_recording_name(name)
+        try:
+            yield rec
+            _flush(rec, path)
+        finally:
+            rec.disconnect()  # writes the footer
+        _check_whole(temporary, path)
+
+
+def log_group(
+    rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float = 1.5
+) -> None:
+    """The curves of a group, a gap where they are NaN; as points where lines would not show, between gaps."""
+    import rerun as rr
+
+    path = f"{root}/{group.path}"
+    names, colours = list(group.names), list(group.colours)
+    look: rr.SeriesPoints | rr.SeriesLines
+    if group.is_scattered:
+        look = rr.SeriesPoints(names=names, colors=colours, marker_sizes=[2.5] * len(names))
+    else:
+        look = rr.SeriesLines(
+            names=names,
+            colors=colours,
+            widths=[width] * len(names),
+            interpolation_mode="StepAfter" if group.is_stepped else "Linear",
+        )
+    rec.log(path, look, static=True)
+    values = group.values
+    send(rec, path, timeline, run.t, lambda rows: rr.Scalars.columns(scalars=np.ascontiguousarray(values[rows])))
+
+
+def log_card(rec: rr.RecordingStream, markdown: str) -> None:
+    """The text beside the linkage."""
+    import rerun as rr
+
+    rec.log("/card", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
+
+
+def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run) -> None:
+    """The lane of states and the log of what happened."""
+    import rerun as rr
+
+    path = f"{root}/solver/status"
+    labels = [label(status) for status in Status]
+    colours = [palette.STATUS[status] for status in Status]
+    rec.log(path, rr.StateConfiguration(values=labels, colors=colours), static=True)
+    turns = list(changes(run))
+    times = np.array([turn.t for turn in turns])
+    states = [label(turn.status) for turn in turns]
+    send(rec, path, timeline, times, lambda rows: rr.StateChange.columns(state=states[rows]))
+    events = happenings(run)
+    send(
+        rec,
+        f"{root}/log",
+        timeline,
+        np.array([event.t for event in events]),
+        lambda rows: rr.TextLog.columns(
+            text=[event.text for event in events[rows]],
+            level=[_LEVELS.get(event.level, "INFO") for event in events[rows]],
+        ),
+    )
+
+
+def _properties(run: Run) -> rr.AnyValues:
+    """The run's info, unit and verdict as properties of the recording."""
+    import rerun as rr
+
+    about = rr.AnyValues()
+    for name, text in {**run.info, "length_unit": run.length_unit, "verdict": sentence(run)}.items():
+        about.with_component_from_data(name, text)
+    return about
+
+
+def _flush(rec: rr.RecordingStream, path: str | Path) -> None:
+    try:
+        rec.flush()
+    except RuntimeError as error:
+        raise LogError(f"{path}: the recording could not be written to its end ({error}); is the disk full?") from error
+
+
+def _check_whole(file: Path, path: str | Path) -> None:
+    """Look for the footer: what fails after the last flush Rerun tells to the terminal only."""
+    with file.open("rb") as stream:
+        stream.seek(-min(64, file.stat().st_size), 2)
+        if b"RRF" not in stream.read():
+            raise LogError(f"{path}: the recording could not be written to its end; is the disk full?")

@@ -1,0 +1,133 @@
+"""The curves of a run: coordinates grouped by what they measure, and the solver's accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import axis_of
+from kinfmu.scene import palette
+from kinfmu.scene.shown import shown_range
+from kinfmu.units import Quantity, unit_of
+
+ORDERS = ("position", "velocity", "acceleration")
+KINDS = ("angle", "length")
+SMALLEST = 1e-17  # drawn in the place of 0 on a logarithmic axis, below all round-off
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Curves of one unit that belong into one plot: values (n, k), NaN in a gap; shown: range of the axis, or None."""
+
+    path: str
+    title: str
+    names: tuple[str, ...]
+    colours: tuple[palette.Colour, ...]
+    values: FloatArray
+    shown: tuple[float, float] | None = None
+    is_stepped: bool = False
+
+    @property
+    def is_scattered(self) -> bool:
+        """True where a value has none beside it, so that a line would not show it."""
+        known = np.pad(np.isfinite(self.values).any(axis=1), 1)
+        return bool(np.any(known[1:-1] & ~known[:-2] & ~known[2:]))
+
+
+def groups(run: Run) -> dict[tuple[str, str], Group]:
+    """Coordinates and points of interest by (order, kind), such as ('velocity', 'angle'); kinds that occur."""
+    colours = _colours(run)
+    axis = axis_of(run)
+    found = {}
+    for kind in KINDS:
+        columns = [k for k, name in enumerate(run.outputs) if quantity_of(name).kind == kind]
+        if not columns:
+            continue
+        size = 0.0
+        for order, table in enumerate((run.values, run.rates, run.accelerations)):
+            kept = [k for k in columns if derivative_name(run.outputs[k], order) not in run.absent]
+            if not kept:
+                continue
+            values = np.where(run.good[:, None], table[:, kept], np.nan)
+            if order == 0:
+                size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+            found[ORDERS[order], kind] = Group(
+                path=f"{ORDERS[order]}/{kind}",
+                title=_title(Quantity(kind, order, axis.per), run.length_unit),
+                names=tuple(derivative_name(run.outputs[k], order) for k in kept),
+                colours=tuple(colours[run.outputs[k]] for k in kept),
+                values=values,
+                shown=shown_range(values, size / (axis.span or 1.0) ** order),
+            )
+    return found
+
+
+def _title(quantity: Quantity, length_unit: str) -> str:
+    """Such as 'angular velocity [rad/s]'."""
+    words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]
+    return f"{words[quantity.order]} [{unit_of(quantity, length_unit)}]"
+
+
+def accuracy(run: Run) -> Group | None:
+    """log10 of the residual and of the largest watch, both relative to the mechanism's size; None if not kept."""
+    curves = {"residual": run.residual} if "solver.residual" not in run.absent else {}
+    if run.watch_names and not {f"watch.{name}" for name in run.watch_names} & run.absent:
+        curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
+    return _logarithmic("accuracy", f"log10 {next(iter(curves))}", curves, 0, SMALLEST) if curves else None
+
+
+def error_estimates(run: Run) -> Group | None:
+    """log10 of the estimated errors of q, qd and qdd; None if no sample has any."""
+    curves = {name: run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
+    if not np.any(run.error > 0.0):  # nor where errors were not kept, which are NaN then
+        return None
+    return _logarithmic("error", "log10 error", curves, 2, np.nan)
+
+
+def margin(run: Run) -> Group | None:
+    """log10 of the margin, 1 / condition of the worst block: 0 far from singular points, -16 at one."""
+    if "solver.margin" in run.absent:
+        return None
+    return _logarithmic("margin", "log10 margin", {"margin": run.margin}, 1, SMALLEST)
+
+
+def iterations(run: Run) -> Group | None:
+    """Newton's iterations, a step from sample to sample."""
+    if "solver.iterations" in run.absent:
+        return None
+    return Group(
+        path="solver/iterations",
+        title="Newton iterations",
+        names=("iterations",),
+        colours=(palette.body(1),),
+        values=run.iterations.astype(float)[:, None],
+        is_stepped=True,
+    )
+
+
+def _logarithmic(path: str, title: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
+    """log10 of the curves; `zero` is drawn in the place of 0, and nothing where nothing is known."""
+    table = np.column_stack(list(curves.values()))
+    table[np.isinf(table)] = np.nan
+    return Group(
+        path=f"solver/{path}",
+        title=title,
+        names=tuple(curves),
+        colours=tuple(palette.body(first_colour + k) for k in range(len(curves))),
+        values=np.log10(np.where(table == 0.0, zero, np.maximum(np.abs(table), SMALLEST))),
+    )
+
+
+def _colours(run: Run) -> dict[str, palette.Colour]:
+    """Colour of each output: that of its body or point, lighter for y."""
+    owners: list[str] = []
+    for name in (*run.outputs[: run.coordinate_count], *run.fixed, *run.outputs):
+        owner = name.rpartition(".")[0]
+        if owner not in owners:
+            owners.append(owner)
+    plain = {name: palette.body(owners.index(name.rpartition(".")[0])) for name in run.outputs}
+    return {name: palette.lighter(colour) if name.endswith(".y") else colour for name, colour in plain.items()}

@@ -1,0 +1,145 @@
+"""The arithmetic in which joints and laws are written: `+ - * /` of the operands, and the functions from here.
+
+One formula serves floats (direct evaluation), complex numbers (derivative tests), Taylor numbers (the dense reference)
+and symbols (generated code): each room that brings its own kind of number registers it with these functions.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from functools import singledispatch
+from typing import Any
+
+from kinfmu.solver.python.curve import CurveData
+from kinfmu.solver.python.curve import curve as curve_value
+
+Value = Any  # float, complex, Taylor number, array or symbol: whatever the operands are
+
+
+@singledispatch
+def sin(x: Value) -> Value:
+    """Sine of an angle [rad]."""
+    return math.sin(x)
+
+
+@singledispatch
+def cos(x: Value) -> Value:
+    """Cosine of an angle [rad]."""
+    return math.cos(x)
+
+
+@singledispatch
+def sqrt(x: Value) -> Value:
+    """Square root."""
+    return math.sqrt(x)
+
+
+@singledispatch
+def floor(x: Value) -> Value:
+    """The largest whole number that is not above x; its derivative is 0, at the whole numbers too."""
+    return float(math.floor(x))
+
+
+@singledispatch
+def curve(x: Value, data: CurveData, order: int = 0) -> Value:
+    """The derivative of the given order (0: the value) of a piecewise function at x; data as in `solver.curve`."""
+    return curve_value(data, order, x)
+
+
+def atan2(y: Value, x: Value) -> Value:
+    """The angle of the vector (x, y) in [-pi, pi] [rad]; its derivative is that of the angle turned continuously."""
+    return atan2_like(x if isinstance(y, float | int) else y, y, x)
+
+
+@singledispatch
+def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  it decides by its type
+    """atan2(y, x) in the arithmetic of `like`, which is one of the two: what a new kind of number registers."""
+    return math.atan2(y, x)
+
+
+def without_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]:
+    """Return how many whole periods lie between begin and x, and x without them, exact after millions of them.
+
+        n = floor((x - begin) / p),   rest = x - n p,   p = the sum of `period`
+
+    Sum and product are each formed as two numbers, the rounded one and what it leaves (Knuth's sum, Dekker's product);
+    n p, rounded, would lose as many digits as n has. The rest has the derivative of x.
+
+    Args:
+        x: What is reduced.
+        begin: Where a period begins.
+        period: Parts of the period, which may have a rounded sum.
+
+    """
+    whole: Value = 0.0
+    small: Value = 0.0
+    for part in period:
+        whole, left = _exact_sum(whole, part)
+        small = small + left
+    times = floor((x - begin) / whole)
+    product, left = _exact_product(times, whole)
+    return times, (x - product) - left - times * small
+
+
+def sine_of_line(slope: Value, x: Value, intercept: Value) -> Value:
+    """Return sin(slope x + intercept), exact after thousands of turns.
+
+        sin(p + e) = sin p + e cos p,   p: the rounded phase, e: what rounding leaves of it, |e| <= eps |p|
+
+    Args:
+        slope: Angle per unit of x.
+        x: Argument.
+        intercept: Angle at x = 0 [rad].
+
+    """
+    product, left = _exact_product(slope, x)
+    phase, left_too = _exact_sum(product, intercept)
+    return sin(phase) + cos(phase) * (left + left_too)
+
+
+def _exact_sum(a: Value, b: Value) -> tuple[Value, Value]:
+    """Return a + b, rounded, and what rounding leaves of it (Knuth)."""
+    total = a + b
+    back = total - a
+    return total, (a - (total - back)) + (b - back)
+
+
+def _exact_product(a: Value, b: Value) -> tuple[Value, Value]:
+    """Return a b, rounded, and what rounding leaves of it (Dekker)."""
+    product = a * b
+    (high, low), (high_too, low_too) = _halves(a), _halves(b)
+    return product, ((high * high_too - product) + high * low_too + low * high_too) + low * low_too
+
+
+def _halves(x: Value) -> tuple[Value, Value]:
+    """Return two numbers of 26 bits whose sum is x (Dekker): products of such halves are exact."""
+    scaled = 134217729.0 * x  # 2^27 + 1
+    high = scaled - (scaled - x)
+    return high, x - high
+
+
+sin.register(complex, cmath.sin)
+cos.register(complex, cmath.cos)
+sqrt.register(complex, cmath.sqrt)
+
+
+# Complex numbers carry a derivative in their imaginary part (complex step): what has no analytic continuation follows
+# its real part, to first order.
+
+
+@floor.register
+def _(x: complex) -> complex:
+    return complex(math.floor(x.real))
+
+
+@curve.register
+def _(x: complex, data: CurveData, order: int = 0) -> complex:
+    return complex(curve_value(data, order, x.real), x.imag * curve_value(data, order + 1, x.real))
+
+
+@atan2_like.register
+def _(like: complex, y: complex, x: complex) -> complex:  # noqa: ARG001
+    y, x = complex(y), complex(x)
+    turned = (x.real * y.imag - y.real * x.imag) / (x.real * x.real + y.real * y.real)
+    return complex(math.atan2(y.real, x.real), turned)

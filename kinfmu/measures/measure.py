@@ -1,0 +1,41 @@
+"""The contract of a measure: a quantity of a pose that may be held (a joint), driven, or coupled to another."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from kinfmu.measures.arithmetic import Value
+from kinfmu.measures.placement import Placement
+
+
+class Measure(ABC):
+    """One number of a pose, in plain arithmetic.
+
+    A leaf is a frozen dataclass; its fields are keys of the table that names it, such as
+    `{ measure = "angle", of = "rocker" }`. `kind` is 'length' or 'angle'.
+    """
+
+    type: ClassVar[str]  # how mechanism files call it
+    kind: ClassVar[str]
+    is_absolute: ClassVar[bool] = False  # True if it depends on where the world's origin lies
+
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that it meets, ground included."""
+
+    @abstractmethod
+    def value(self, at: Placement) -> Value:
+        """The quantity in a pose."""
+
+    def row(self, at: Placement, target: Value) -> Value:
+        """A constraint that is zero where the quantity is `target`."""
+        return self.value(at) - target
+
+    def scale(self, target: float) -> float:  # noqa: ARG002  some rows depend on it
+        """Change of the row per change of the quantity, where it is `target`."""
+        return 1.0
+
+    def gap(self, residual: float, target: float) -> float:
+        """By how much the quantity misses `target` where the row has this residual."""
+        return residual / self.scale(target)

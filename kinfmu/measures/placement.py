@@ -1,0 +1,87 @@
+"""Where the bodies are, and how joints ask for it; what a text field of a joint may refer to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple, get_origin
+
+from kinfmu.measures.arithmetic import Value, cos, sin
+
+
+class Reference(NamedTuple):
+    """What a text field of a joint refers to, so that the reader can check it and say what would be valid."""
+
+    kind: str  # "point": 'body.point', "body": a body's name, or "choice"
+    choices: tuple[str, ...] = ()
+
+
+def is_pair(hint: Any) -> bool:
+    """True if a field with this annotation holds two references."""
+    return get_origin(getattr(hint, "__origin__", None)) is tuple
+
+
+PointName = Annotated[str, Reference("point")]
+BodyName = Annotated[str, Reference("body")]
+PointPair = Annotated[tuple[str, str], Reference("point")]
+BodyPair = Annotated[tuple[str, str], Reference("body")]
+Axis = Annotated[str, Reference("choice", ("x", "y"))]
+
+
+class Pose(NamedTuple):
+    """Where a body is: frame origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
+
+    x: Value
+    y: Value
+    phi: Value
+    c: Value
+    s: Value
+
+    @classmethod
+    def of(cls, x: Value, y: Value, phi: Value) -> Pose:
+        return cls(x, y, phi, cos(phi), sin(phi))
+
+
+GROUND = Pose(0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+class Placement:
+    """The bodies in one pose of the mechanism; answers what joints ask of it, in any arithmetic.
+
+    poses: Pose by body name; points: body-fixed coordinates (s_x, s_y) by 'body.point'.
+    """
+
+    def __init__(self, poses: Mapping[str, Pose], points: Mapping[str, tuple[float, float]]) -> None:
+        self.poses = poses
+        self.points = points
+
+    def point(self, name: str) -> tuple[Value, Value]:
+        """World coordinates r + A s of 'body.point'."""
+        body = self.poses[name.partition(".")[0]]
+        s_x, s_y = self.points[name]
+        return body.x + body.c * s_x - body.s * s_y, body.y + body.s * s_x + body.c * s_y
+
+    def angle(self, body: str) -> Value:
+        """Angle phi of a body [rad]."""
+        return self.poses[body].phi
+
+    def direction(self, body: str, angle: Value) -> tuple[Value, Value]:
+        """Unit vector at an angle [rad] to the x axis of a body's frame, in the world."""
+        pose = self.poses[body]
+        e_x, e_y = unit_vector(angle)
+        return pose.c * e_x - pose.s * e_y, pose.s * e_x + pose.c * e_y
+
+
+def unit_vector(angle: Value) -> tuple[Value, Value]:
+    """(cos, sin) of an angle [rad]; of a number exact along the axes."""
+    if not isinstance(angle, float | int):
+        return cos(angle), sin(angle)
+    quarter = angle / (0.5 * math.pi)
+    if quarter == round(quarter):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter) % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def body_of(point: str) -> str:
+    """'crank' of 'crank.tip'."""
+    return point.partition(".")[0]

@@ -1,0 +1,140 @@
+"""Which columns of a run are kept, and at which samples: what is not kept need not be computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.naming import derivative_name
+from kinfmu.run.axis import TIME
+from kinfmu.run.run import FloatArray, IntArray, Run
+
+ALWAYS = ("time", "solver.status")  # without them nobody can tell what a sample is
+DRAWN = "drawn"
+GROUPS_OF_COORDINATES = ("q", "points", "all")
+ROUNDING = 1e-9  # of a period: what a sample may come early
+
+
+def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
+    """The columns of `run`, with or without samples, that `names` do not choose; none if they are None.
+
+    Names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'residual',
+    'iterations', 'margin', 'error', 'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the topics
+    of an MCAP file that viewers draw by themselves. A minus in front leaves out: ['-error', '-margin'] is all but
+    those. Time and status are always kept, and the inputs of a run over these.
+    """
+    groups = _groups(run)
+    columns = [place.name for place in run.places()]
+    kept = _kept(names, lambda name: _named(name, groups, columns))
+    return frozenset({*columns} - kept - {*ALWAYS, *_of_axis(run)}) | run.absent if names is not None else run.absent
+
+
+def _of_axis(run: Run) -> tuple[str, ...]:
+    """The inputs that the axis of a run and its rates are known by."""
+    return () if run.axis == TIME else run.input_names
+
+
+def is_drawn(names: Sequence[str] | None) -> bool:
+    """True if `names` choose the topics that viewers draw by themselves."""
+    return DRAWN in _kept(names, lambda name: {DRAWN} if name in ("all", DRAWN) else set())
+
+
+def _kept(names: Sequence[str] | None, named: Callable[[str], set[str]]) -> set[str]:
+    """What is left after each name has added what it stands for, or taken it away."""
+    kept = set(named("all")) if names is None or (names and names[0].startswith("-")) else set()
+    for name in names or ():
+        found = named(name.removeprefix("-"))
+        kept = kept - found if name.startswith("-") else kept | found
+    return kept
+
+
+def kept_samples(t: FloatArray, rate: float | None) -> IntArray:
+    """Places of the samples at times t (n,) [s] that are kept at `rate` [1/s]: the first in every period, and the last.
+
+    All if rate is None.
+    """
+    if rate is None or not len(t):
+        return np.arange(len(t))
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise RequestError(f"rate = {rate:g} samples a second must be positive and finite")
+    periods = np.floor((t - t[0]) * rate + ROUNDING)
+    is_kept = np.diff(periods, prepend=periods[0] - 1.0) != 0.0
+    is_kept[-1] = True
+    return np.flatnonzero(is_kept)
+
+
+def select(run: Run, channels: Sequence[str] | None = None, rate: float | None = None) -> Run:
+    """The part of a run that `absent_columns` and `kept_samples` tell of; what is left out is not computed for it."""
+    rows = kept_samples(run.t, rate)
+    part = run if len(rows) == len(run) else run.part(rows, events=run.events)
+    return part.without(absent_columns(run, channels))
+
+
+def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
+    """The coordinates of which `names` choose a column, in the order named.
+
+    Names: as those of `absent_columns`, 'coupler.vx' chooses 'coupler.x'; fixed coordinates by their own. Raises a
+    RequestError for a name that is not known, or that chooses no coordinate.
+    """
+    owners = {derivative_name(name, order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
+    groups, columns = _groups(run), [place.name for place in run.places()]
+    kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
+    for name in names:
+        if name.startswith("-"):
+            left_out = _named(name[1:], groups, columns)
+            kept = {column: None for column in kept if column not in left_out}
+        else:
+            found = _of_coordinates(name, owners, groups, columns)
+            kept |= dict.fromkeys(column for column in owners if column in found)
+    return tuple(dict.fromkeys(owners[column] for column in kept if column in owners))
+
+
+def _of_coordinates(
+    name: str, owners: Mapping[str, str], groups: dict[str, set[str]], columns: Sequence[str]
+) -> set[str]:
+    """The columns of coordinates under a name, those that were not kept too; an error if there are none."""
+    found = {name} if name in owners else groups.get(name, {column for column in columns if fnmatchcase(column, name)})
+    if found.isdisjoint(owners):
+        known = dict.fromkeys(owners.values())
+        raise RequestError(
+            f"the run has no coordinate '{name}'{suggestion(name, [*owners, *GROUPS_OF_COORDINATES])}; "
+            f"coordinates: {listed(known)}, or {listed(GROUPS_OF_COORDINATES)}, with * for any letters"
+        )
+    return found
+
+
+def _groups(run: Run) -> dict[str, set[str]]:
+    """Columns by the name of their group."""
+    points = run.outputs[run.coordinate_count :]
+    every = {place.name for place in run.places(kept=False)}
+    return {
+        "all": {*every, DRAWN},
+        "none": set(),
+        "inputs": set(run.input_names),
+        **{
+            group: {derivative_name(name, order) for name in run.names}
+            for order, group in enumerate(("q", "qd", "qdd"))
+        },
+        "points": {derivative_name(name, order) for name in points for order in range(3)},
+        **{name: {f"solver.{name}"} for name in ("status", "residual", "iterations", "margin")},
+        "error": {f"solver.error_{name}" for name in ("q", "qd", "qdd")},
+        "watch": {f"watch.{name}" for name in run.watch_names},
+        DRAWN: {DRAWN},
+    }
+
+
+def _named(name: str, groups: dict[str, set[str]], columns: Sequence[str]) -> set[str]:
+    """The columns of a group, or those that match; an error if there are none."""
+    if name in groups:
+        return groups[name]
+    found = {column for column in columns if fnmatchcase(column, name)}
+    if not found:
+        example = next(column for column in columns if "." in column)
+        raise RequestError(
+            f"channel '{name}' is not known{suggestion(name, [*groups, *columns])}; "
+            f"channels: {listed(groups)}, or columns such as '{example}', with * for any letters"
+        )
+    return found

@@ -1,0 +1,266 @@
+"""Run: the result of a solve or of a simulation, with named columns, units and a status for every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.errors import KinfmuError, MissingPackageError, suggestion
+from kinfmu.naming import derivative_name, quantity_of
+from kinfmu.run.axis import TIME, axis_of, rates_per
+from kinfmu.solver.python.status import Status
+from kinfmu.units import unit_of
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
+
+
+class Late:
+    """A table of a run that may be given as a function: it is called when the table is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, run: Run | None, owner: type) -> FloatArray:
+        if run is None:
+            raise AttributeError(self._name)  # so that the field has no default
+        table = run.__dict__[self._name]
+        if callable(table):
+            table = run.__dict__[self._name] = table()
+        return table  # type: ignore[no-any-return]  # whatever was given
+
+    def __set__(self, run: Run, table: FloatArray | Callable[[], FloatArray]) -> None:
+        run.__dict__[self._name] = table
+
+
+class Column(NamedTuple):
+    """One column of a run."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]  # (n,)
+
+
+class Place(NamedTuple):
+    """Where a column stands: in a table of the run, by the name of the field."""
+
+    name: str
+    unit: str
+    table: str
+    column: int | None  # None in tables of one column
+
+
+class Event(NamedTuple):
+    """Something that happened at a time of a run, such as a pose that could not be reached."""
+
+    t: float
+    level: str  # "info", "warning" or "error"
+    text: str
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Run:
+    """n samples of a mechanism's motion.
+
+    t: (n,) [s]. outputs: names of the m output coordinates, first the generalized coordinates q, then the points of
+    interest; values, rates, accelerations: (n, m) in the mechanism's unit of length, rad and s. fixed: coordinates that
+    a joint holds at a constant. inputs: (n, 3 d): value, speed and acceleration of each driver. status, iterations:
+    (n,); residual: (n,) how far the rows of the worst block are open, relative to the mechanism's size; margin: (n,)
+    1 / condition; error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the
+    size; watch: (n, w) residual of the rows set aside as redundant, relative to the size. margin and error may be given
+    as functions that compute them when they are first read.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
+    absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
+    axis: what pictures and reports show the samples over: 'time'; of driver values given instead of times the input
+    that changes, such as 'crank_angle', or 'sample' where more than one does. t then counts the samples.
+    """
+
+    t: FloatArray
+    outputs: tuple[str, ...]
+    coordinate_count: int  # how many of the outputs are generalized coordinates
+    values: FloatArray
+    rates: FloatArray
+    accelerations: FloatArray
+    fixed: Mapping[str, float]
+    input_names: tuple[str, ...]
+    inputs: FloatArray
+    status: IntArray
+    iterations: IntArray
+    residual: FloatArray
+    margin: Late = Late()  # a descriptor, not a default
+    error: Late = Late()
+    watch_names: tuple[str, ...]
+    watch: FloatArray
+    length_unit: str = "m"
+    mechanism_text: str = ""  # the mechanism as TOML
+    model_description: str = ""  # of the FMU that was stepped, as XML
+    info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
+    events: tuple[Event, ...] = ()
+    absent: frozenset[str] = frozenset()
+    axis: str = TIME
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the generalized coordinates, the columns of q."""
+        return self.outputs[: self.coordinate_count]
+
+    @property
+    def q(self) -> FloatArray:
+        """Generalized coordinates, (n, len(names))."""
+        return self.values[:, : self.coordinate_count]
+
+    @property
+    def qd(self) -> FloatArray:
+        """Velocities of the generalized coordinates."""
+        return self.rates[:, : self.coordinate_count]
+
+    @property
+    def qdd(self) -> FloatArray:
+        """Accelerations of the generalized coordinates."""
+        return self.accelerations[:, : self.coordinate_count]
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """(n,) True where the sample holds numbers (status 0 to 2)."""
+        return np.asarray(self.status <= Status.BRIDGED)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All tables as numbers, for copies and for other processes."""
+        return {**self.__dict__, "margin": self.margin, "error": self.error}
+
+    def __repr__(self) -> str:
+        name = self.info.get("name", "run")
+        span = f", {axis_of(self).range()}" if len(self.t) else ""
+        bad = int((~self.good).sum())
+        return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {', '.join(self.outputs)}>"
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
+        """Some of the samples, with these events; what was not computed yet is not computed for it."""
+
+        def late(name: str) -> Any:
+            table = self.__dict__[name]
+            return (lambda: getattr(self, name)[rows]) if callable(table) else table[rows]
+
+        tables = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "watch")
+        parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
+        return replace(self, **parts, margin=late("margin"), error=late("error"), events=events)
+
+    def replaced(self, **fields: Any) -> Run:
+        """Return the run with other fields; margins and errors that are not computed yet stay so."""
+        return replace(self, **{name: self.__dict__[name] for name in ("margin", "error")} | fields)
+
+    def without(self, names: Iterable[str]) -> Run:
+        """The run without columns of these names: their places hold NaN, 0 where they count, and none is computed."""
+        absent = self.absent | frozenset(names)
+        tables: dict[str, Any] = {}
+        for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
+            places = list(group)
+            gone = [place.column or 0 for place in places if place.name in absent]
+            if len(gone) == len(places):
+                shape = len(self) if places[0].column is None else (len(self), len(places))
+                tables[name] = np.zeros(shape, np.int64) if name == "iterations" else np.full(shape, np.nan)
+            elif gone:
+                tables[name] = np.array(getattr(self, name))
+                tables[name][:, gone] = np.nan
+        return self.replaced(**tables, absent=absent)
+
+    def columns(self) -> Iterator[Column]:
+        """Every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
+        for place in self.places():
+            yield Column(place.name, place.unit, self._column(place))
+
+    def places(self, *, kept: bool = True) -> Iterator[Place]:
+        """Names, units and places of the columns, in their order; kept=False: those that were not kept, too."""
+        for place in self._places():
+            if not (kept and place.name in self.absent):
+                yield place
+
+    def _places(self) -> Iterator[Place]:
+        per = rates_per(self)
+        yield Place("time", "s" if self.axis == TIME else "1", "t", None)
+        for k, name in enumerate(self.input_names):
+            yield Place(name, self.input_unit(name), "inputs", k)
+        for order, table in enumerate(("values", "rates", "accelerations")):
+            for k, name in enumerate(self.outputs):
+                unit = unit_of(quantity_of(name, order, per), self.length_unit)
+                yield Place(derivative_name(name, order), unit, table, k)
+        for name in ("status", "residual", "iterations", "margin"):
+            yield Place(f"solver.{name}", "1", name, None)
+        for k, name in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
+            yield Place(name, "1", "error", k)
+        for k, name in enumerate(self.watch_names):
+            yield Place(f"watch.{name}", "1", "watch", k)
+
+    def _column(self, place: Place) -> NDArray[Any]:
+        table: NDArray[Any] = getattr(self, place.table)
+        return table if place.column is None else table[:, place.column]
+
+    def to_arrow(self) -> Any:
+        """The columns as a pyarrow.Table, with the unit of each in the metadata of its field.
+
+        This, to_pandas and to_polars raise a MissingPackageError without their package.
+        """
+        return arrow_table(self.columns())
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
+        frame = _optional("pandas").DataFrame({column.name: column.values for column in self.columns()})
+        frame.attrs["units"] = {place.name: place.unit for place in self.places()}
+        return frame
+
+    def to_polars(self) -> Any:
+        """The columns as a polars.DataFrame."""
+        return _optional("polars").DataFrame({column.name: column.values for column in self.columns()})
+
+    def input_unit(self, name: str) -> str:
+        """Unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
+        first = self.input_names[self.input_names.index(name) // 3 * 3]
+        kind = "angle" if first.endswith("_angle") else "length"
+        order = ("speed", "acceleration").index(name.rpartition("_")[2]) + 1 if name != first else 0
+        return unit_of(quantity_of(".phi" if kind == "angle" else ".x", order), self.length_unit)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The column of that name, (n,); a fixed coordinate is a column of its constant, its rates are zero."""
+        if not isinstance(name, str):
+            raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
+        for fixed, value in self.fixed.items():
+            for order in range(3):
+                if name == derivative_name(fixed, order):
+                    return np.full(len(self.t), value if order == 0 else 0.0)
+        names = []
+        for place in self.places(kept=False):
+            if place.name == name:
+                if name in self.absent:
+                    raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
+                return self._column(place)
+            names.append(place.name)
+        raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")
+
+
+def arrow_table(columns: Iterable[Column]) -> Any:
+    """Columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
+    pa = _optional("pyarrow")
+    arrays, fields = [], []
+    for column in columns:
+        arrays.append(pa.array(column.values))
+        fields.append(pa.field(column.name, arrays[-1].type, False, {"unit": column.unit}))
+    return pa.table(arrays, schema=pa.schema(fields))
+
+
+def _optional(package: str) -> Any:
+    """A package that is not installed with kinfmu."""
+    try:
+        return import_module(package)
+    except ImportError:
+        raise MissingPackageError(f"a run as a table of {package} needs it: pip install {package}") from None

@@ -1,0 +1,92 @@
+"""Coordinates that a run was not asked for, solved again from the drivers' values that it holds, for pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism.mechanism import Mechanism
+from kinfmu.run import FloatArray, IntArray, Run
+
+if TYPE_CHECKING:
+    from kinfmu.plan import SolvePlan
+
+_SAME = 1e-6  # [rad, sizes]; how near the coordinates solved again must come to those of the run
+
+
+def solved_again(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | None:
+    """Return all coordinates (n,) by name, NaN in a gap; None if they cannot be known.
+
+    A run of few outputs, as [outputs] or --outputs choose them, is solved for all of them at its drivers' values. What
+    the run holds itself must come out the same; a column that was left out by --channels stays so.
+    """
+    from kinfmu.sweep import solve
+
+    values = run.input_names[::3]
+    if not values or run.absent.intersection(values) or run.absent.intersection(run.outputs):
+        return None
+    try:
+        plan = _plan_of_all(_as_run(run, mechanism))
+        good = np.flatnonzero(run.good)
+        if not len(good):
+            return {name: np.full(len(run), np.nan) for name in (*plan.outputs, *plan.fixed)}
+        found = solve(plan, **{name: run.inputs[good, 3 * k] for k, name in enumerate(values)})
+    except KinfmuError:
+        return None
+    columns = {name: found[name] for name in (*plan.outputs, *plan.fixed)}
+    for name in set(run.names) & columns.keys():
+        size = 1.0 if name.endswith(".phi") else plan.size
+        if not np.all(np.abs(columns[name] - run[name][good]) <= _SAME * size):  # nor where one is NaN
+            return None
+    return {name: _spread(column, good, len(run)) for name, column in columns.items()}
+
+
+def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
+    """The mechanism with the parameters of the run, assembled as the run was, and all coordinates as outputs."""
+    from kinfmu.sweep.continued import continued
+
+    settings = (entry.partition(" = ") for entry in run.info.get("parameters", "").split(", "))  # of an FMU
+    values = {**run.info, **{name: value for name, _, value in settings}}
+    changed: dict[str, float | str] = {}
+    for name, parameter in mechanism.parameters.items():
+        try:
+            value = float(values[name])
+        except (KeyError, ValueError):
+            continue
+        if parameter.expression is None and value != float(parameter.value):
+            changed[name] = value
+    return replace(continued(mechanism, changed).mechanism, coordinates="all", points={})
+
+
+@lru_cache(maxsize=4)
+def _plan_of_text(text: str) -> SolvePlan:
+    from kinfmu.mechanism import toml_file
+    from kinfmu.plan import compile_plan
+
+    return compile_plan(toml_file.parse(text, "the run's mechanism"))
+
+
+def _plan_of_all(mechanism: Mechanism) -> SolvePlan:
+    """Return the plan of a mechanism; it is cached, since records are drawn piece by piece."""
+    from kinfmu.mechanism.toml_text import text
+
+    return _plan_of_text(text(mechanism))
+
+
+def _spread(column: FloatArray, rows: IntArray, count: int) -> FloatArray:
+    """A column at some of so many samples."""
+    found = np.full(count, np.nan)
+    found[rows] = column
+    return found
+
+
+def remedy(run: Run, names: Iterable[str]) -> str:
+    """Return what would bring missing coordinates into a run: it depends on how they were left out."""
+    if run.absent.intersection(names):
+        return "keep them: --channels all, or q among its names"
+    return "name them in [outputs] coordinates, or leave that out"

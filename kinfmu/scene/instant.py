@@ -1,0 +1,85 @@
+"""One instant of a motion: where everything is then, and where the run takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinfmu.drivers import Driver
+from kinfmu.joints import Revolute
+from kinfmu.joints.joint import Joint
+from kinfmu.measures.placement import Placement, Pose, body_of
+from kinfmu.mechanism import Mechanism
+from kinfmu.run import FloatArray
+from kinfmu.scene import palette
+from kinfmu.scene.placing import seen_from, world
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """The pose to draw, and the poses of the run.
+
+    poses: (1 + n, 3) by body, the ground too: x, y [length], phi [rad] of the drawn pose, then at n samples of the run,
+    NaN where one holds no numbers; a body that the run does not tell of is missing, and with it the joints that hold
+    it. ways: +1.0 or -1.0 by driver, which way it moves first.
+    """
+
+    mechanism: Mechanism
+    poses: Mapping[str, FloatArray]
+    ways: Mapping[str, float]
+
+    @property
+    def joints(self) -> Sequence[Joint]:
+        """Joints between bodies whose poses are known."""
+        return [joint for joint in self.mechanism.joints if self.poses.keys() >= set(joint.bodies())]
+
+    @property
+    def drivers(self) -> Sequence[Driver]:
+        """Drivers of bodies whose poses are known."""
+        return [driver for driver in self.mechanism.drivers if self.poses.keys() >= set(driver.bodies())]
+
+    @cached_property
+    def body_points(self) -> Mapping[str, tuple[float, float]]:
+        """Body-fixed coordinates of every point, by 'body.point'."""
+        return self.mechanism.body_points
+
+    def track(self, point: str) -> FloatArray:
+        """World coordinates (1 + n, 2) of 'body.point', the first as drawn."""
+        return world(self.poses[body_of(point)], self.body_points[point])
+
+    def point(self, point: str) -> FloatArray:
+        """World coordinates (2,) of 'body.point' as drawn."""
+        return np.asarray(world(self.poses[body_of(point)][:1], self.body_points[point])[0])
+
+    def placed(self, body: str, points: FloatArray) -> FloatArray:
+        """World coordinates (k, 2) of points (k, 2) in a body's frame, as drawn."""
+        return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
+
+    def seen(self, body: str, points: FloatArray) -> FloatArray:
+        """Coordinates (k, 2) in a body's frame of points (k, 2) of the world as drawn: the inverse of `placed`."""
+        return seen_from(np.tile(self.poses[body][:1], (len(points), 1)), points)
+
+    def angle(self, body: str) -> float:
+        """Angle of a body as drawn [rad]."""
+        return float(self.poses[body][0, 2])
+
+    def colour(self, body: str) -> palette.Colour:
+        """Colour of a body, the ground's too."""
+        order = [moving.name for moving in self.mechanism.moving_bodies]
+        return palette.body(order.index(body)) if body in order else palette.GROUND
+
+    def axle(self, wheel: str, carrier: str) -> FloatArray | None:
+        """Where a pin holds a wheel on its carrier, (2,); None if none does."""
+        for joint in self.joints:
+            if isinstance(joint, Revolute) and set(joint.bodies()) == {wheel, carrier}:
+                return self.point(joint.between[0])
+        return None
+
+    def value(self, driver: str) -> float:
+        """What a driver measures as drawn [rad or length]."""
+        poses = {name: Pose.of(*pose[0].tolist()) for name, pose in self.poses.items()}
+        (found,) = (one for one in self.mechanism.drivers if one.name == driver)
+        return float(found.measured().value(Placement(poses, self.body_points)))

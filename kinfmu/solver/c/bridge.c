@@ -1,0 +1,416 @@
+/* Bridges: across singular points by interpolation from both sides, proved by closing. See kinfmu/solver/python/bridge.py. */
+#include "way.h"
+
+#define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would win */
+#define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
+#define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node turns away */
+#define FINE 1e-12     /* [rad, sizes]; difference of two widths from which narrower ones win nothing */
+#define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: less where there is one */
+#define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
+#define NOISE 8.0      /* roundings of the residual at the centre; a smaller residual is no miss */
+#define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
+
+/* True inside the window, where the bridge is used. */
+bool kf_covers(const kf_bridge *bridge, double u)
+{
+    return bridge->u[2] < u && u < bridge->u[3];
+}
+
+/* Unknowns moved by the turns of a bridge; `to` may be `z`. */
+static void turn_on(const kf_bridge *bridge, const double *z, double *to)
+{
+    int k;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        to[k] = bridge->turns != 0.0 ? kf_turned(z[k], bridge->raised[k]) : z[k];
+    }
+}
+
+/* Where a driver value lies on the span: x = (u - centre) / half. */
+static double place(const kf_bridge *bridge, const kf_span *span, double u)
+{
+    return (kf_turned(u, -bridge->turns) - span->centre) / bridge->half;
+}
+
+/* Where the inner polynomials of a bridge's span are kept, if none with the same place came after them. */
+static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
+{
+    return &solver->scratch.inner[bridge->span % KF_INNERS];
+}
+
+/* A span whole turns on; `raised` tells the turns of the unknowns. */
+static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
+{
+    const kf_span *const from = &KF_MAP(solver)->spans[span];
+    int k;
+    bridge->span = span;
+    bridge->turns = turns;
+    bridge->centre = kf_turned(from->centre, turns);
+    bridge->half = from->half;
+    for (k = 0; k < KF_NODES; ++k) {
+        bridge->u[k] = kf_turned(from->u[k], turns);
+    }
+}
+
+/* The pose at a node. */
+static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pose *pose)
+{
+    const double *const z = KF_MAP(solver)->spans[bridge->span].z[node];
+    double *const there = solver->scratch.z;
+    const double *u;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    u = KF_AT(&solver->model, &bridge->u[node], room);
+    kf_fresh(pose, -1, -INFINITY, INFINITY);
+    if (bridge->turns == 0.0) { /* as it was found */
+        return kf_evaluated_as_given(&solver->model, u, z, &pose->found);
+    }
+    turn_on(bridge, z, there);
+    return kf_evaluated(&solver->model, u, there, NULL, &pose->found);
+}
+
+/* The farthest node on the target's side that does not lie beyond the target. */
+bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
+{
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const int near = target > bridge->centre ? 3 : 2, far = target > bridge->centre ? 4 : 1;
+    const bool passed = fabs(target - bridge->centre) >= fabs(bridge->u[far] - bridge->centre);
+    return at_node(solver, bridge, passed ? far : near, pose);
+}
+
+/* The interpolated pose inside the window; blocks that are regular are solved from it. */
+bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose)
+{
+    const kf_model *const model = &solver->model;
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
+    kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[KF_ALONG(solver)]), z, zd, zdd);
+    turn_on(bridge, z, z);
+    kf_fresh(pose, -1, INFINITY, -INFINITY);
+    if (!kf_evaluated(model, u, z, span->held, &pose->found)) {
+        return false;
+    }
+    pose->bridge = number;
+    pose->status = KF_BRIDGED;
+    KF_VELOCITY(model, &pose->found, KF_SPEEDS(model), zd, span->held, pose->x1);
+    KF_ACCELERATION(model, &pose->found, kf_at_rest, pose->x1, zdd, span->held, pose->x2);
+    pose->derivatives = 2;
+    return true;
+}
+
+/* The interpolated pose at the centre, and the largest of the driver value and the unknowns, in radians and sizes. */
+static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *found, double *size)
+{
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    double *const z = solver->scratch.z;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    double largest = fabs(bridge->centre) / kf_reach[KF_ALONG(solver)];
+    int block, k = 0;
+    kf_span_middle(span, z);
+    turn_on(bridge, z, z);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            largest = kf_is_outside(&solver->model, block) ? largest : fmax(largest, fabs(z[k]) / kf_unknown_scales[k]);
+        }
+    }
+    *size = largest;
+    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, room), z, span->held, found);
+}
+
+/* True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
+ *
+ * Two points that pass each other at a distance d give this row a residual of d^2.
+ */
+static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, const kf_found *found)
+{
+    double residuals[KF_ROOM(KF_LARGEST_BLOCK)];
+    int k;
+    for (k = 0; k < KF_DISTANCES && bridge->u[2] < 0.0 && 0.0 < bridge->u[3]; ++k) {
+        if (kf_distance_drivers[k] == KF_ALONG(solver) && !kf_is_outside(&solver->model, kf_distance_blocks[k])) {
+            const double u = bridge->centre;
+            double squared;
+            kf_residuals(&solver->model, found, kf_distance_blocks[k], residuals);
+            squared = residuals[kf_distance_rows[k]] * kf_distance_scales[k] + u * u;
+            if (fabs(sqrt(fmax(squared, 0.0)) - fabs(u)) > CLOSED * KF_SIZE) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* True if the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
+static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
+{
+    double largest;
+    return find_middle(solver, bridge, found, &largest) && found->residual <= CLOSED + 4.0 * KF_EPS * largest
+           && keeps_distances(solver, bridge, found);
+}
+
+/* By how much lengths miss the change point, relative to the size; 0 within rounding.
+ *
+ * That is the residual at the centre that no change of the unknowns removes: of J dz = -r, damped, the part outside the
+ * columns of J.
+ */
+static double miss(kf_solver *solver, const kf_bridge *bridge)
+{
+    kf_found *const found = &solver->scratch.way[1].found;
+    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
+    double jacobian[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)], largest, left = 0.0;
+    const double *rows = kf_row_scales;
+    int block, i, k;
+    if (!find_middle(solver, bridge, found, &largest)) {
+        return 0.0;
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int first = kf_first_of(block), columns = kf_block_ends[block] - first, m = kf_block_rows[block];
+        if (held[block]) {
+            kf_jacobian(&solver->model, found, block, jacobian);
+            kf_residuals(&solver->model, found, block, right);
+            for (i = 0; i < m; ++i) {
+                for (k = 0; k < columns; ++k) {
+                    jacobian[i * columns + k] *= kf_unknown_scales[first + k] / rows[i];
+                }
+            }
+            left = fmax(left, kf_unclosed(m, columns, jacobian, right, DAMPING));
+        }
+        rows += m;
+    }
+    return fmax(0.0, left - NOISE * KF_EPS * (1.0 + largest));
+}
+
+/* What the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
+ *
+ * Where lengths miss a change point by m, crossing branches separate: by sqrt(m) at the crossing, by m / x at the distance
+ * x from it. Their determinant is linear in x, so it gives x more exactly than the window's centre. slope: of the steepest
+ * unknown.
+ */
+void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3])
+{
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[pose->bridge];
+    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
+    kf_pose *const before = &solver->scratch.way[1], *const after = &solver->scratch.way[2];
+    const double e = 2.0 * sqrt(miss(solver, bridge));
+    double part = INFINITY, w;
+    int k;
+    missed[0] = missed[1] = missed[2] = 0.0;
+    if (e == 0.0 || !at_node(solver, bridge, 2, before) || !at_node(solver, bridge, 3, after)) {
+        return;
+    }
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double sides = fabs(before->found.determinants[k]) + fabs(after->found.determinants[k]);
+        part = held[k] ? fmin(part, 2.0 * fabs(pose->found.determinants[k]) / sides) : part;
+    }
+    w = e + part * bridge->half / kf_reach[KF_ALONG(solver)];
+    missed[0] = e * e / w;
+    missed[1] = 2.0 * fmax(1.0, slope) * (e / w) * (e / w);
+    missed[2] = 8.0 * e * e / (w * w * w);
+}
+
+/* What the wider span says less than the one used, in z and its two derivatives: the error estimate. */
+void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd)
+{
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    kf_span_difference(span, inner_of(solver, bridge), place(bridge, span, u), z, zd, zdd);
+}
+
+/* The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats; or -1.
+ *
+ * It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
+ * if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
+ */
+int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
+{
+    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    const double turns = kf_whole_turns(u - span->centre), there = kf_turned(u, -turns);
+    const double here = kf_turned(KF_HERE(solver, pose), -turns);
+    const int first = here > span->centre ? 3 : 0;
+    const int made = kf_spare_bridge(solver);
+    kf_bridge *const other = &KF_MAP(solver)->bridges[made];
+    const kf_pose *arrived;
+    int node = first, k;
+    if (turns == bridge->turns || !(span->u[0] <= there && there <= span->u[KF_NODES - 1])) {
+        return -1;
+    }
+    for (k = first; k < first + 3; ++k) {
+        node = fabs(span->u[k] - here) < fabs(span->u[node] - here) ? k : node;
+    }
+    arrived = kf_plainly(solver, pose, kf_turned(span->u[node], turns));
+    if (arrived == NULL) {
+        return -1;
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        const double a = arrived->found.x[k], b = span->z[node][k];
+        other->raised[k] = kf_unknown_is_angle[k] ? kf_whole_turns(a - b) : 0.0;
+        if (!(fabs(a - kf_turned(b, other->raised[k])) <= AGREED * kf_unknown_scales[k])) {
+            return -1;
+        }
+    }
+    make(other, solver, bridge->span, turns);
+    for (k = 0; turns != 0.0 && k < KF_NODES; ++k) {
+        if (!at_node(solver, other, k, &solver->scratch.walk[0])) {
+            return -1;
+        }
+    }
+    return closes(solver, other, &solver->scratch.walk[0].found) ? made : -1;
+}
+
+/* Driver value where a determinant vanishes on the secant through its values at a and b. */
+bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
+{
+    const double rise = of_b - of_a;
+    *zero = b - of_b * (b - a) / rise;
+    return rise != 0.0;
+}
+
+/* Where a block's determinant vanishes, by the secant rule from the near side; false if it does not fall straight.
+ *
+ * Towards a dead centre it falls like a square root: the secant's zero stays beyond, by as much as is left to go.
+ */
+static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
+{
+    const double least = 0.1 * NARROWEST * kf_reach[KF_ALONG(solver)];
+    double step = 0.5 * (*zero - KF_HERE(solver, pose));
+    bool whole = false; /* the first estimate may stem from the same two places */
+    while (fabs(step) > least) {
+        const double here = KF_HERE(solver, pose);
+        kf_pose *const ahead = kf_plainly(solver, pose, here + step);
+        double of_here, of_ahead, better, left, change;
+        if (ahead == NULL) {
+            step *= 0.5;
+            whole = false;
+            continue;
+        }
+        of_here = pose->found.determinants[block];
+        of_ahead = ahead->found.determinants[block];
+        if (!kf_secant_zero(here, of_here, KF_HERE(solver, ahead), of_ahead, &better)) {
+            return false;
+        }
+        left = better - KF_HERE(solver, ahead);
+        if (left * step <= 0.0) {
+            return false;
+        }
+        change = fabs(better - *zero);
+        *zero = better;
+        if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
+            return true;
+        }
+        solver->scratch.located = *ahead; /* walks from here may fail */
+        pose = &solver->scratch.located;
+        whole = true;
+        step = 0.5 * (better - KF_HERE(solver, pose));
+    }
+    return false;
+}
+
+/* True for a block of more rows than unknowns: its determinant is never negative, and falls to a crossing too. */
+static bool is_tall(int block)
+{
+    return kf_block_rows[block] > kf_block_ends[block] - (block > 0 ? kf_block_ends[block - 1] : 0);
+}
+
+/* Poses at 1, 2, 4 half widths on the far side: each extrapolated from the last known ones, then corrected. */
+static bool cross(kf_solver *solver, kf_span *span, double side, int block)
+{
+    static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
+    static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
+    double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
+    kf_pose *const pose = &solver->scratch.walk[0];
+    double *const last = determinants[2];
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    int node, k;
+    for (node = 3; node < KF_NODES; ++node) {
+        const int first = node == 5 ? 1 : 0, count = node - first;
+        const double u = span->centre + side * places[node] * span->half;
+        double weights[KF_MOST_NODES][3];
+        kf_weights(count, places + first, places[node], weights);
+        kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
+        kf_fresh(pose, -1, -INFINITY, INFINITY);
+        if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, room), solver->scratch.z, NULL, &pose->found)
+            || pose->found.moved > STEADY * pose->found.margin) {
+            return false;
+        }
+        for (k = 0; node > 3 && k < KF_BLOCKS; ++k) {
+            if (pose->found.determinants[k] * last[k] <= 0.0) {
+                return false; /* there is another zero beside the one to be bridged */
+            }
+        }
+        memcpy(last, pose->found.determinants, KF_BLOCKS * sizeof(double));
+        if (node == 3) {
+            memcpy(determinants[1], last, KF_BLOCKS * sizeof(double));
+        }
+        kf_span_node(span, node, pose, &solver->model);
+    }
+    return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else touched and not crossed */
+}
+
+/* A span of one width over the zero of a block's determinant, from the side that the pose is on. */
+static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block, double centre, double half)
+{
+    const double side = centre > KF_HERE(solver, pose) ? 1.0 : -1.0;
+    double distance = 4.0;
+    int node;
+    span->centre = centre;
+    span->half = half;
+    for (node = 0; node < 3; ++node) {
+        pose = kf_plainly(solver, pose, centre - side * distance * half);
+        if (pose == NULL) {
+            return false;
+        }
+        kf_span_node(span, node, pose, &solver->model);
+        distance *= 0.5;
+    }
+    memcpy(solver->scratch.determinants[0], pose->found.determinants, KF_BLOCKS * sizeof(double));
+    if (!cross(solver, span, side, block)) {
+        return false;
+    }
+    kf_span_hold(span, solver->scratch.determinants[0], solver->scratch.determinants[1]);
+    if (side < 0.0) {
+        kf_span_reverse(span);
+    }
+    return true;
+}
+
+/* A bridge over the zero of a block's determinant that a regular pose has before it, or -1 if none proves itself.
+ *
+ * zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
+ * closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:
+ * the determinant does not fall to zero straight, the far side cannot be reached.
+ */
+int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
+{
+    const double reach = kf_reach[KF_ALONG(solver)];
+    double half, apart = AGREED;
+    int best = -1;
+    if (!locate(solver, pose, block, &zero)) {
+        return -1;
+    }
+    for (half = KF_HALF_WIDTH * reach; half >= NARROWEST * reach && apart > FINE; half *= 0.5) {
+        const int number = kf_spare_span(solver, best);
+        kf_span *const span = &KF_MAP(solver)->spans[number < 0 ? 0 : number];
+        if (number >= 0 && span_over(solver, span, pose, block, zero, half) && kf_span_apart(span) < apart) {
+            best = number;
+            apart = kf_span_apart(span);
+        }
+    }
+    if (best >= 0) {
+        const int number = kf_spare_bridge(solver);
+        kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+        int k;
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            bridge->raised[k] = 0.0;
+        }
+        make(bridge, solver, best, 0.0);
+        if (closes(solver, bridge, &solver->scratch.walk[0].found)) {
+            return number;
+        }
+    }
+    return -1;
+}

@@ -1,0 +1,239 @@
+/* Continuation: from the anchor of a mechanism as it is written to the same pose with other parameters.
+ *
+ *     Phi(q, u, p0 + s (p1 - p0)) = 0,   s from 0 to 1
+ *
+ * The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a
+ * way of the drivers. See kinfmu/solver/python/continuation.py.
+ */
+#include "way.h"
+
+#define SHORTEST 1e-7 /* step in s; where steps get shorter the way ends */
+#define MOST_STEPS 10000
+#define ITERATIONS 60
+#define WHY 200 /* characters */
+
+/* As on a way of the drivers: corrections small against the determinants, none of which falls steeply. */
+static bool is_trusted(const kf_found *found, const kf_found *trial)
+{
+    int k;
+    if (KF_TRUST * trial->moved > fmin(trial->margin, found->margin) || trial->margin == 0.0) {
+        return false;
+    }
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double before = found->determinants[k], after = trial->determinants[k];
+        if (!(before > 0.0 ? after >= KF_FALL * before : after <= KF_FALL * before)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* "parameters coupler = 9": those that differ from what is written. */
+static void say_parameters(char *message, const double *parameters)
+{
+    bool is_first = true;
+    int k;
+    message[0] = '\0';
+    kf_say(message, "parameters ");
+    for (k = 0; k < KF_PARAMETERS; ++k) {
+        if (parameters[k] != kf_parameters_written[k]) {
+            kf_say(message, "%s%s = ", is_first ? "" : ", ", kf_parameter_names[k]);
+            kf_say_number(message, "%.12g", parameters[k]);
+            is_first = false;
+        }
+    }
+    kf_say(message, ": ");
+}
+
+static double length_of(int count, const double *vector)
+{
+    double largest = 0.0, square = 0.0;
+    int k;
+    for (k = 0; k < count; ++k) {
+        largest = fmax(largest, fabs(vector[k]));
+    }
+    for (k = 0; largest > 0.0 && k < count; ++k) {
+        square += vector[k] / largest * (vector[k] / largest);
+    }
+    return largest * sqrt(square);
+}
+
+/* J^T (J, r) of a block at what was found, the rows relative to the size; the length of r. */
+static double normal_equations(const kf_model *model, const kf_found *found, int block, int k, double *normal,
+                               double *right)
+{
+    double jacobian[KF_ROOM(KF_LARGEST_BLOCK)], left[KF_ROOM(KF_LARGEST_BLOCK)];
+    const int m = kf_block_rows[block];
+    const double *scales = kf_row_scales;
+    int i, j, row;
+    for (i = 0; i < block; ++i) {
+        scales += kf_block_rows[i];
+    }
+    kf_jacobian(model, found, block, jacobian);
+    kf_residuals(model, found, block, left);
+    for (i = 0; i < k; ++i) {
+        right[i] = 0.0;
+        for (row = 0; row < m; ++row) {
+            right[i] -= jacobian[row * k + i] / scales[row] * left[row];
+        }
+        for (j = 0; j < k; ++j) {
+            normal[i * k + j] = 0.0;
+            for (row = 0; row < m; ++row) {
+                normal[i * k + j] += jacobian[row * k + i] / scales[row] * (jacobian[row * k + j] / scales[row]);
+            }
+        }
+    }
+    return length_of(m, left);
+}
+
+/* Smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if none can be had. */
+static double gap_of(kf_solver *solver, const kf_model *model, int block)
+{
+    kf_found *const found = &solver->scratch.walk[0].found;
+    double normal[KF_ROOM(KF_LARGEST_BLOCK)], damped[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)];
+    double factors[KF_LU_ROOM(1) + 3 * KF_LARGEST_BLOCK], step[KF_ROOM(KF_LARGEST_BLOCK)];
+    double residuals[KF_ROOM(KF_LARGEST_BLOCK)], determinant, damping = 1e-3, left = -1.0, now;
+    double *const best = solver->scratch.z, *const trial = solver->scratch.zd;
+    const int first = kf_first_of(block), k = kf_block_ends[block] - first;
+    int turn, i;
+    memcpy(best, solver->anchor.found.x, KF_UNKNOWNS * sizeof(double));
+    for (turn = 0; turn < ITERATIONS; ++turn) {
+        if (left < 0.0) {
+            if (!kf_evaluated_as_given(model, kf_anchor_u, best, found)) {
+                return 0.0;
+            }
+            left = normal_equations(model, found, block, k, normal, right);
+        }
+        memcpy(damped, normal, (size_t)(k * k) * sizeof(double));
+        for (i = 0; i < k; ++i) {
+            damped[i * k + i] += damping * (normal[i * k + i] + 1e-12);
+        }
+        if (!kf_lu(k, damped, factors, &determinant)) {
+            break;
+        }
+        kf_lu_solve(k, factors, right, step);
+        memcpy(trial, best, KF_UNKNOWNS * sizeof(double));
+        for (i = 0; i < k; ++i) {
+            trial[first + i] += step[i];
+        }
+        if (!kf_evaluated_as_given(model, kf_anchor_u, trial, found)) {
+            return 0.0;
+        }
+        kf_residuals(model, found, block, residuals);
+        now = length_of(kf_block_rows[block], residuals);
+        if (now < left) {
+            memcpy(best, trial, KF_UNKNOWNS * sizeof(double));
+            left = -1.0;
+            damping = fmax(0.2 * damping, 1e-12);
+        } else {
+            damping *= 8.0;
+            if (damping > 1e8) {
+                break;
+            }
+        }
+    }
+    kf_evaluated_as_given(model, kf_anchor_u, best, found);
+    kf_residuals(model, found, block, residuals);
+    return length_of(kf_block_rows[block], residuals);
+}
+
+/* Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave. */
+static void say_opens(kf_solver *solver, const double *parameters, int block)
+{
+    kf_model *const model = &solver->scratch.ahead;
+    const double *const determinants = solver->anchor.found.determinants;
+    const bool is_told = block >= 0;
+    char why[WHY];
+    double gap;
+    int k;
+    if (!kf_bind(model, parameters, why, sizeof why)) { /* a length that is not positive */
+        kf_say(solver->message, "%s", why);
+        return;
+    }
+    for (k = 0; !is_told && k < KF_BLOCKS; ++k) {
+        block = block < 0 || fabs(determinants[k]) < fabs(determinants[block]) ? k : block;
+    }
+    if (block < 0) {
+        kf_say(solver->message, "the mechanism does not close");
+        return;
+    }
+    gap = gap_of(solver, model, block);
+    if (gap > 1e-9) {
+        kf_say(solver->message, "the mechanism does not close: rows %s stay open by ", kf_block_row_names[block]);
+        kf_say_number(solver->message, "%.4g", gap * KF_SIZE);
+        kf_say(solver->message, " %s", kf_length_unit);
+    } else {
+        kf_say(solver->message, "lie behind a singular point, where rows %s are dependent",
+               kf_block_row_names[block]);
+    }
+}
+
+bool kf_solver_bind(kf_solver *solver, const double *parameters)
+{
+    const double tolerance = solver->tolerance;
+    kf_model *const ahead = &solver->scratch.ahead;
+    kf_pose *const trial = &solver->scratch.way[0];
+    double *const slope = solver->scratch.zd;
+    double p[KF_ROOM(KF_PARAMETERS)], watches[KF_ROOM(KF_WATCHES)], s = 0.0, step = 1.0;
+    int turn, k, most = 0, block = -1;
+    bool is_there = true;
+    kf_solver_start(solver);
+    solver->tolerance = tolerance;
+    for (k = 0; k < KF_PARAMETERS; ++k) {
+        is_there = is_there && parameters[k] == kf_parameters_written[k];
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        slope[k] = 0.0;
+    }
+    for (turn = 0; turn < MOST_STEPS && !is_there; ++turn) {
+        const kf_found *const found = &solver->anchor.found;
+        const double there = fmin(s + step, 1.0);
+        char why[WHY];
+        for (k = 0; k < KF_PARAMETERS; ++k) {
+            const double written = kf_parameters_written[k];
+            p[k] = there == 1.0 ? parameters[k] : written + there * (parameters[k] - written);
+        }
+        kf_fresh(trial, -1, -INFINITY, INFINITY);
+        if (kf_bind(ahead, p, why, sizeof why)) {
+            const int failed =
+                kf_position(ahead, kf_anchor_u, found->x, slope, kf_at_rest, there - s, NULL, &trial->found);
+            if (failed < 0 && is_trusted(found, &trial->found)) {
+                for (k = 0; k < KF_UNKNOWNS; ++k) {
+                    slope[k] = (trial->found.x[k] - found->x[k]) / (there - s);
+                }
+                solver->anchor = *trial;
+                solver->model = *ahead;
+                s = there;
+                step *= 2.0;
+                is_there = s == 1.0;
+                continue;
+            }
+            block = failed >= 0 ? failed : block;
+        }
+        step *= 0.5;
+        if (step < SHORTEST) {
+            break;
+        }
+    }
+    solver->stuck = true;
+    say_parameters(solver->message, parameters);
+    if (!is_there) {
+        if (turn < MOST_STEPS) {
+            say_opens(solver, parameters, block);
+        } else {
+            kf_say(solver->message, "too far from the parameters as written");
+        }
+    } else if (!(solver->anchor.found.watch <= solver->tolerance)) {
+        kf_watches(&solver->model, &solver->anchor.found, watches);
+        for (k = 1; k < KF_WATCHES; ++k) {
+            most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
+        }
+        kf_say(solver->message, "the redundant row %s is open by about ", kf_watch_names[most]);
+        kf_say_number(solver->message, "%.4g", fabs(watches[most]) * KF_SIZE);
+        kf_say(solver->message, " %s", kf_length_unit);
+    } else {
+        solver->message[0] = '\0';
+        solver->stuck = false;
+    }
+    return !solver->stuck;
+}

@@ -1,0 +1,366 @@
+/* Estimated errors of a pose's outputs: what rounding, conditioning and interpolation leave of their digits.
+ *
+ * Every solved block is a source. Its rows are known to a few roundings of their terms, so its unknowns z to
+ *
+ *     |dz| = |J^-1| R (2 eps + residual + eps |z|)        R: scales of the rows, in lengths
+ *
+ * which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried:
+ * position, velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
+ */
+#include "way.h"
+
+#define UNBOUNDED 0.5 /* change of a determinant, as a part of it, within a pose's error: rates are not known then */
+
+/* How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given. And the
+ * largest of the derivatives in radians and sizes.
+ */
+typedef struct {
+    const double *ud, *udd;
+    const bool *held;
+    double speed, curve;
+} kf_driven;
+
+/* How a pose is driven; its derivatives are formed. */
+static kf_driven drive_of(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
+{
+    const bool one = KF_IS_ONE(solver);
+    kf_driven drive;
+    drive.ud = one ? KF_SPEEDS(&solver->model) : ud;
+    drive.udd = one ? kf_at_rest : udd;
+    drive.held = pose->bridge < 0 ? NULL : KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span].held;
+    if (one) {
+        kf_tangent(&solver->model, pose);
+    } else {
+        drive.held = kf_rates_in_time(&solver->model, pose, ud, udd);
+    }
+    drive.speed = kf_larger(kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales), KF_DRIVERS, drive.ud, kf_reach);
+    drive.curve = kf_larger(drive.speed * drive.speed, KF_UNKNOWNS, pose->x2, kf_unknown_scales);
+    drive.curve = kf_larger(drive.curve, KF_DRIVERS, drive.udd, kf_reach);
+    return drive;
+}
+
+/* What one block adds. */
+static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int block, double weight)
+{
+    kf_source *const source = &solver->scratch.source;
+    double *const given = source->given_first, *const all_of = solver->scratch.x1; /* of the unknowns */
+    const double *rows = kf_row_scales;
+    const double c = kf_known_to(&pose->found, block);
+    bool held[KF_ROOM(KF_BLOCKS)];
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        held[k] = k == block || (drive->held != NULL && drive->held[k]);
+        rows += k < block ? kf_block_rows[k] : 0;
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        given[k] = 0.0;
+    }
+    kf_soften(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        source->z[k] = weight * c * all_of[k];
+        source->first[k] = weight * KF_ROUNDINGS * KF_EPS * drive->speed * all_of[k];
+        source->second[k] = weight * KF_ROUNDINGS * KF_EPS * drive->curve * all_of[k];
+    }
+    source->missed[0] = source->missed[1] = source->missed[2] = 0.0;
+    source->is_given = false;
+}
+
+/* There and more, away from here: two errors that happen to cancel are no smaller for it. */
+static void add(const double *there, const double *here, const double *more, double *to)
+{
+    double along = 0.0, sign;
+    int k;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        along += (there[k] - here[k]) * more[k];
+    }
+    sign = along >= 0.0 ? 1.0 : -1.0;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        to[k] = there[k] + sign * more[k];
+    }
+}
+
+/* The pose that a source moves to, with its derivatives. */
+static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, kf_pose *there)
+{
+    const kf_model *const model = &solver->model;
+    const kf_source *const source = &solver->scratch.source;
+    double *const z = solver->scratch.x1;
+    bool all[KF_ROOM(KF_BLOCKS)];
+    int k;
+    memset(all, 1, sizeof all);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        z[k] = pose->found.x[k] + source->z[k];
+    }
+    if (!kf_evaluated(model, KF_POSE_U(pose), z, all, &there->found)) {
+        return false;
+    }
+    KF_VELOCITY(model, &there->found, drive->ud, source->is_given ? source->given_first : pose->x1, drive->held,
+                there->x1);
+    add(there->x1, pose->x1, source->first, z);
+    KF_VELOCITY(model, &there->found, drive->ud, z, all, there->x1);
+    KF_ACCELERATION(model, &there->found, drive->udd, there->x1, source->is_given ? source->given_second : pose->x2,
+                    drive->held, there->x2);
+    add(there->x2, pose->x2, source->second, z);
+    KF_ACCELERATION(model, &there->found, drive->udd, there->x1, z, all, there->x2);
+    return true;
+}
+
+/* What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together. The larger
+ * of it and what `rounding` holds stays there.
+ */
+static bool round_node(kf_solver *solver, const kf_span *span, int place, double *rounding)
+{
+    kf_pose *const node = &solver->scratch.way[1], *const there = &solver->scratch.way[2];
+    double *const squares = solver->scratch.zd;
+    const double half = span->half;
+    int worst[KF_MOST_SOURCES], count, i, k;
+    double weight;
+    kf_driven drive;
+    kf_fresh(node, -1, -INFINITY, INFINITY);
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    if (!kf_evaluated_as_given(&solver->model, KF_AT(&solver->model, &span->u[place], room), span->z[place], &node->found)) {
+        return false;
+    }
+    drive = drive_of(solver, node, KF_SPEEDS(&solver->model), kf_at_rest);
+    count = kf_worst_blocks(&solver->model, &node->found, NULL, worst, &weight);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        squares[k] = 0.0;
+    }
+    for (i = 0; i < count; ++i) {
+        make_source(solver, node, &drive, worst[i], weight);
+        if (!move(solver, node, &drive, there)) {
+            return false;
+        }
+        for (k = 0; k < KF_UNKNOWNS; ++k) {
+            const double one = fabs(solver->scratch.source.z[k]) + half * fabs(there->x1[k] - node->x1[k])
+                               + half * half * fabs(there->x2[k] - node->x2[k]);
+            squares[k] += one * one;
+        }
+    }
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        rounding[k] = fmax(rounding[k], sqrt(squares[k]));
+    }
+    return count >= 0;
+}
+
+static double away(double gap, double by)
+{
+    return gap >= 0.0 ? gap + by : gap - by;
+}
+
+/* The steepest slope of an unknown over the only driver, both in radians and sizes. */
+static double steepest(const kf_solver *solver, const kf_pose *pose)
+{
+    (void)solver; /* without tracks the only driver is the first */
+    return kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales) * kf_reach[KF_ALONG(solver)];
+}
+
+/* What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by. */
+static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
+{
+    kf_scratch *const scratch = &solver->scratch;
+    kf_source *const source = &scratch->source;
+    const kf_span *const span = &KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span];
+    double *const rounding = scratch->x2; /* of the unknowns */
+    const double half = span->half;
+    int k;
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        rounding[k] = 0.0;
+    }
+    if (!round_node(solver, span, 2, rounding) || !round_node(solver, span, 3, rounding)) {
+        return false;
+    }
+    kf_bridge_missed(solver, pose, steepest(solver, pose), source->missed);
+    kf_bridge_difference(solver, pose->bridge, KF_HERE(solver, pose), scratch->z, scratch->zd, scratch->zdd);
+    for (k = 0; k < KF_UNKNOWNS; ++k) {
+        scratch->z[k] = away(scratch->z[k], rounding[k]);
+        source->given_first[k] = pose->x1[k] + away(scratch->zd[k], 1.0 / half * rounding[k]);
+        source->given_second[k] = pose->x2[k] + away(scratch->zdd[k], 1.0 / (half * half) * rounding[k]);
+        source->first[k] = source->second[k] = 0.0;
+    }
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, scratch->z, drive->held, scratch->x1);
+    memcpy(source->z, scratch->x1, KF_UNKNOWNS * sizeof(double));
+    source->is_given = true;
+    return true;
+}
+
+#if KF_TRACKS
+
+/* What the bridge of one track adds, in time. */
+static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int driver)
+{
+    kf_source *const source = &solver->scratch.source;
+    const double v = drive->ud[driver], a = drive->udd[driver];
+    kf_pose *own;
+    bool is_made;
+    int block, k = 0;
+    kf_enter_track(solver, driver);
+    own = kf_own_pose(solver, pose, driver);
+    {
+        const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
+        is_made = make_source_of_bridge(solver, own, &along);
+        source->missed[1] *= fabs(v) / kf_reach[driver];
+        source->missed[2] *= v / kf_reach[driver] * (v / kf_reach[driver]);
+    }
+    kf_leave_track(solver);
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const bool is_own = kf_block_drivers[block] == driver;
+        for (; k < kf_block_ends[block]; ++k) {
+            const double one = is_own ? source->given_first[k] - own->x1[k] : 0.0;
+            const double two = is_own ? source->given_second[k] - own->x2[k] : 0.0;
+            source->z[k] = is_own ? source->z[k] : 0.0;
+            source->given_first[k] = pose->x1[k] + v * one;
+            source->given_second[k] = pose->x2[k] + (v * v * two + a * one);
+        }
+    }
+#if KF_MIXES
+    bool of_tracks[KF_BLOCKS];
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        of_tracks[block] = kf_block_drivers[block] != KF_MIXED;
+    }
+    KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, source->z, of_tracks, solver->scratch.x1);
+    memcpy(source->z, solver->scratch.x1, sizeof source->z);
+#endif
+    return is_made;
+}
+
+#endif
+
+/* The largest difference of two rows of outputs, in radians and sizes. */
+static double largest_gap(const double *there, const double *here)
+{
+    double largest = 0.0;
+    int k;
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        const double gap = fabs(there[k] - here[k]) / (kf_output_is_angle[k] ? 1.0 : KF_SIZE);
+        if (gap != gap) {
+            return INFINITY;
+        }
+        largest = fmax(largest, gap);
+    }
+    return largest;
+}
+
+/* True if a determinant changes by half of its size to a pose that rounding cannot distinguish.
+ *
+ * So close to a singular point the rates have no bound.
+ */
+static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const bool *held)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double a = pose->found.determinants[k], b = there->found.determinants[k];
+        if (!(held != NULL && held[k]) && fabs(b - a) > UNBOUNDED * fabs(a)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Squares of the changes of the outputs by all sources; false if unknown. lost: set if rates are unknown. */
+static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_driven *drive,
+                  double squares[3], bool *lost)
+{
+    kf_pose *const there = &solver->scratch.way[0];
+    double(*const rows)[3][KF_ROOM(KF_OUTPUTS)] = solver->scratch.rows;
+    int worst[KF_MOST_SOURCES], i, order;
+    double weight, missed[3];
+    const int count = kf_worst_blocks(&solver->model, &pose->found, drive->held, worst, &weight);
+    const int most = pose->bridge >= 0 ? 1 : KF_TRACKS ? KF_DRIVERS : 0;
+    kf_outputs_of(&solver->model, pose, ud, udd, rows[0][0], rows[0][1], rows[0][2]);
+    for (i = 0; i < count + most; ++i) {
+        if (i < count) {
+            make_source(solver, pose, drive, worst[i], weight);
+#if KF_TRACKS
+        } else if (!KF_IS_ONE(solver)) {
+            if (!pose->has_tracks || pose->own[i - count].bridge < 0) {
+                continue;
+            }
+            if (!make_source_of_track(solver, pose, drive, i - count)) {
+                return false;
+            }
+#endif
+        } else if (!make_source_of_bridge(solver, pose, drive)) {
+            return false;
+        }
+        if (!move(solver, pose, drive, there)) {
+            return false;
+        }
+        kf_outputs_of(&solver->model, there, ud, udd, rows[1][0], rows[1][1], rows[1][2]);
+        memcpy(missed, solver->scratch.source.missed, sizeof missed);
+        if (KF_DRIVERS == 1) {
+            missed[1] *= fabs(ud[0]) / kf_reach[0];
+            missed[2] *= ud[0] / kf_reach[0] * (ud[0] / kf_reach[0]);
+        }
+        for (order = 0; order < 3; ++order) {
+            const double gap = largest_gap(rows[1][order], rows[0][order]);
+            squares[order] += gap * gap + missed[order] * missed[order];
+        }
+        *lost = *lost || is_singular_between(pose, there, drive->held);
+    }
+    return count >= 0 && squares[0] + squares[1] + squares[2] < INFINITY;
+}
+
+/* True where branches cross and no bridge holds: whose rates these are is not known. */
+static bool is_at_a_crossing(const kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
+{
+    (void)solver;
+    return KF_IS_ONE(solver) && pose->bridge < 0 && pose->found.margin < KF_UNDECIDED
+        && drive->speed * kf_reach[KF_ALONG(solver)] < KF_STEEP;
+}
+
+/* The same of one of the tracks. */
+static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
+{
+    bool is_there = false;
+#if KF_TRACKS
+    int driver;
+    for (driver = 0; pose->has_tracks && pose->found.margin < KF_UNDECIDED && driver < KF_DRIVERS; ++driver) {
+        kf_pose *own;
+        kf_enter_track(solver, driver);
+        own = kf_own_pose(solver, pose, driver);
+        if (own->found.margin < KF_UNDECIDED) {
+            const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
+            is_there = is_there || is_at_a_crossing(solver, own, &along);
+        }
+        kf_leave_track(solver);
+    }
+#else
+    (void)solver;
+    (void)pose;
+#endif
+    return is_there;
+}
+
+void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3])
+{
+    const kf_driven drive = drive_of(solver, pose, ud, udd);
+    bool lost = false;
+    double squares[3] = {0.0, 0.0, 0.0}, largest = 0.0, speed = drive.speed, curve = drive.curve;
+    const double *const outputs = solver->scratch.rows[0][0];
+    const double zeros[KF_ROOM(KF_OUTPUTS)] = {0.0};
+    int k;
+    if (KF_DRIVERS == 1) {
+        const double r = kf_reach[KF_ALONG(solver)], v = fabs(ud[0]) / r, a = fabs(udd[0]) / r;
+        speed = drive.speed * r * v;
+        curve = drive.curve * r * r * v * v + drive.speed * r * a;
+    }
+    if (!tried(solver, pose, ud, udd, &drive, squares, &lost)) {
+        errors[0] = errors[1] = errors[2] = INFINITY;
+        return;
+    }
+    for (k = 0; k < KF_OUTPUTS; ++k) {
+        largest = kf_output_is_angle[k] ? fmax(largest, fabs(outputs[k])) : largest;
+    }
+    speed = fmax(speed, largest_gap(solver->scratch.rows[0][1], zeros));
+    curve = fmax(curve, largest_gap(solver->scratch.rows[0][2], zeros));
+    errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
+    errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
+    errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);
+    if (lost || is_at_a_crossing(solver, pose, &drive) || is_a_track_at_a_crossing(solver, pose)) {
+        errors[1] = errors[2] = INFINITY;
+    }
+}

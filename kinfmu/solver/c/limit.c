@@ -1,0 +1,87 @@
+/* Limit: driver values where a way ends, and why. See Limit in kinfmu/solver/python/advance.py. */
+#include "way.h"
+
+
+/* Where the way ends, just beyond a pose that steps cannot leave.
+ *
+ * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule
+ * on the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
+ */
+void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
+{
+    const double *const determinants = pose->found.determinants;
+    double near, far, beyond = 0.0, steepest = 0.0;
+    int k;
+    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
+    limit->block = KF_BLOCKS > 0 ? 0 : KF_NO_BLOCK;
+    if (KF_BLOCKS == 0) {
+        return;
+    }
+    for (k = 1; k < KF_BLOCKS; ++k) {
+        limit->block = fabs(determinants[k]) < fabs(determinants[limit->block]) ? k : limit->block;
+    }
+    if (KF_IS_ONE(solver)) {
+        kf_tangent(&solver->model, pose);
+    } else {
+        KF_VELOCITY(&solver->model, &pose->found, direction, NULL, NULL, pose->x1);
+    }
+    for (k = kf_first_of(limit->block); k < kf_block_ends[limit->block]; ++k) {
+        steepest = fmax(steepest, fabs(pose->x1[k]) / kf_unknown_scales[k]);
+    }
+    limit->crosses = steepest * (KF_IS_ONE(solver) ? kf_reach[KF_ALONG(solver)] : 1.0) < KF_STEEP;
+    near = fabs(determinants[limit->block]);
+    far = fabs(before->found.determinants[limit->block]);
+    if (!limit->crosses) {
+        near *= near;
+        far *= far;
+    }
+    if (far > near) {
+        beyond = near / (far - near);
+        for (k = 0; k < KF_DRIVERS; ++k) {
+            limit->u[k] += (KF_POSE_U(pose)[k] - KF_POSE_U(before)[k]) * beyond;
+        }
+    }
+}
+
+/* True if the target lies past the limit on the way that s goes. */
+bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s)
+{
+    double sum = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum += (target[k] - limit[k]) * direction[k] * s;
+    }
+    return sum > 0.0;
+}
+
+/* Why a target cannot be reached, in one line. */
+void kf_say_limit(char *message, const kf_limit *limit, const double *target, int driver)
+{
+    int k;
+    if (limit->block == KF_TOO_FAR) {
+        kf_say_place(message, target, KF_ROUGHLY, driver);
+        kf_say(message, " is too far from ");
+        kf_say_place(message, limit->u, KF_ROUGHLY, driver);
+        kf_say(message, ": more than %d steps on one way", KF_MOST_STEPS);
+        return;
+    }
+    if (!kf_differs(target, limit->u, KF_LOCATED)) {
+        kf_say_place(message, target, KF_LOCATED, driver);
+        kf_say(message, " cannot be reached: to these digits it is the limit");
+    } else {
+        kf_say_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED, driver);
+        kf_say(message, " cannot be reached: the limit is ");
+        kf_say_place(message, limit->u, KF_LOCATED, driver);
+    }
+    kf_say(message, limit->crosses ? ", where branches of " : ", where ");
+    if (limit->block == KF_NO_BLOCK) {
+        kf_say(message, "the joints");
+    }
+    for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
+        kf_say(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
+    }
+    kf_say(message, limit->crosses ? " cross" : " would part");
+    if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
+        kf_say(message, "; the crossing depends on several drivers, so no bridge is built");
+    }
+}

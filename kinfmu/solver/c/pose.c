@@ -1,0 +1,159 @@
+/* Pose: an assembled pose of a mechanism at given driver values. See kinfmu/solver/python/pose.py. */
+#include "way.h"
+
+const double kf_alone[KF_DRIVERS] = {1.0};
+const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)] = {0.0};
+
+/* A pose just found: nothing is known of it but its road. */
+inline void kf_fresh(kf_pose *pose, int road, double low, double high)
+{
+    pose->low = low;
+    pose->high = high;
+    pose->status = KF_OK;
+    pose->derivatives = 0;
+    pose->road = road;
+    pose->bridge = -1;
+    pose->has_base = false;
+#if KF_TRACKS
+    pose->has_tracks = pose->is_held = false;
+#endif
+}
+
+/* What kf_position gives for unknowns that are known: held blocks are not solved for. s = -0.0 at rest leaves z as it
+ * is, to the bit.
+ */
+bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found)
+{
+    return kf_position(model, u, z, kf_at_rest, kf_at_rest, -0.0, held, found) < 0;
+}
+
+/* The same where nothing is solved for. */
+bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found)
+{
+    bool all[KF_ROOM(KF_BLOCKS)];
+    memset(all, 1, sizeof all);
+    return kf_evaluated(model, u, z, all, found);
+}
+
+/* First and second derivative of all coordinates with respect to the only driver. */
+inline void kf_tangent(const kf_model *model, kf_pose *pose)
+{
+    if (pose->derivatives < 1) {
+        KF_VELOCITY(model, &pose->found, KF_SPEEDS(model), NULL, NULL, pose->x1);
+    }
+    if (pose->derivatives < 2) {
+        KF_ACCELERATION(model, &pose->found, kf_at_rest, pose->x1, NULL, NULL, pose->x2);
+        pose->derivatives = 2;
+    }
+}
+
+#if KF_TRACKS
+
+/* The model of a track: of the blocks that depend on one driver alone. All others stay as the anchor has them. */
+void kf_enter_track(kf_solver *solver, int driver)
+{
+    kf_model *const model = &solver->model;
+    int k;
+    model->track = driver + 1;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        model->outside[k] = kf_block_drivers[k] != driver;
+    }
+    memcpy(model->kept, solver->anchor.found.x, sizeof model->kept);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        model->along[k] = k == driver ? 1.0 : 0.0;
+        model->rest[k] = kf_anchor_u[k];
+    }
+}
+
+#if KF_MIXES
+
+/* The model of the blocks that depend on several drivers, while all others are at unknowns z, and move: slopes are their
+ * derivatives along the way that the drivers go, second derivatives are 0.
+ */
+void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes)
+{
+    kf_model *const model = &solver->model;
+    int k;
+    model->track = KF_MIXED;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        model->outside[k] = kf_block_drivers[k] != KF_MIXED;
+    }
+    memcpy(model->kept, z, sizeof model->kept);
+    memcpy(model->slopes, slopes, sizeof model->slopes);
+}
+
+#endif
+
+/* The whole model again. */
+void kf_leave_track(kf_solver *solver)
+{
+    solver->model.track = 0;
+}
+
+/* Driver values of which one is given and the others rest. */
+const double *kf_driven_at(const kf_model *model, const double *value, double *room)
+{
+    memcpy(room, model->rest, KF_DRIVERS * sizeof(double));
+    room[KF_ALONG_OF(model)] = *value;
+    return room;
+}
+
+/* Blocks whose unknowns are given: those that are held, and those outside a track. */
+static const bool *given_blocks(const kf_model *model, const bool *held, bool *room)
+{
+    int k;
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        room[k] = model->outside[k] || (held != NULL && held[k]);
+    }
+    return room;
+}
+
+/* Derivatives of the unknowns outside a track: they rest, but beside blocks that depend on several drivers. */
+static const double *slopes_of(const kf_model *model)
+{
+#if KF_MIXES
+    if (model->track == KF_MIXED) {
+        return model->slopes;
+    }
+#endif
+    (void)model;
+    return kf_at_rest;
+}
+
+/* What is given of the unknowns. */
+static const double *given_rates(const kf_model *model, const double *outside, const double *given, double *room)
+{
+    int block, k = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            room[k] = model->outside[block] ? outside[k] : given == NULL ? 0.0 : given[k];
+        }
+    }
+    return room;
+}
+
+void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
+              double *x1)
+{
+    bool blocks[KF_ROOM(KF_BLOCKS)];
+    double rates[KF_ROOM(KF_UNKNOWNS)];
+    if (model->track != 0) {
+        held = given_blocks(model, held, blocks);
+        given = given_rates(model, slopes_of(model), given, rates);
+    }
+    kf_velocity(model, found, ud, given, held, x1);
+}
+
+void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
+                     const double *given, const bool *held, double *x2)
+{
+    bool blocks[KF_ROOM(KF_BLOCKS)];
+    double rates[KF_ROOM(KF_UNKNOWNS)];
+    if (model->track != 0) {
+        held = given_blocks(model, held, blocks);
+        given = given_rates(model, kf_at_rest, given, rates);
+    }
+    kf_acceleration(model, found, udd, x1, given, held, x2);
+}
+
+#endif

@@ -1,0 +1,233 @@
+/* Solver: poses, rates and accelerations of the model. See kinfmu/solver/python/solver.py. */
+#include "way.h"
+
+#define TOLERANCE 1e-9 /* residual relative to the size above which a sample is not ok */
+
+void kf_solver_start(kf_solver *solver)
+{
+    int k;
+    kf_bind(&solver->model, kf_parameters_written, solver->message, sizeof solver->message);
+    solver->tolerance = TOLERANCE;
+#if KF_TRACKS
+    solver->model.track = solver->scratch.ahead.track = 0;
+#endif
+    solver->stuck = false;
+    for (k = 0; k < KF_INNERS; ++k) {
+        solver->scratch.inner[k].half = 0.0; /* nothing was read */
+    }
+    solver->message[0] = '\0';
+    kf_fresh(&solver->anchor, -1, -INFINITY, INFINITY);
+    kf_evaluated(&solver->model, kf_anchor_u, kf_anchor_z, NULL, &solver->anchor.found);
+}
+
+KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status)
+{
+    kf_fresh(pose, -1, -INFINITY, INFINITY);
+    pose->status = status;
+    return status;
+}
+
+/* A pose counts only if its rows close and the rows set aside as redundant hold too. */
+static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
+{
+    char *const message = solver->message;
+    double watches[KF_ROOM(KF_WATCHES)];
+    int k, most = 0;
+    kf_say_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_TOLD(solver));
+    if (!(pose->found.residual <= solver->tolerance)) {
+        kf_say(message, ": residual ");
+        kf_say_number(message, "%.2g", pose->found.residual);
+        kf_say(message, " of the size is left");
+        return pose->status = KF_NOT_CONVERGED;
+    }
+    kf_watches(&solver->model, &pose->found, watches);
+    for (k = 1; k < KF_WATCHES; ++k) {
+        most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
+    }
+    kf_say(message, ": the redundant row %s is open by ", kf_watch_names[most]);
+    kf_say_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
+    kf_say(message, " %s", kf_length_unit);
+    return pose->status = KF_INCONSISTENT;
+}
+
+/* The pose that a way starts from where the pose has no tangent to go on by. */
+static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
+{
+    kf_pose *const base = &solver->scratch.base;
+    if (pose->base_bridge >= 0) {
+        kf_bridge_pose(solver, pose->base_bridge, pose->base_u, base);
+    } else {
+        kf_fresh(base, -1, -INFINITY, INFINITY);
+        kf_evaluated_as_given(&solver->model, pose->base_u, pose->base_z, &base->found);
+    }
+    base->road = pose->road;
+    base->low = pose->low;
+    base->high = pose->high;
+    return base;
+}
+
+static inline bool is_same(const double *a, const double *b)
+{
+    bool same = true;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        same = same && a[k] == b[k];
+    }
+    return same;
+}
+
+/* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
+static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *road)
+{
+    const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)], s = u[KF_ALONG(solver)] - KF_HERE(solver, start);
+    if (!(-longest <= s && s <= longest && start->low <= u[KF_ALONG(solver)] && u[KF_ALONG(solver)] <= start->high)
+        || !kf_trusted_step(solver, start, KF_SPEEDS(&solver->model), s, u, pose)
+        || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)) {
+        return false;
+    }
+    if (pose->found.margin >= KF_REGULAR) {
+        return true;
+    }
+    if (pose->found.margin > KF_NEAR
+        && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, KF_SPEEDS(&solver->model), s))) {
+        kf_needed(solver, start->road, start->road, start->road);
+        *road = kf_surveyed(solver, start, pose);
+        return *road == pose->road;
+    }
+    return false;
+}
+
+/* The pose, rejected if its rows do not close or the rows set aside as redundant do not hold. */
+kf_status kf_checked(kf_solver *solver, kf_pose *pose)
+{
+    if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
+        solver->message[0] = '\0';
+        return rejected(solver, pose);
+    }
+    return pose->status;
+}
+
+/* The pose at the driver values of the start: the start itself, unless nothing has judged it yet, as the anchor. */
+static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
+{
+    const kf_pose *found = NULL;
+    if (start->found.margin < KF_REGULAR && start->status == KF_OK && start->road < 0) {
+        kf_limit limit;
+        int road = -1;
+        if (KF_IS_FOLLOWED) {
+            kf_needed(solver, start->road, start->road, start->road);
+            road = kf_surveyed(solver, start, start);
+        }
+        found = road < 0 ? NULL : kf_advance(solver, start, road, KF_POSE_U(start), &limit);
+    }
+    *pose = found == NULL ? *start : *found;
+    if (pose->status == KF_OK && pose->found.margin < KF_NEAR) {
+        pose->status = KF_NEAR_SINGULAR;
+    }
+    return kf_checked(solver, pose);
+}
+
+#if KF_TRACKS
+#define KF_SOLVE_ALONG kf_solve_along
+#else
+#define KF_SOLVE_ALONG kf_solve
+#endif
+
+inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    kf_pose *found;
+    kf_limit limit;
+    double sum = 0.0;
+    int road, k;
+    if (solver->stuck) {
+        return kf_failed(pose, KF_INCONSISTENT);
+    }
+    if (start->has_base && !is_same(u, KF_POSE_U(start))) {
+        start = base_of(solver, start);
+    }
+    if (is_same(u, KF_POSE_U(start))) {
+        return again(solver, start, pose);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum += u[k];
+    }
+    road = start->road;
+    if (KF_IS_FOLLOWED && is_near(solver, start, u, pose, &road)) { /* most samples */
+        return KF_OK;
+    }
+    solver->message[0] = '\0';
+    if (!(sum - sum == 0.0)) {
+        kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
+        kf_say(solver->message, " is not a finite number");
+        return kf_failed(pose, KF_OUTSIDE);
+    }
+    for (k = 0; k < KF_DISTANCES; ++k) {
+        if (u[kf_distance_drivers[k]] < 0.0) {
+            kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
+            kf_say(solver->message, ": a distance cannot be negative");
+            return kf_failed(pose, KF_OUTSIDE);
+        }
+    }
+    found = kf_advance(solver, start, road, u, &limit);
+    if (found == NULL) {
+        kf_say_limit(solver->message, &limit, u, KF_TOLD(solver));
+        return kf_failed(pose, KF_OUTSIDE);
+    }
+    *pose = *found;
+    return kf_checked(solver, pose);
+}
+
+/* Outputs, rates and accelerations from the derivatives that the pose holds: those with respect to the only driver, or
+ * those in time.
+ */
+inline void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd,
+                          double *outputs, double *rates, double *accelerations)
+{
+    if (outputs != NULL) {
+        kf_outputs(model, &pose->found, outputs);
+    }
+    if (rates != NULL) {
+        kf_output_rates(model, &pose->found, pose->x1, ud[0], rates);
+    }
+    if (accelerations != NULL) {
+        kf_output_accelerations(model, &pose->found, pose->x1, pose->x2, ud[0], udd[0], accelerations);
+    }
+}
+
+inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
+                      double *rates, double *accelerations)
+{
+    const kf_model *const model = &solver->model;
+    const bool one = KF_DRIVERS == 1;
+#if KF_TRACKS
+    if (pose->is_held && (rates != NULL || accelerations != NULL)) {
+        kf_rates_in_time(model, pose, ud, udd);
+        kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);
+        return;
+    }
+#endif
+    if ((rates != NULL || accelerations != NULL) && pose->derivatives < 1) {
+        KF_VELOCITY(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
+        pose->derivatives = one ? 1 : 0; /* of the single driver they stay true */
+    }
+    if (accelerations != NULL && pose->derivatives < 2) {
+        KF_ACCELERATION(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);
+        pose->derivatives = one ? 2 : 0;
+    }
+    kf_outputs_of(model, pose, ud, udd, outputs, rates, accelerations);
+}
+
+double kf_margin(const kf_solver *solver, const kf_pose *pose)
+{
+    double matrix[KF_ROOM(KF_LARGEST_BLOCK)], margin = fmin(1.0, pose->found.margin);
+    int block, first = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
+        if (rows > 1) {
+            kf_jacobian(&solver->model, &pose->found, block, matrix);
+            margin = fmin(margin, kf_reciprocal_condition(rows, columns, matrix));
+        }
+        first = kf_block_ends[block];
+    }
+    return margin;
+}

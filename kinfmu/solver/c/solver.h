@@ -1,0 +1,221 @@
+/* The solver: follows the branch of a mechanism that its anchor lies on. See kinfmu/solver/python/solver.py.
+ *
+ *     static kf_solver solver;                        zeroed memory: then equal runs leave equal bytes
+ *     kf_pose poses[2];
+ *     kf_solver_start(&solver);
+ *     kf_solve(&solver, &solver.anchor, u, &poses[0]);
+ *     kf_motion(&solver, &poses[0], ud, udd, outputs, rates, accelerations);
+ *     kf_solve(&solver, &poses[0], next_u, &poses[1]);    and so on, in turns: what is found is not copied
+ *
+ * State is in the poses. A pose that is found on a trial changes nothing about another one found later from the same
+ * start. What a pose knows of singular points on its way is kept in the solver, since it is large and rarely changes;
+ * the pose tells its road there by number. kf_solve keeps what its start refers to, and what it finds; what any other
+ * pose refers to may be overwritten. So after kf_solve(s, a, u, b) go on from a (another trial) or from b (it is
+ * accepted), and from the anchor at any time; a third pose that was kept aside is to be kept together with a copy of
+ * its solver.
+ *
+ * There are no pointers inside: copies of the solver and of the poses, byte by byte, are the whole state, and do the
+ * same to the bit wherever they are copied to, in another instance too. Of the solver the first KF_SOLVER_STATE bytes
+ * are enough: what follows does not outlive a call. Nothing is allocated, nothing is global: threads may run a solver
+ * each.
+ */
+#ifndef KF_SOLVER_H
+#define KF_SOLVER_H
+
+#include "kinfmu.h"
+
+#define KF_MESSAGE 480 /* characters, with the 0 at the end */
+
+/* How far the numbers of a pose can be trusted: see kinfmu/solver/python/status.py. */
+typedef enum {
+    KF_OK,
+    KF_NEAR_SINGULAR, /* right, but with fewer digits: see kf_errors */
+    KF_BRIDGED,       /* interpolated across a singular point, proved by closing */
+    KF_OUTSIDE,       /* the drivers cannot take the mechanism there */
+    KF_INCONSISTENT,  /* a constraint set aside as redundant does not hold there */
+    KF_NOT_CONVERGED
+} kf_status;
+
+#define KF_GOOD(status) ((status) <= KF_BRIDGED) /* the pose holds numbers */
+
+/* What a pose of the whole has of one driver's track: where to go on from, and what is known there. */
+typedef struct {
+    kf_status status;
+    int road, bridge, base_bridge;
+    bool has_base;
+    double base_u, base_z[KF_ROOM(KF_UNKNOWNS)];
+} kf_own;
+
+/* A pose that was found. If it is not good, nothing but its status says anything.
+ *
+ * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
+ * high: the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1:
+ * nothing; bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on
+ * by: the next way starts from its base, the last regular pose before it, to which road, low and high then belong.
+ */
+typedef struct {
+    kf_found found;
+    double x1[KF_COORDINATES];
+    double x2[KF_COORDINATES];
+    double low, high;
+    double base_u[KF_DRIVERS];
+    double base_z[KF_ROOM(KF_UNKNOWNS)];
+    kf_status status;
+    int derivatives;
+    int road, bridge, base_bridge;
+    bool has_base;
+#if KF_TRACKS
+    bool has_tracks, is_held;
+    kf_own own[KF_DRIVERS];
+    bool held[KF_BLOCKS]; /* blocks that are interpolated, and their derivatives, each over its own driver */
+    double own1[KF_UNKNOWNS], own2[KF_UNKNOWNS];
+#endif
+} kf_pose;
+
+#define KF_POSE_U(pose) ((pose)->found.x + KF_COORDINATES - KF_DRIVERS) /* its driver values */
+
+/* What is interpolated across a singular point, from six regular poses: see kinfmu/solver/python/span.py. */
+#define KF_NODES 6
+typedef struct {
+    double centre, half;
+    double u[KF_NODES];
+    double z[KF_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zd[KF_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zdd[KF_NODES][KF_ROOM(KF_UNKNOWNS)];
+    bool held[KF_ROOM(KF_BLOCKS)];
+} kf_span;
+
+/* A polynomial in Newton's form: see kinfmu/solver/python/hermite.py. */
+#define KF_MOST_NODES 4
+typedef struct {
+    int count; /* of the terms, three a node */
+    double coefficients[3 * KF_MOST_NODES], nodes[3 * KF_MOST_NODES];
+} kf_hermite;
+
+/* The polynomials of the unknowns through a span's inner nodes, and what they were made from. */
+typedef struct {
+    double half;
+    double z[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zd[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    double zdd[KF_MOST_NODES][KF_ROOM(KF_UNKNOWNS)];
+    kf_hermite polynomials[KF_ROOM(KF_UNKNOWNS)];
+} kf_inner;
+
+/* A span, moved by whole turns of the driver and of each unknown: see kinfmu/solver/python/bridge.py. */
+typedef struct {
+    int span; /* its number in the solver */
+    double turns;
+    double raised[KF_ROOM(KF_UNKNOWNS)];
+    double centre, half;
+    double u[KF_NODES]; /* of the nodes, moved; the window is between the third and the fourth */
+} kf_bridge;
+
+/* A stretch where no zero of a block's determinant is to be sought (again). */
+typedef struct {
+    double low, high;
+    int block;
+} kf_searched;
+
+/* What is known of the singular points on the way of a single driver: see kinfmu/solver/python/road.py. */
+#define KF_KEPT 32 /* of each kind, the latest */
+#define KF_IS_FOLLOWED (KF_DRIVERS == 1 || KF_TRACKS) /* along one driver: there are bridges */
+#define KF_SEARCHED (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
+typedef struct {
+    int bridges, stretches;
+    int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
+    kf_searched searched[KF_SEARCHED];
+} kf_road;
+
+/* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
+ * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
+ * not bridged. Blocks of several drivers follow the tracks piece by piece: the roads of the first start are needed too.
+ */
+#define KF_ROADS (KF_IS_FOLLOWED ? 4 + KF_MIXES : 1)
+#define KF_BRIDGES (KF_IS_FOLLOWED ? (3 + KF_MIXES) * KF_KEPT + 1 : 1)
+#define KF_SPANS (KF_IS_FOLLOWED ? KF_KEPT + 8 : 1)
+
+/* What is known along one driver. */
+typedef struct {
+    kf_road roads[KF_ROADS];
+    kf_bridge bridges[KF_BRIDGES];
+    kf_span spans[KF_SPANS];
+} kf_map;
+
+#define KF_MAPS (KF_TRACKS ? KF_DRIVERS : 1)
+
+/* What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held. */
+typedef struct {
+    double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
+    double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
+    double missed[3]; /* what adds to the outputs and their derivatives, as lengths miss a change point */
+    bool is_given;
+} kf_source;
+
+#define KF_INNERS 2 /* as many as most mechanisms have singular points */
+
+/* What does not outlive a call, but for the polynomials read last, which may be of use again. */
+typedef struct {
+    kf_inner inner[KF_INNERS];
+    kf_pose base, way[4], walk[2], beside, located;
+#if KF_TRACKS
+    kf_pose track[2];
+#endif
+#if KF_MIXES
+    kf_pose whole[4], share[2];
+    int origin[KF_DRIVERS]; /* roads of the tracks where a way of several drivers starts: needed until it ends */
+#endif
+    kf_model ahead;
+    kf_source source;
+    double rows[2][3][KF_ROOM(KF_OUTPUTS)];
+    double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
+    double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
+    double x1[KF_COORDINATES], x2[KF_COORDINATES];
+    int live[3]; /* roads that are needed */
+} kf_scratch;
+
+/* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor:
+ * where all ways start; message: why the last pose that is not good could not be had.
+ */
+typedef struct {
+    kf_model model;
+    double tolerance;
+    kf_pose anchor;
+    bool stuck; /* the parameters cannot be had: every pose fails, and the message says why */
+    char message[KF_MESSAGE];
+    kf_map maps[KF_MAPS];
+    kf_scratch scratch;
+} kf_solver;
+
+#define KF_SOLVER_STATE offsetof(kf_solver, scratch)
+
+/* Parameters as written, tolerance 1e-9. */
+void kf_solver_start(kf_solver *solver);
+
+/* Values of the parameters (KF_PARAMETERS), followed from what is written with the drivers at rest; the tolerance
+ * stays. false: they cannot be had, the message says why, and every pose fails with it. Poses found before are void.
+ */
+bool kf_solver_bind(kf_solver *solver, const double *parameters);
+
+/* The pose at driver values u (KF_DRIVERS), followed from the good pose `start`, another one, in a straight line of
+ * the driver values. The start stays what it is; derivatives that it has not been asked for yet are added to it. The
+ * status is that of the pose; if it is not good, the solver's message says why, in one line.
+ */
+kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
+
+/* Outputs, their rates and accelerations (KF_OUTPUTS each) at driver speeds ud and accelerations udd (KF_DRIVERS
+ * each); NULL: not wanted, and nothing is computed for it (ud and udd may be NULL where nothing needs them).
+ */
+void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double *outputs,
+               double *rates, double *accelerations);
+
+/* Estimated errors of the outputs, their rates and accelerations, the largest of each, in radians and sizes; infinite
+ * where nothing is known of them. See kinfmu/solver/python/estimate.py.
+ */
+void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
+
+/* The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point, or of |determinant| over
+ * the largest that it can be: where a row vanishes, equilibrating hides it.
+ */
+double kf_margin(const kf_solver *solver, const kf_pose *pose);
+
+#endif

@@ -1,0 +1,268 @@
+/* Tracks: what depends on one driver alone is followed along that driver. See kinfmu/solver/python/tracks.py. */
+#include "way.h"
+
+#if KF_TRACKS
+
+/* The pose of a track that a pose of the whole was put together from. */
+kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver)
+{
+    kf_pose *const own = &solver->scratch.track[0];
+    const double u = KF_POSE_U(whole)[driver];
+    const kf_own *const known = &whole->own[driver];
+    double z[KF_UNKNOWNS], room[KF_DRIVERS];
+    int block, k = 0;
+    if (whole->has_tracks && known->bridge >= 0) {
+        kf_bridge_pose(solver, known->bridge, kf_driven_at(&solver->model, &u, room), own);
+    } else {
+        for (block = 0; block < KF_BLOCKS; ++block) {
+            for (; k < kf_block_ends[block]; ++k) {
+                z[k] = kf_block_drivers[block] == driver ? whole->found.x[k] : solver->anchor.found.x[k];
+            }
+        }
+        kf_fresh(own, -1, -INFINITY, INFINITY);
+        kf_evaluated_as_given(&solver->model, kf_driven_at(&solver->model, &u, room), z, &own->found);
+    }
+    if (whole->has_tracks) {
+        own->status = known->status;
+        own->road = known->road;
+        own->has_base = known->has_base;
+        own->base_bridge = known->base_bridge;
+        if (known->has_base) {
+            kf_driven_at(&solver->model, &known->base_u, own->base_u);
+            memcpy(own->base_z, known->base_z, sizeof own->base_z);
+        }
+        kf_stretch(solver, own->road, own->has_base ? known->base_u : u, &own->low, &own->high);
+    }
+    return own;
+}
+
+/* What a pose of the whole keeps of the pose of a track. */
+static void keep(kf_solver *solver, const kf_pose *own, int driver, kf_pose *whole, double *z)
+{
+    kf_own *const kept = &whole->own[driver];
+    const bool *const held =
+        own->bridge < 0 ? NULL : KF_MAP(solver)->spans[KF_MAP(solver)->bridges[own->bridge].span].held;
+    int block, k = 0;
+    kept->status = own->status;
+    kept->road = own->road;
+    kept->bridge = own->bridge;
+    kept->has_base = own->has_base;
+    kept->base_bridge = own->base_bridge;
+    if (own->has_base) {
+        kept->base_u = own->base_u[driver];
+        memcpy(kept->base_z, own->base_z, sizeof kept->base_z);
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const bool is_own = kf_block_drivers[block] == driver;
+        whole->held[block] = is_own ? held != NULL && held[block] : whole->held[block];
+        whole->is_held = whole->is_held || whole->held[block];
+        for (; k < kf_block_ends[block]; ++k) {
+            if (is_own) {
+                z[k] = own->found.x[k];
+                whole->own1[k] = held == NULL ? 0.0 : own->x1[k];
+                whole->own2[k] = held == NULL ? 0.0 : own->x2[k];
+            }
+        }
+    }
+}
+
+static bool has_track(int driver)
+{
+    int block;
+    for (block = 0; block < KF_BLOCKS && kf_block_drivers[block] != driver; ++block) {
+    }
+    return block < KF_BLOCKS;
+}
+
+/* True if the blocks of all tracks are regular, and the others not near singular. */
+static bool is_apart(const kf_pose *pose)
+{
+    int block;
+    bool apart = pose->found.margin >= KF_NEAR;
+    if (!KF_MIXES || pose->found.margin >= KF_REGULAR) {
+        return pose->found.margin >= KF_REGULAR;
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        apart = apart && (kf_block_drivers[block] < 0 || fabs(pose->found.determinants[block]) >= KF_REGULAR);
+    }
+    return apart;
+}
+
+/* One trusted step of all drivers away from all that is singular on a track; false if it is not one. */
+bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    double direction[KF_DRIVERS], distance;
+    int k;
+    if (start->status != KF_OK || start->has_base || !is_apart(start)) {
+        return false;
+    }
+    distance = kf_course(KF_POSE_U(start), u, direction);
+    if (!(0.0 < distance && distance <= KF_LONGEST_STEP)) {
+        return false;
+    }
+    for (k = 0; start->has_tracks && k < KF_DRIVERS; ++k) {
+        if (start->own[k].road >= 0) {
+            double low, high;
+            kf_enter_track(solver, k);
+            kf_stretch(solver, start->own[k].road, KF_POSE_U(start)[k], &low, &high);
+            kf_leave_track(solver);
+            if (!(low <= u[k] && u[k] <= high)) {
+                return false;
+            }
+        }
+    }
+    if (!kf_trusted_step(solver, start, direction, distance, u, pose) || !is_apart(pose)
+        || !(pose->found.watch <= solver->tolerance && pose->found.residual <= solver->tolerance)
+        || (pose->found.margin < KF_REGULAR && !kf_keeps_branch(solver, start, pose, direction, distance))) {
+        return false;
+    }
+    pose->has_tracks = true;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        pose->own[k].status = KF_OK;
+        pose->own[k].road = start->has_tracks ? start->own[k].road : -1;
+        pose->own[k].bridge = -1;
+        pose->own[k].has_base = false;
+        pose->own[k].base_bridge = -1;
+    }
+    return true;
+}
+
+/* The pose of the tracks at u, on the way from `start` to `target`; all other blocks are as z has them. */
+kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *from,
+                       kf_pose *pose)
+{
+    const double tolerance = solver->tolerance;
+    kf_pose *const own = &solver->scratch.track[1];
+    double z[KF_UNKNOWNS], room[KF_DRIVERS];
+    kf_status status = KF_OK;
+    int k, iterations = 0;
+    memcpy(z, from, sizeof z);
+    memset(pose->held, 0, sizeof pose->held);
+    pose->is_held = false;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        kf_status one;
+        if (!has_track(k)) {
+            pose->own[k].status = KF_OK;
+            pose->own[k].road = pose->own[k].bridge = pose->own[k].base_bridge = -1;
+            pose->own[k].has_base = false;
+            continue;
+        }
+        kf_enter_track(solver, k);
+        solver->tolerance = INFINITY; /* the whole is what counts */
+        one = kf_solve_along(solver, kf_own_pose(solver, start, k), kf_driven_at(&solver->model, &u[k], room), own);
+        if (!KF_GOOD(one) && u != target) { /* the message is to tell of the target */
+            char message[KF_MESSAGE];
+            kf_status beyond;
+            memcpy(message, solver->message, sizeof message);
+            kf_driven_at(&solver->model, &target[k], room);
+            beyond = kf_solve_along(solver, kf_own_pose(solver, start, k), room, own);
+            if (KF_GOOD(beyond)) {
+                memcpy(solver->message, message, sizeof message);
+            } else {
+                one = beyond;
+            }
+        }
+        solver->tolerance = tolerance;
+        if (KF_GOOD(one)) {
+            keep(solver, own, k, pose, z);
+            iterations += own->found.iterations;
+            status = one == KF_NEAR_SINGULAR || status == KF_OK ? one : status;
+        }
+        kf_leave_track(solver);
+        if (!KF_GOOD(one)) {
+            return kf_failed(pose, one);
+        }
+    }
+    pose->low = -INFINITY;
+    pose->high = INFINITY;
+    pose->derivatives = 0;
+    pose->road = pose->bridge = -1;
+    pose->has_base = false;
+    pose->has_tracks = true;
+    pose->status = status;
+    if (!kf_evaluated_as_given(&solver->model, u, z, &pose->found)) {
+        kf_limit limit;
+        memcpy(limit.u, KF_POSE_U(start), sizeof limit.u);
+        limit.block = KF_NO_BLOCK;
+        limit.crosses = false;
+        solver->message[0] = '\0';
+        kf_say_limit(solver->message, &limit, target, -1);
+        return kf_failed(pose, KF_OUTSIDE);
+    }
+    pose->found.iterations = iterations;
+    return pose->status;
+}
+
+kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    kf_status status;
+    double sum = 0.0;
+    int k;
+    bool is_same = start->has_tracks;
+    if (solver->stuck) {
+        return kf_failed(pose, KF_INCONSISTENT);
+    }
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        is_same = is_same && u[k] == KF_POSE_U(start)[k];
+        sum += u[k];
+    }
+    if (is_same) {
+        *pose = *start;
+        return pose->status;
+    }
+    if (kf_is_near(solver, start, u, pose)) { /* most samples */
+        return KF_OK;
+    }
+    solver->message[0] = '\0';
+    if (!(sum - sum == 0.0)) {
+        kf_say_place(solver->message, u, KF_ROUGHLY, -1);
+        kf_say(solver->message, " is not a finite number");
+        return kf_failed(pose, KF_OUTSIDE);
+    }
+#if KF_MIXES
+    for (k = 0; k < KF_DISTANCES; ++k) {
+        if (kf_block_drivers[kf_distance_blocks[k]] == KF_MIXED && u[kf_distance_drivers[k]] < 0.0) {
+            kf_say_place(solver->message, u, KF_ROUGHLY, -1);
+            kf_say(solver->message, ": a distance cannot be negative");
+            return kf_failed(pose, KF_OUTSIDE);
+        }
+    }
+    status = kf_followed_all(solver, start, u, pose);
+#else
+    status = kf_assembled(solver, start, u, u, start->found.x, pose);
+#endif
+    return KF_GOOD(status) ? kf_checked(solver, pose) : status;
+}
+
+#endif
+
+/* First and second derivative of the coordinates in time; the blocks that are interpolated, whose derivatives follow by
+ * the chain rule, or NULL.
+ */
+const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd)
+{
+    const bool *held = NULL;
+    const double *first = NULL, *second = NULL;
+#if KF_TRACKS
+    double given_first[KF_UNKNOWNS], given_second[KF_UNKNOWNS];
+    int block, k = 0;
+    for (block = 0; pose->is_held && block < KF_BLOCKS; ++block) {
+        const int driver = kf_block_drivers[block];
+        const double v = driver < 0 ? 0.0 : ud[driver], a = driver < 0 || udd == NULL ? 0.0 : udd[driver];
+        for (; k < kf_block_ends[block]; ++k) {
+            given_first[k] = v * pose->own1[k];
+            given_second[k] = v * v * pose->own2[k] + a * pose->own1[k];
+        }
+    }
+    if (pose->is_held) {
+        held = pose->held;
+        first = given_first;
+        second = given_second;
+    }
+#endif
+    kf_velocity(model, &pose->found, ud, first, held, pose->x1);
+    if (udd != NULL) {
+        kf_acceleration(model, &pose->found, udd, pose->x1, second, held, pose->x2);
+    }
+    return held;
+}

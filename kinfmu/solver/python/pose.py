@@ -1,0 +1,153 @@
+"""Pose: an assembled pose of a mechanism at given driver values, and how it is found by Newton."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .status import Status
+
+Vector = tuple[float, ...]
+Model = Any  # a generated module: see kinfmu.codegen.python.emit
+Found = tuple[Any, ...]  # what its `position` gives
+
+EPS = 2.220446049250313e-16
+POLISHED = 0.1  # determinant below which Newton goes on until the residual no longer falls
+UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
+STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
+ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
+AT_REST: Vector = (0.0,)
+
+
+class Pose:
+    """A value; what is derived from it is computed when first asked for.
+
+    u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular, 0 at a singular point;
+    margin: the smallest of their sizes; residual: the largest length of a block's residuals, relative to the size;
+    moved: largest correction of the prediction, in radians and sizes; watch: largest residual of the rows set aside,
+    relative to the size; values: numbers of the position stage that later stages use. road: the singular stretches
+    known on the way here; bridge: the one that this pose was interpolated by. status and message: see Status.
+    """
+
+    __slots__ = (
+        "base",
+        "bridge",
+        "determinants",
+        "iterations",
+        "margin",
+        "message",
+        "moved",
+        "residual",
+        "road",
+        "status",
+        "tangent",
+        "tracks",
+        "u",
+        "values",
+        "watch",
+        "z",
+    )
+
+    def __init__(self, u: Vector, found: Found, road: Any = None) -> None:
+        self.u = u
+        (
+            self.z,
+            self.determinants,
+            self.margin,
+            self.residual,
+            self.iterations,
+            self.moved,
+            self.watch,
+            self.values,
+        ) = found
+        self.road = road  # None: nothing singular is known
+        self.bridge: Any = None
+        self.base: Pose | None = None  # where to go on from, if not from here: see advance
+        self.status: int = 0
+        self.message = ""
+        self.tracks: tuple[tuple[Any, Pose], ...] = ()  # with several drivers: each track, and its pose
+        self.tangent: tuple[Vector, Vector] | None = None  # of a single driver: see tangent_of
+
+    @property
+    def is_bridged(self) -> bool:
+        """True if unknowns of the pose are interpolated."""
+        if not self.tracks:
+            return self.bridge is not None
+        return any(own.bridge is not None for _, own in self.tracks)
+
+    @property
+    def good(self) -> bool:
+        """True if the pose holds numbers."""
+        return self.status <= 2
+
+    def found(self) -> Found:
+        """What `position` gave for this pose."""
+        return (
+            self.z,
+            self.determinants,
+            self.margin,
+            self.residual,
+            self.iterations,
+            self.moved,
+            self.watch,
+            self.values,
+        )
+
+
+def tangent_of(model: Model, pose: Pose) -> tuple[Vector, Vector]:
+    """First and second derivative of z with respect to the only driver."""
+    tangent = pose.tangent
+    if tangent is None:
+        tangent = pose.tangent = model.tangent(pose.values)
+    return tangent
+
+
+def directed(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vector]:
+    """First and second derivative of z on a straight way of the drivers."""
+    if len(direction) == 1:
+        return tangent_of(model, pose)
+    zd = model.velocity(pose.values, direction)
+    return zd, model.acceleration(pose.values, direction, (0.0,) * len(direction), zd)
+
+
+def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
+    """A pose without numbers: what could not be reached from `start`, and why."""
+    pose = Pose(u, start.found(), start.road)
+    pose.status = status
+    pose.message = message
+    return pose
+
+
+def on_road(pose: Pose, road: Any) -> Pose:
+    """The same pose with other singular stretches known."""
+    other = Pose(pose.u, pose.found(), road)
+    other.tangent = pose.tangent
+    return other
+
+
+def position(model: Model, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0) -> Found:
+    """What the model's `position` gives; near a singular pose Newton goes on until the residual no longer falls."""
+    found: Found = model.position(u, z, zd, zdd, s, held)
+    return found if found[2] >= POLISHED or held < 0 else polished(model, u, found, held)
+
+
+def polished(model: Model, u: Vector, found: Found, held: int = 0) -> Found:
+    """What Newton gives that goes on from a pose near a singular one; the pose as it is where that wins nothing."""
+    if held and not any(abs(size) < POLISHED and not held >> k & 1 for k, size in enumerate(found[1])):
+        return found  # the blocks near a singular pose are not solved for
+    rest = (0.0,) * len(found[0])
+    try:
+        better: Found = model.position(u, found[0], rest, rest, -0.0, held, 0.0)
+    except (ArithmeticError, ValueError):
+        return found
+    if not better[3] <= found[3]:
+        return found
+    return (*better[:4], found[4] + better[4], found[5], *better[6:])
+
+
+def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> Found:
+    """What `position` gives for unknowns that are known: held blocks (all, if nothing is said) are not solved for.
+
+    s = -0.0 at rest leaves z as it is, to the bit.
+    """
+    rest = (0.0,) * len(z)
+    return position(model, u, z, rest, rest, -0.0, held)

@@ -1,0 +1,7 @@
+"""Sweeps: `solve` at many samples, by the Python or the native engine."""
+
+from __future__ import annotations
+
+from kinfmu.sweep.solve import run_times, solve
+
+__all__ = ["run_times", "solve"]

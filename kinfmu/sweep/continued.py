@@ -1,0 +1,93 @@
+"""Parameters set in a mechanism: the pose of the mechanism as written is followed to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from kinfmu.codegen.python import load_module
+from kinfmu.errors import KinfmuError
+from kinfmu.mechanism import Mechanism, Start
+from kinfmu.mechanism.mechanism import COORDINATES
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.solver.python import Solver, Stuck, with_parameters
+from kinfmu.solver.python.pose import Pose, failed
+from kinfmu.solver.python.status import Status
+
+Settings = Mapping[str, float | str]
+
+
+class Continued(NamedTuple):
+    """A mechanism with parameters set.
+
+    message: why the written pose cannot be followed to them, so that the mechanism is assembled anew from its start
+    poses; empty if it can.
+    """
+
+    mechanism: Mechanism
+    message: str = ""
+
+
+def continued(mechanism: Mechanism, settings: Settings) -> Continued:
+    """Return the mechanism with other parameters and law constants, started in the pose that the written one becomes.
+
+    The start poses are replaced by the pose that is followed, first to the parameters with the drivers at rest, then to
+    the start of the laws, as an FMU does. A mechanism that does not assemble as it is written, or that cannot be
+    followed, keeps its start poses.
+
+    Raises:
+        RequestError: A name is unknown.
+        MechanismError: A value is invalid.
+
+    """
+    changed = mechanism.with_parameters(settings)
+    if not any(name in mechanism.parameters for name in settings) and law_starts(changed) == law_starts(mechanism):
+        return Continued(changed)
+    whole = replace(mechanism, coordinates="all", points={})
+    try:
+        plan = compile_plan(settable(whole, settings))
+    except KinfmuError:
+        return Continued(changed)
+    solver = with_parameters(load_module(plan), bound_values(plan, changed))
+    pose = at_law_start(solver, changed)
+    if not pose.good:
+        return Continued(changed, anew(pose.message))
+    pose = pose if pose.status == Status.OK else solver.anchor
+    start = dict(zip(plan.outputs, solver.outputs(pose), strict=True))
+    bodies = tuple(
+        body if body.is_ground else replace(body, start=Start(*(start[f"{body.name}.{c}"] for c in COORDINATES)))
+        for body in changed.bodies
+    )
+    return Continued(replace(changed, bodies=bodies))
+
+
+def settable(mechanism: Mechanism, settings: Settings) -> Mechanism:
+    """Return the mechanism as written; parameters that are set although an expression gives them are numbers."""
+    derived = [name for name, parameter in mechanism.parameters.items() if parameter.expression and name in settings]
+    return mechanism.with_parameters({name: float(mechanism.parameters[name].value) for name in derived})
+
+
+def bound_values(plan: SolvePlan, mechanism: Mechanism) -> tuple[float, ...]:
+    """Return the values that a mechanism has for the parameters of a plan."""
+    return tuple(float(mechanism.parameters[parameter.name].value) for parameter in plan.parameters)
+
+
+def anew(message: str) -> str:
+    """Return the note about parameters to which the written pose cannot be followed."""
+    return f"{message}; the mechanism is assembled anew from its start poses"
+
+
+def law_starts(mechanism: Mechanism) -> tuple[float, ...]:
+    """Return the driver values at which the laws start."""
+    return tuple(float(driver.law.at(mechanism.run.start)) for driver in mechanism.drivers)
+
+
+def at_law_start(solver: Solver, mechanism: Mechanism) -> Pose:
+    """Return the pose at the start of the laws, followed from the anchor: a pose without numbers if that fails."""
+    start = law_starts(mechanism)
+    return (
+        failed(solver.anchor, start, Status.OUTSIDE, solver.message)
+        if isinstance(solver, Stuck)
+        else solver.solve(solver.anchor, start)
+    )

@@ -1,0 +1,208 @@
+"""A plan's C as a library: compiled, loaded, and called for whole arrays of samples."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c.model import emit
+from kinfmu.errors import KinfmuError
+from kinfmu.plan import SolvePlan
+from kinfmu.simd import sources
+from kinfmu.solver.python.status import Status
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # lanes need them; the arithmetic is the same
+MESSAGE = 480  # characters, as KF_MESSAGE
+MOST_FAILURES = 1000  # stretches without numbers whose reasons are kept
+
+_double = ctypes.c_double
+_numbers = ctypes.POINTER(_double)
+_integers = ctypes.POINTER(ctypes.c_int64)
+
+
+class _Table(ctypes.Structure):
+    """kf_table of sweep.h."""
+
+    _fields_ = (("start", _numbers), ("row", ctypes.c_ssize_t), ("column", ctypes.c_ssize_t))
+
+
+class _Job(ctypes.Structure):
+    """kf_job of sweep.h."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64),
+        ("u", _numbers),
+        ("ud", _numbers),
+        ("udd", _numbers),
+        ("tables", _Table * 3),
+        ("outcomes", ctypes.c_void_p),
+        ("residual", _numbers),
+        ("watches", _numbers),
+        ("most_failures", ctypes.c_int64),
+        ("failure_count", ctypes.c_int64),
+        ("failures", _integers),
+        ("messages", ctypes.c_char_p),
+        ("side_by_side", ctypes.c_int64),
+        ("gaps", ctypes.c_int64),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a sweep tells besides its tables: see Run. outcomes: (n, 2), status and iterations.
+
+    failures: first sample and message of each stretch without numbers, and after MOST_FAILURES of them how many more
+    there are; side_by_side: how many samples went through lanes.
+    """
+
+    outcomes: NDArray[np.int32]
+    residual: FloatArray
+    watch: FloatArray
+    failures: tuple[tuple[int, str], ...]
+    side_by_side: int
+
+
+class Library:
+    """The compiled model and solver of a plan. CompilerError if it cannot be compiled, kept or loaded."""
+
+    def __init__(self, plan: SolvePlan) -> None:
+        self.plan = plan
+        files = emit(plan) | compiler.runtime() | sources(plan)
+        library = self._library = compiler.load(files, FLAGS)
+        library.kf_sweep_new.restype = ctypes.c_void_p
+        library.kf_sweep_new.argtypes = [_double]
+        library.kf_sweep_free.argtypes = [ctypes.c_void_p]
+        library.kf_sweep_bind.restype = ctypes.c_bool
+        library.kf_sweep_bind.argtypes = [ctypes.c_void_p, _numbers]
+        library.kf_sweep_run.restype = ctypes.c_bool
+        library.kf_sweep_run.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job)]
+        library.kf_sweep_diagnose.restype = ctypes.c_bool
+        library.kf_sweep_diagnose.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), _numbers, _numbers]
+        library.kf_sweep_message.restype = ctypes.c_char_p
+        library.kf_sweep_message.argtypes = [ctypes.c_void_p]
+        library.kf_drive_all.restype = ctypes.c_bool
+
+    def drive(
+        self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, d) driver values, speeds and accelerations at times; parameters: those of the plan if none."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
+        values = parameters or [parameter.value for parameter in self.plan.parameters]
+        given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
+        if not self._library.kf_drive_all(ctypes.c_int64(len(times)), _start(times), *given, *map(_start, driven)):
+            raise KinfmuError("these parameters cannot be had")
+        return driven  # type: ignore[return-value]  # three of them
+
+    def sweep(
+        self,
+        driven: tuple[FloatArray, FloatArray, FloatArray],
+        tables: Sequence[FloatArray | None],
+        parameters: Sequence[float] = (),
+        tolerance: float = 1e-9,
+        room: Told | None = None,
+    ) -> Told:
+        """Fill tables (n, outputs) of values, rates and accelerations at (n, d) driver values, speeds, accelerations.
+
+        A table may be laid out by samples or by outputs; None: not wanted. Where the samples cannot be reached it is
+        NaN. room: what a sweep of as many samples told, whose arrays are written over.
+        """
+        count, watches = len(driven[0]), len(self.plan.watches)
+        if room is None:
+            whole = np.empty((2, count))  # in one piece: the system hands large pieces over faster
+            told = Told(whole[0].view(np.int32).reshape(count, 2), whole[1], np.empty((count, watches)), (), 0)
+        elif room.watch.shape == (count, watches):
+            told = room
+        else:
+            raise KinfmuError(f"room for {room.watch.shape} samples and rows set aside, not for {(count, watches)}")
+        failures = np.zeros(MOST_FAILURES, dtype=np.int64)
+        messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
+        job = self._job(driven, tables)
+        job.outcomes = told.outcomes.ctypes.data_as(ctypes.c_void_p)
+        job.residual, job.watches = _start(told.residual), _start(told.watch)
+        job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
+        job.messages = ctypes.cast(messages, ctypes.c_char_p)
+        with _Memory(self._library, self._refusal(count), tolerance, parameters) as memory:
+            if not self._library.kf_sweep_run(memory, ctypes.byref(job)):
+                raise KinfmuError(self._refusal(count))
+        failed = []
+        for k, sample in enumerate(failures[: min(job.failure_count, MOST_FAILURES)].tolist()):
+            text = messages.raw[k * MESSAGE : (k + 1) * MESSAGE].split(b"\0", 1)[0]
+            failed.append((sample, text.decode()))
+        more = job.failure_count - MOST_FAILURES
+        if more > 0:
+            bad = told.outcomes[:, 0] > Status.BRIDGED
+            first = int(np.flatnonzero(bad & ~np.concatenate([[False], bad[:-1]]))[MOST_FAILURES])
+            failed.append(
+                (first, f"{more} more stretches without numbers begin here or later: {MOST_FAILURES} are told")
+            )
+        return replace(told, failures=tuple(failed), side_by_side=job.side_by_side)
+
+    def diagnose(
+        self,
+        driven: tuple[FloatArray, FloatArray, FloatArray],
+        outcomes: NDArray[np.int32],
+        parameters: Sequence[float] = (),
+        tolerance: float = 1e-9,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Margins (n,) and estimated errors (n, 3) of samples that were swept, with these outcomes; NaN if not good."""
+        margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
+        job = self._job(driven, (None, None, None))
+        job.outcomes = outcomes.ctypes.data_as(ctypes.c_void_p)
+        with _Memory(self._library, self._refusal(len(margins)), tolerance, parameters) as memory:
+            if not self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors)):
+                raise KinfmuError(self._refusal(len(margins)))
+        return margins, errors
+
+    def _refusal(self, count: int) -> str:
+        return (
+            f"no memory is left for a sweep of {count} samples of '{self.plan.mechanism.name}' by the native engine, "
+            "which may need 200 MB beside its tables; sweep fewer samples at a time, or with engine 'python'"
+        )
+
+    def _job(self, driven: tuple[FloatArray, ...], tables: Sequence[FloatArray | None]) -> _Job:
+        job = _Job(count=len(driven[0]))
+        job.given = [np.ascontiguousarray(table) for table in driven]  # to live as long as what points at them
+        job.u, job.ud, job.udd = map(_start, job.given)
+        for k, table in enumerate(tables):
+            if table is not None:
+                row, column = (stride // table.itemsize for stride in table.strides)
+                job.tables[k] = _Table(table.ctypes.data_as(_numbers), row, column)
+        return job
+
+
+class _Memory:
+    """Memory of a sweep, with its parameters bound. refusal: what to say if there is none."""
+
+    def __init__(self, library: Any, refusal: str, tolerance: float, parameters: Sequence[float]) -> None:
+        self._library = library
+        self._memory = library.kf_sweep_new(tolerance)
+        if not self._memory:
+            raise KinfmuError(refusal)
+        if parameters and not library.kf_sweep_bind(self._memory, (_double * len(parameters))(*parameters)):
+            message = library.kf_sweep_message(self._memory).decode()
+            library.kf_sweep_free(self._memory)
+            raise KinfmuError(message)
+
+    def __enter__(self) -> Any:
+        return self._memory
+
+    def __exit__(self, *_: object) -> None:
+        self._library.kf_sweep_free(self._memory)
+
+
+def _start(array: FloatArray) -> Any:
+    return array.ctypes.data_as(_numbers)
+
+
+def _integer_start(array: IntArray) -> Any:
+    return array.ctypes.data_as(_integers)

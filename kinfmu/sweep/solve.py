@@ -1,0 +1,294 @@
+"""solve(): a mechanism over many samples, as a Run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.codegen.python import load_model, load_module
+from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
+from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.mechanism.mechanism import refuse_other
+from kinfmu.mechanism.number import measured
+from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.toml_text import text
+from kinfmu.mechanism.valid import is_number
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
+from kinfmu.run.axis import TIME, axis_for
+from kinfmu.run.unwrap import short_way
+from kinfmu.solver.python import Solver, Stuck, with_parameters
+from kinfmu.solver.python.pose import Vector
+from kinfmu.solver.python.solver import TOLERANCE
+from kinfmu.sweep.continued import anew, at_law_start, bound_values, continued, law_starts
+from kinfmu.sweep.engine import Driven, Engine, Tables
+from kinfmu.sweep.python_engine import PythonEngine
+
+ENGINES = ("auto", "python", "native")
+LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
+WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
+
+
+def solve(
+    mechanism: Mechanism | SolvePlan,
+    t: ArrayLike | None = None,
+    *,
+    parameters: Mapping[str, float | str] | None = None,
+    outputs: Sequence[str] | None = None,
+    engine: str = "auto",
+    tolerance: float = TOLERANCE,
+    wrap: bool = False,
+    out: Tables | None = None,
+    **inputs: ArrayLike,
+) -> Run:
+    """Positions, velocities and accelerations at the given times, or at the given driver values.
+
+    t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
+    the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
+    and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples, and the axis
+    of pictures is the driver's value).
+    parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
+    other geometry is reached by continuation from the pose of the geometry as written; what cannot be reached is
+    assembled anew, with an event of level "info". outputs: names to solve for, all
+    if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
+    and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there.
+    tolerance: residual relative to the size above which a sample is not ok; positive. wrap: angles given as inputs are
+    followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three
+    arrays (n, outputs), by samples or by outputs (order="F": faster), that take values, rates and accelerations.
+
+    Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
+    last good sample. Raises a RequestError for what is not there or cannot be meant, and what compiling a plan raises
+    for a mechanism that cannot be solved; a CompilerError if engine 'native' is asked for and there is no compiler.
+    """
+    if engine not in ENGINES:
+        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+    if not (is_number(tolerance) and 0.0 < tolerance < math.inf):
+        raise RequestError(f"tolerance = {quoted(tolerance)} must be a positive number")
+    if isinstance(mechanism, SolvePlan):
+        if outputs is not None:
+            raise RequestError("outputs are chosen when a plan is compiled: compile_plan(mechanism, outputs)")
+        plan = mechanism
+    else:
+        refuse_other(mechanism, "solve")
+        plan = compile_plan(mechanism, outputs)
+    constants, geometry = _settings(plan, parameters or {})
+    own = {name: value for name, value in (parameters or {}).items() if name not in geometry}
+    plan, bound, solver, anew_note = _set(plan, geometry, own, tolerance, by_law=not inputs)
+    if t is None and not inputs:
+        t = run_times(plan.mechanism.run)
+    if t is None:
+        times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
+        driven, axis = (u, ud, udd), axis_for(u, tuple(driver.inputs[0] for driver in plan.drivers))
+    elif wrap:
+        raise RequestError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
+    elif inputs:
+        raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+    else:
+        times, driven, axis = _column("t", t), None, TIME
+    chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
+    if driven is None:
+        driven = _with_values(chosen.drive(times, tuple(constants.values())))
+    else:
+        _refuse_huge(plan, driven)
+    run = _swept(plan, chosen, times, driven, out, constants).replaced(axis=axis)
+    if anew_note and len(times):
+        run = run.replaced(events=(Event(float(times[0]), "info", anew_note), *run.events))
+    return run
+
+
+def run_times(run: RunSettings) -> FloatArray:
+    """(n,) start + k step up to stop, which is included where a step hits it."""
+    if (run.stop - run.start) / run.step > MOST_SAMPLES:
+        raise KinfmuError(
+            f"[run] {run.start:g} to {run.stop:g} s in steps of {run.step:g} s: more than {MOST_SAMPLES} samples"
+        )
+    count = int((run.stop - run.start) / run.step + 1e-6)
+    return run.start + run.step * np.arange(count + 1, dtype=np.float64)
+
+
+def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[str, float], dict[str, float | str]]:
+    """Law constants by name, with those given in place of the file's; and the parameters of the mechanism given."""
+    constants = {constant.name: constant.value for constant in plan.law_constants}
+    quantities = {constant.name: constant.quantity for constant in plan.law_constants}
+    positive = {constant.name for constant in plan.law_constants if constant.is_positive}
+    geometry: dict[str, float | str] = {}
+    for name, value in given.items():
+        if name in plan.mechanism.parameters:
+            geometry[name] = value
+            continue
+        known = [*plan.mechanism.parameters, *constants]
+        if name not in constants:
+            raise RequestError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
+        constants[name] = measured(f"parameter '{name}'", value, quantities[name], plan.mechanism.length_unit)
+        if name in positive and not constants[name] > 0.0:
+            raise RequestError(f"parameter '{name}' = {value!r} must be positive")
+    return constants, geometry
+
+
+def _set(
+    plan: SolvePlan,
+    geometry: Mapping[str, float | str],
+    constants: Mapping[str, float | str],
+    tolerance: float,
+    *,
+    by_law: bool,
+) -> tuple[SolvePlan, Vector, Solver | None, str]:
+    """The plan with other values of parameters written, the values to be bound (none: those of the plan), a solver if
+    there is one already, followed from the plan's anchor, and a note if it could not be followed (else empty).
+
+    What continuation does not reach is planned anew, as a file with these values would be: that assembles, or says
+    which joint stays open by how much.
+    """
+    written = plan.mechanism
+    settings = {**geometry, **constants}
+    if not settings:
+        return plan, (), None, ""
+    changed = written.with_parameters(settings)
+    if not geometry and (not by_law or law_starts(changed) == law_starts(written)):
+        return plan, (), None, ""
+    if any(written.parameters[name].expression is not None for name in geometry):
+        followed = continued(written, settings)
+        return compile_plan(followed.mechanism, plan.outputs), (), None, followed.message
+    values = bound_values(plan, changed)
+    solver = with_parameters(load_module(plan), values, tolerance)
+    if by_law or isinstance(solver, Stuck):
+        start = at_law_start(solver, changed)
+        if not start.good:
+            return compile_plan(changed, plan.outputs), (), None, anew(start.message)
+    return replace(plan, mechanism=written.with_parameters(geometry)), values, solver, ""
+
+
+def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, tolerance: float, count: int) -> Engine:
+    """The engine of a name; `auto` takes the native one where it pays and can be had."""
+    work = count * max(1, len(plan.blocks))
+    if name == "native" or (name == "auto" and work >= WORTH_COMPILING):
+        from kinfmu.sweep.native_engine import NativeEngine
+
+        fixed = plan.fixed if solver is None else solver.model.FIXED
+        try:
+            return NativeEngine(plan, bound, fixed, tolerance)
+        except CompilerError:
+            if name == "native":
+                raise
+    return PythonEngine(solver or Solver(load_model(plan), tolerance))
+
+
+def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: bool = False) -> tuple[FloatArray, ...]:
+    """Sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
+
+    wrap: angles are followed the short way.
+    """
+    known = [name for driver in plan.drivers for name in driver.inputs]
+    for name in inputs:
+        if name not in known:
+            raise RequestError(
+                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
+            )
+    for driver in plan.drivers:
+        if driver.inputs[0] not in inputs:
+            raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
+    columns = {name: _column(name, value) for name, value in inputs.items()}
+    angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
+    if wrap and not angles:
+        raise RequestError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
+    columns |= {name: short_way(columns[name]) for name in angles if wrap}
+    lengths = {len(column) for column in columns.values() if len(column) > 1}
+    if len(lengths) > 1:
+        sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())
+        raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
+    n = lengths.pop() if lengths else min((len(column) for column in columns.values()), default=1)
+    tables = []
+    for order, default in enumerate((0.0, 1.0, 0.0)):
+        given = [columns.get(driver.inputs[order], np.array([default])) for driver in plan.drivers]
+        tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
+    return np.arange(n, dtype=float), *tables
+
+
+def _with_values(driven: Driven) -> Driven:
+    """Return what laws drive; NaN where a law has no value, or has rates whose squares no float holds."""
+    u, ud, udd = driven
+    has_value = (np.abs(ud) <= LARGEST_RATE) & (np.abs(udd) <= LARGEST_RATE)
+    return driven if has_value.all() else (np.where(has_value, u, np.nan), ud, udd)
+
+
+def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:
+    """Raise a RequestError for a speed or an acceleration of a driver whose square no float holds."""
+    for order in (1, 2):
+        sizes = np.abs(driven[order])
+        if (sizes > LARGEST_RATE).any():
+            sample, number = np.argwhere(sizes > LARGEST_RATE)[0]
+            raise RequestError(
+                f"{plan.drivers[number].inputs[order]} = {driven[order][sample, number]:.6g} at sample {sample}: "
+                f"the largest value is {LARGEST_RATE:g}"
+            )
+
+
+def _column(name: str, values: ArrayLike) -> FloatArray:
+    try:
+        column = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be numbers") from None
+    if column.ndim != 1:
+        raise RequestError(f"{name} must be one-dimensional, not of shape {column.shape}")
+    if not np.isfinite(column).all():
+        raise RequestError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
+    return column
+
+
+def _swept(
+    plan: SolvePlan,
+    engine: Engine,
+    times: FloatArray,
+    driven: Driven,
+    out: Tables | None,
+    constants: Mapping[str, float],
+) -> Run:
+    tables = _tables(out, (len(times), len(plan.outputs)), engine.order)
+    told = engine.sweep(driven, tables)
+    inputs = np.stack(driven, axis=2).reshape(
+        len(times), 3 * len(plan.drivers)
+    )  # value, speed, acceleration of each driver
+    return Run(
+        t=times,
+        outputs=plan.outputs,
+        coordinate_count=plan.coordinate_count,
+        values=tables[0],
+        rates=tables[1],
+        accelerations=tables[2],
+        fixed=engine.fixed,
+        input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
+        inputs=inputs,
+        status=told.status,
+        iterations=told.iterations,
+        residual=told.residual,
+        margin=told.margin,
+        error=told.error,
+        watch_names=plan.watch_names,
+        watch=told.watch,
+        length_unit=plan.mechanism.length_unit,
+        mechanism_text=text(plan.mechanism),
+        info={
+            "name": plan.mechanism.name,
+            "title": plan.mechanism.title,
+            "engine": engine.name,
+            **{name: repr(float(parameter.value)) for name, parameter in plan.mechanism.parameters.items()},
+            **{name: repr(value) for name, value in constants.items()},
+        },
+        events=tuple(Event(float(times[k]), "error", message) for k, message in told.failures),
+    )
+
+
+def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:
+    if out is None:
+        return tuple(np.empty(shape, order=order) for _ in range(3))  # type: ignore[return-value]  # three of them
+    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
+        if array.shape != shape or array.dtype != np.float64:
+            raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+        if not array.flags.writeable:
+            raise RequestError(f"out: {name} is read-only")
+    return out

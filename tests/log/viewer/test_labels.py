@@ -1,0 +1,96 @@
+"""Names in the viewer: supports are named as in figures, and names are not printed over one another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism, gallery
+from kinfmu.log import write_rrd
+from kinfmu.log.viewer.card import card
+from kinfmu.log.viewer.labels import dots, places_below, shown_names
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.scene.scene import Scene, drawable
+from tests.log.viewer.test_rerun_file import statics
+
+SLIDER_FIRST = """
+name = "slider_first"
+[bodies.ground]
+points = { O = [0, 0], way = [0, -1] }
+[bodies.crank]
+points = { O = [0, 0], P = [1, 0] }
+[bodies.rod]
+points = { P = [0, 0], S = [3, 0] }
+start = { x = 1, phi = -0.3 }
+[bodies.slider]
+points = { S = [0, 0], tip = [1, 0] }
+start = { x = 4, y = -1 }
+[joints]
+main = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+S = { type = "revolute", between = ["rod.S", "slider.S"] }
+guide = { type = "translational", between = ["slider.S", "ground.way"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+speed = 1
+"""
+
+
+def scene_of(mechanism: Mechanism) -> Scene:
+    run = kinfmu.solve(mechanism, np.linspace(mechanism.run.start, mechanism.run.stop, 41))
+    found, _ = drawable(run)
+    assert found
+    return found
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_names_of_supports_do_not_cover_each_other(name: str) -> None:
+    scene = scene_of(kinfmu.load(name))
+    places, names = places_below(scene) * dots(scene), list(scene.supports)
+    for k, at in enumerate(places):
+        for other, text in zip(places[:k], names, strict=False):
+            assert abs(at - other)[1] > 16.0 or abs(at - other)[0] > 3.2 * (len(text) + len(names[k]))
+
+
+def test_a_name_that_would_lie_on_another_shows_when_pointed_at() -> None:
+    mechanism = kinfmu.load("fourbar")
+    assert {"crank", "coupler", "rocker"} <= shown_names(scene_of(mechanism))
+    scene = scene_of(mechanism)
+    twins = replace(scene, bodies=(*scene.bodies, replace(scene.bodies[0], name="other")))
+    assert "other" not in shown_names(twins)
+    assert "crank" in shown_names(twins)
+
+
+def test_supports_have_the_names_of_their_joints_as_in_figures() -> None:
+    assert list(scene_of(parse(SLIDER_FIRST, "slider.toml")).supports) == ["main"]
+    assert {"O", "boom_foot"} == set(scene_of(kinfmu.load("excavator")).supports)  # a cylinder has no pin of that name
+
+
+def test_two_supports_in_one_place_have_one_name_of_all_their_joints() -> None:
+    mechanism = kinfmu.load("jansen_leg")
+    assert "pin_upper, pin_lower" in scene_of(mechanism).supports
+
+
+def test_the_block_of_the_ground_that_a_slider_moves_through_is_drawn(tmp_path: Path) -> None:
+    mechanism = parse(SLIDER_FIRST, "slider.toml")
+    write_rrd(kinfmu.solve(mechanism, np.linspace(0.0, 1.0, 11)), tmp_path / "run.rrd")
+    (block,) = statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:strips")
+    np.testing.assert_allclose(np.mean(block, axis=0), [0.0, -1.0], atol=1e-6)
+    (radius,) = statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:radii")
+    assert radius > 0.01  # as wide as a block, not a thin line
+    assert "guide" in statics(tmp_path / "run.rrd", "/linkage/ground/blocks", "LineStrips2D:labels")
+
+
+def test_the_card_has_no_token_and_says_what_made_the_fmu() -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), [0.0])
+    of_fmu = replace(run, info={"name": "fourbar", "generation_tool": "kinfmu 1", "token": "{12ab}", "parameters": ""})
+    assert "{12ab}" not in card(of_fmu)
+    assert "token" not in card(of_fmu)
+    assert "| FMU made by | kinfmu 1 |" in card(of_fmu)
+    assert "parameters set" not in card(of_fmu)

@@ -1,0 +1,164 @@
+"""Reviewing a run: recordings are made, pictures taken, and what is missing is said."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from matplotlib.image import imread
+
+import kinfmu
+from kinfmu.cli import main
+from kinfmu.errors import LogError, RequestError
+from kinfmu.log import review, write_mcap, write_rrd
+from kinfmu.log.viewer import headless, reviewing
+from kinfmu.log.viewer.timeline import timeline_named, timeline_of
+from kinfmu.run import Run
+from kinfmu.scene import palette
+from tests.log.runs import fourbar
+
+
+@pytest.fixture
+def mcap(run: Run, tmp_path: Path) -> Path:
+    write_mcap(run, tmp_path / "run.mcap")
+    return tmp_path / "run.mcap"
+
+
+def test_a_recording_is_saved_and_nothing_else(mcap: Path, tmp_path: Path) -> None:
+    assert review(mcap, save=tmp_path / "saved.rrd") == tmp_path / "saved.rrd"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "saved.rrd"]
+
+
+def test_two_runs_are_saved_as_one_recording(mcap: Path, tmp_path: Path) -> None:
+    write_mcap(fourbar(np.arange(0.0, 181.0, 2.0)), tmp_path / "other.mcap")
+    review(mcap, tmp_path / "other.mcap", save=tmp_path / "both.rrd")
+    assert (tmp_path / "both.rrd").stat().st_size > 10_000
+
+
+def test_without_a_display_it_says_what_else_can_be_done(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(LogError, match=r"no display to open the viewer on; save .*--save F\.rrd.*--screenshot F\.png"):
+        review(mcap)
+    assert [path.name for path in mcap.parent.iterdir()] == ["run.mcap"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the display has no name to get wrong")
+def test_a_viewer_that_cannot_open_a_window_is_reported(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", ":4711")
+    with pytest.raises(LogError, match=r"run\.rrd: the viewer could not be opened: ") as caught:
+        review(mcap)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in for the viewer is a shell script")
+def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
+    mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer = tmp_path / "viewer"
+    viewer.write_text('#!/bin/sh\necho "$@" >&2\nexec cat "$FIFO"\n')  # waits until somebody writes to the pipe
+    viewer.chmod(0o700)
+    os.mkfifo(tmp_path / "pipe")
+    monkeypatch.setenv("FIFO", str(tmp_path / "pipe"))
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(reviewing, "executable", lambda: str(viewer))
+    monkeypatch.setattr(reviewing, "FAILS_WITHIN", 0.2)
+    assert review(mcap) == mcap.with_suffix(".rrd")
+    process = reviewing._VIEWERS.pop()
+    assert process.poll() is None
+    assert process.args == [str(viewer), "--bind", "127.0.0.1", str(mcap.with_suffix(".rrd"))]
+    process.kill()
+    process.wait()
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
+    with pytest.raises(RequestError, match=r"run\.csv: a run to review is an \.mcap or \.rrd file"):
+        review(tmp_path / "run.csv")
+    with pytest.raises(RequestError, match=r"shot\.jpg: the name must end in \.png"):
+        review(mcap, screenshot=tmp_path / "shot.jpg")
+    with pytest.raises(RequestError, match=r"none\.mcap: there is no such file"):
+        review(mcap, tmp_path / "none.mcap")
+    review(mcap, save=tmp_path / "run.rrd")
+    with pytest.raises(RequestError, match=r"a recording cannot be compared; give the run's \.mcap file"):
+        review(tmp_path / "run.rrd", mcap)
+    with pytest.raises(RequestError, match=r"at = 4 is the time of a screenshot, and none is asked for"):
+        review(mcap, save=tmp_path / "run.rrd", at=4.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
+def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
+    with pytest.raises(LogError, match="on Debian: apt-get install mesa-vulkan-drivers libvulkan1") as caught:
+        review(mcap, screenshot=mcap.with_suffix(".png"))
+    assert caught.value.no_graphics
+    assert [path.name for path in mcap.parent.iterdir()] == ["run.mcap"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
+def test_a_viewer_that_cannot_draw_is_told_before_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
+    with pytest.raises(LogError, match="no graphics driver"), headless.viewer((320, 200)):
+        pytest.fail("a viewer was given that cannot draw")
+
+
+@pytest.mark.usefixtures("graphics")
+def test_a_picture_shows_the_linkage_in_its_colours_and_the_viewer_is_gone(
+    mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = pytest.importorskip("PIL.Image")
+    ended = []
+    end = headless._end
+    monkeypatch.setattr(headless, "_end", lambda process: (end(process), ended.append(process.poll())))
+    assert review(mcap, screenshot=tmp_path / "shot.png") is None
+    assert len(ended) == 1
+    assert ended[0] is not None
+    with image.open(tmp_path / "shot.png") as picture:
+        size = picture.size
+        pixels = np.asarray(picture.convert("RGB"), dtype=int).reshape(-1, 3)
+    assert size == (1600, 900)
+    for colour in palette.BODIES[:3]:
+        assert (np.abs(pixels - colour).max(axis=1) <= 2).sum() > 500
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "shot.png"]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "label", "value", "place"),
+    [
+        ("sim_time", "s", "t [s]", 2.5, 2.5),
+        ("crank [deg]", "deg", "crank [deg]", np.pi / 4.0, 45.0),
+        ("crank [0.01 deg]", "deg", "crank [deg]", np.pi / 4.0, 4500.0),
+        ("piston [0.1 mm]", "mm", "piston [mm]", 12.5, 125.0),
+        ("sample", "", "sample", 7.0, 7.0),
+    ],
+)
+def test_a_timeline_is_known_by_its_name(name: str, unit: str, label: str, value: float, place: float) -> None:
+    timeline = timeline_named(name)
+    assert (timeline.unit, timeline.label) == (unit, label)
+    assert timeline.place(value) == pytest.approx(place, rel=1e-15)
+
+
+@pytest.mark.usefixtures("graphics")
+def test_at_of_a_recording_over_a_driver_is_the_drivers_value(tmp_path: Path) -> None:
+    run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.arange(0.0, 90.5, 0.5)))
+    recording, record = tmp_path / "run.rrd", tmp_path / "run.mcap"
+    write_rrd(run, recording)
+    write_mcap(run, record)
+    assert timeline_of([run]) == timeline_named("crank [0.1 deg]")
+    for source in (recording, record):
+        picture = tmp_path / f"{source.suffix[1:]}.png"
+        result = CliRunner().invoke(main, ["review", str(source), "--screenshot", str(picture), "--at", "45.5deg"])
+        assert result.exit_code == 0, result.output
+    pictures = [imread(tmp_path / f"{kind}.png") for kind in ("rrd", "mcap")]  # of 0 to 1
+    np.testing.assert_allclose(*pictures, rtol=0.0, atol=0.05)  # drawn twice they differ by a few levels
+    with pytest.raises(RequestError, match=r"at = 100 is outside the recording, crank \[deg\] = 0 to 90$"):
+        review(recording, screenshot=tmp_path / "none.png", at=np.radians(100.0))
+    assert not (tmp_path / "none.png").exists()

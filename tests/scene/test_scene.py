@@ -1,0 +1,196 @@
+"""What is drawn, against the closed form of the four-bar."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.mechanism.toml_text import text
+from kinfmu.run import Run
+from kinfmu.scene.placing import world
+from kinfmu.scene.scene import Scene, drawable
+from kinfmu.sweep import run_times
+from tests.log.runs import DEGREE
+
+
+@pytest.fixture
+def fourbar_scene(run: Run) -> Scene:
+    found, note = drawable(run)
+    assert found
+    assert not note
+    return found
+
+
+def test_bodies_stand_where_their_coordinates_and_constants_say(fourbar_scene: Scene, run: Run) -> None:
+    crank, coupler, rocker = fourbar_scene.bodies
+    phi = DEGREE * run.t
+    tip = np.column_stack([np.cos(phi), np.sin(phi)])
+    np.testing.assert_allclose(world(crank.pose, (1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(coupler.pose, (-1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(rocker.pose, (1.0, 0.0)), tip + np.array([1.0, 0.0]), atol=1e-15)
+
+
+def test_the_bar_keeps_its_length(fourbar_scene: Scene) -> None:
+    (bar,) = fourbar_scene.bars
+    assert bar.name == "AB"
+    np.testing.assert_allclose(np.hypot(*(bar.ends[:, 1] - bar.ends[:, 0]).T), 1.0, rtol=1e-14)
+
+
+def test_supports_are_the_points_of_the_ground_that_joints_use(fourbar_scene: Scene) -> None:
+    assert fourbar_scene.supports == {"O": (0.0, 0.0), "C": (1.0, 0.0), "B": (2.0, 0.0)}
+
+
+def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene) -> None:
+    pins = [*fourbar_scene.pins, *(pin for body in fourbar_scene.bodies for pin in body.pins)]
+    assert sorted(name for name, _ in pins) == ["AB", "AB", "C", "O", "P", "Q"]
+
+
+def test_the_path_is_that_of_the_point_of_interest(fourbar_scene: Scene, run: Run) -> None:
+    np.testing.assert_allclose(fourbar_scene.paths["A"], np.column_stack([run["A.x"], run["A.y"]]), atol=1e-15)
+
+
+def test_the_frame_holds_everything(fourbar_scene: Scene) -> None:
+    np.testing.assert_allclose(fourbar_scene.low, [-1.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(fourbar_scene.high, [3.0, 1.0], atol=1e-15)
+
+
+def test_poses_in_a_gap_are_unknown_even_where_coordinates_are_constant(run_with_gap: Run) -> None:
+    found, _ = drawable(run_with_gap)
+    assert found
+    assert np.isnan(found.bodies[0].pose[100:121]).all()
+    assert np.isfinite(found.high).all()
+
+
+def test_a_body_whose_coordinates_are_not_in_the_run_is_left_out_by_name(run: Run) -> None:
+    found, note = drawable(run.without(["coupler.x", "coupler.y"]))
+    assert found
+    assert [body.name for body in found.bodies] == ["crank", "rocker"]
+    assert note == (
+        "Not drawn: coupler (the run does not hold coupler.x, coupler.y); "
+        "keep them: --channels all, or q among its names."
+    )
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "fourbar", "parallel_jaw", "five_bar", "cam_roller", "excavator"])
+def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
+    mechanism = kinfmu.load(name)
+    whole = solved(name)
+    few = whole.names[-1:]
+    for less in (
+        kinfmu.solve(dataclasses.replace(mechanism, coordinates=few), whole.t),
+        kinfmu.solve(mechanism, whole.t, outputs=few),
+    ):
+        assert set(less.outputs) < set(whole.outputs)
+        (found, note), (expected, _) = drawable(less), drawable(whole)
+        assert found
+        assert expected
+        assert note == ""
+        for body, other in zip(found.bodies, expected.bodies, strict=True):
+            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+
+
+def test_a_run_of_few_outputs_with_other_parameters_is_drawn_with_these() -> None:
+    mechanism = kinfmu.load("jansen_leg")
+    name, value = next((n, 1.02 * float(p.value)) for n, p in mechanism.parameters.items() if p.expression is None)
+    whole = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value})
+    few = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value}, outputs=whole.names[-1:])
+    of_fmu = dataclasses.replace(
+        few, mechanism_text=text(mechanism), info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
+    )
+    expected, _ = drawable(whole)
+    for run in (few, of_fmu):
+        found, note = drawable(run)
+        assert found
+        assert expected
+        assert note == ""
+        for body, other in zip(found.bodies, expected.bodies, strict=True):
+            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+
+
+def test_what_would_be_drawn_otherwise_than_the_run_says_is_left_out_with_the_remedy() -> None:
+    run = kinfmu.solve(kinfmu.load("crank_rocker"), [0.0, 0.1], outputs=["rocker.phi"])
+    other = dataclasses.replace(run, values=run.values + 0.1)
+    _, note = drawable(other)
+    assert note.endswith("; name them in [outputs] coordinates, or leave that out.")
+
+
+def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
+    assert drawable(dataclasses.replace(run, mechanism_text="")) == (
+        None,
+        "Not drawn: the run does not hold its mechanism.",
+    )
+    found, note = drawable(dataclasses.replace(run, mechanism_text="name = ["))
+    assert found is None
+    assert note.startswith("Not drawn: the run's mechanism: not valid TOML")
+
+
+def solved(name: str) -> Run:
+    mechanism = kinfmu.load(name)
+    return kinfmu.solve(mechanism, run_times(mechanism.run)[::4])
+
+
+def drawn(name: str) -> tuple[Scene, Run]:
+    run = solved(name)
+    found, note = drawable(run)
+    assert found
+    assert not note
+    return found, run
+
+
+def placed(scene: Scene, body: str, stroke: str) -> np.ndarray:
+    """World coordinates (n, k, 2) of a stroke of a body."""
+    (found,) = (one for one in scene.bodies if one.name == body)
+    (line,) = (one.points for one in found.strokes if one.name == stroke)
+    return np.stack([world(found.pose, (x, y)) for x, y in line], axis=1)
+
+
+def test_the_roller_touches_the_cam_over_the_whole_run() -> None:
+    found, _ = drawn("cam_roller")
+    (lever,) = (body for body in found.bodies if body.name == "lever")
+    profile, roller = placed(found, "cam", "cam/pitch"), placed(found, "lever", "roller/pitch")
+    centre = roller[:, :-1].mean(axis=1)
+    radius = np.hypot(*(roller[0, 0] - centre[0]))
+    assert np.isfinite(lever.pose).all()
+    gaps = np.hypot(*np.moveaxis(profile - centre[:, None], 2, 0)).min(axis=1) - radius
+    assert np.abs(gaps).max() < 0.02 * radius  # the profile has a corner each degree
+
+
+def test_wheels_touch_while_they_turn() -> None:
+    found, _ = drawn("geared_five_bar")
+    (name,) = (stroke.name for stroke in found.bodies[0].strokes if stroke.name.startswith("wheel/"))
+    rims = [placed(found, body.name, name) for body in found.bodies[:2]]
+    centres = [rim[:, :-1].mean(axis=1) for rim in rims]
+    radii = [np.hypot(*(rim[:, 0] - centre).T) for rim, centre in zip(rims, centres, strict=True)]
+    np.testing.assert_allclose(np.hypot(*(centres[1] - centres[0]).T), sum(radii), rtol=1e-9)
+
+
+def test_cylinders_span_their_points_and_hold_their_rods() -> None:
+    found, run = drawn("excavator")
+    assert [cylinder.shape.driver for cylinder in found.cylinders] == [
+        "boom_cylinder",
+        "stick_cylinder",
+        "bucket_cylinder",
+    ]
+    for cylinder in found.cylinders:
+        lengths = np.hypot(*(cylinder.ends[:, 1] - cylinder.ends[:, 0]).T)
+        np.testing.assert_allclose(lengths, run[f"{cylinder.shape.driver}_length"], rtol=1e-12)
+        within = lengths - cylinder.shape.rod  # where the rod begins, from the barrel's end
+        assert within.min() > 0.0
+        assert within.max() < cylinder.shape.barrel < lengths.min()
+    assert {"O", "boom_foot"} == set(found.supports)
+
+
+def test_slides_have_rails_blocks_and_slots_but_no_pin_on_their_line() -> None:
+    found, _ = drawn("inverted_slider_crank")
+    names = [stroke.name for body in found.bodies for stroke in body.strokes] + [stroke.name for stroke in found.ground]
+    kinds = {name.partition("/")[0] for name in names}
+    assert kinds == {"rod", "block", "rail"}
+    assert "way" not in found.supports
+    assert {stroke.name.partition("/")[0] for body in drawn("scotch_yoke")[0].bodies for stroke in body.strokes} == {
+        "rod",
+        "slot",
+        "block",
+    }
