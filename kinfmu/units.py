@@ -28,7 +28,7 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 HIGHEST_ORDER = 7  # of a derivative that units are written for
 
 
-def like_degrees(angle: float) -> bool:
+def looks_like_degrees(angle: float) -> bool:
     """True for a number of radians that looks as if degrees were meant: 30, 45, 60, 75, ..., of either sign."""
     return abs(angle) >= 30.0 and angle % 15.0 == 0.0
 

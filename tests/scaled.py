@@ -8,7 +8,7 @@ from typing import Any
 
 from kinfmu import Mechanism
 from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.places import Place
+from kinfmu.mechanism.members import NumberPath
 from kinfmu.units import Quantity
 
 
@@ -19,7 +19,7 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
     """
     exact = math.frexp(factor)[0] == 0.5
 
-    def larger(_: Place, value: Any, quantity: Quantity) -> Any:
+    def larger(_: NumberPath, value: Any, quantity: Quantity) -> Any:
         power = int(Dimension.of(quantity).length)
         if value is None or isinstance(value, bool | int | str):
             return value

@@ -15,7 +15,7 @@ from kinfmu.units import (
     every_unit,
     factors,
     in_turns,
-    like_degrees,
+    looks_like_degrees,
     quantity_in,
     unit_of,
 )
@@ -25,9 +25,9 @@ EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", 
 
 def test_radians_that_look_like_degrees_are_known_by_their_fifteens() -> None:
     for angle in (30.0, 45.0, 90.0, -120.0, 360.0, 3600.0):
-        assert like_degrees(angle)
+        assert looks_like_degrees(angle)
     for angle in (0.0, 15.0, 31.0, 4.0 * math.pi, 100.0, 45.5):
-        assert not like_degrees(angle)
+        assert not looks_like_degrees(angle)
     assert in_turns(-360.0) == "57.3 turns"
 
 

@@ -10,8 +10,8 @@ from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.places import Place, told
-from kinfmu.units import Quantity, like_degrees
+from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.units import Quantity, looks_like_degrees
 
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a whole turn may be meant
 _LOOKS = 201  # times of a run at which a driver is looked at
@@ -34,18 +34,18 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
                 "it counts without its sign, and shrinks as the value grows"
             )
     yield from _cams(mechanism)
-    large: list[tuple[Place, float]] = []
+    large: list[tuple[NumberPath, float]] = []
 
-    def look(place: Place, value: Any, quantity: Quantity) -> Any:
+    def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
         is_turns = "law" in place or place[0] == "drivers"  # they go on for many turns; whole fifteens are degrees
-        if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or like_degrees(value)):
+        if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or looks_like_degrees(value)):
             large.append((place, float(value)))
         return value
 
     mechanism.members.changed(look)
     for place, value in large:
         yield (
-            f"{told(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
+            f"{path_text(place)} = {value:.6g} rad is {math.degrees(value):.6g} deg, more than a turn: "
             "a bare angle is in radians; degrees are written such as '60 deg'"
         )
 
@@ -58,7 +58,7 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
     for joint in mechanism.joints:
         if not isinstance(joint, Cam) or joint.cam not in drivers:
             continue
-        why = joint.law.why_no_turn()
+        why = joint.law.why_not_periodic()
         angles = [float(drivers[joint.cam].law.at(t)) for t in times] if why else []
         if why and max(angles) - min(angles) > _TURN:
             yield (

@@ -22,7 +22,7 @@ from kinfmu.equations.redundancy import DependentRow, Redundancy, find_redundanc
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, KinfmuError
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.mechanism import refuse_other
+from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import SolvePlan, determinant_formula, localized, plan_from
 
 
@@ -124,7 +124,7 @@ def check(mechanism: Mechanism) -> Report:
 
     Faults of the mechanism do not raise; they stand in the report's `problem`.
     """
-    refuse_other(mechanism, "check")
+    require_mechanism(mechanism, "check")
     notes = [*file_notes(mechanism), *part_notes(mechanism)]
     local, origin = localized(mechanism)
     system = System(local)

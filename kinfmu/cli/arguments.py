@@ -13,7 +13,7 @@ from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.files.suffix import suffix_of
-from kinfmu.units import ANGLES, Quantity, factors, in_turns, like_degrees
+from kinfmu.units import ANGLES, Quantity, factors, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -147,7 +147,7 @@ def driver_value(option: str, text: str, quantity: Quantity, length_unit: str) -
         value = _number(text, quantity, length_unit)
     except ValueError as error:
         raise click.UsageError(f"{option} {text}: {error}") from None
-    if quantity.kind == "angle" and like_degrees(value) and is_bare(text):
+    if quantity.kind == "angle" and looks_like_degrees(value) and is_bare(text):
         note(f"{option} {text}: {text} rad, {in_turns(value)}; write {text}deg for degrees")
     return value
 

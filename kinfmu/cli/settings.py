@@ -11,7 +11,7 @@ import click
 
 from kinfmu.cli.tell import note
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.units import Quantity, in_turns, like_degrees
+from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -113,5 +113,5 @@ def _value(text: str) -> float | str:
 
 def _note_of_degrees(name: str, text: str) -> None:
     value = _value(text)
-    if isinstance(value, float) and like_degrees(value):
+    if isinstance(value, float) and looks_like_degrees(value):
         note(f"{name} = {text} rad, {in_turns(value)}; write {name}={text}deg for degrees")

@@ -17,7 +17,7 @@ from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
 from kinfmu.files.suffix import suffix_of
-from kinfmu.units import Quantity, in_turns, like_degrees
+from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
     from kinfmu.drivers import Driver
@@ -139,7 +139,7 @@ def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> d
 def _tell_of_angles(text: str, first: float, last: float, n: int, wrap: bool) -> None:
     """Say what bare numbers that look like degrees mean; warn of steps of more than half a turn."""
     a, b, _ = text.split(":")
-    if is_bare(a) and is_bare(b) and (like_degrees(first) or like_degrees(last)):
+    if is_bare(a) and is_bare(b) and (looks_like_degrees(first) or looks_like_degrees(last)):
         turns = in_turns(last - first)
         note(f"--angle {text}: {first:g} to {last:g} rad, {turns}; write {a}deg:{b}deg:{n} for degrees")
     elif n > 1 and not wrap and abs(last - first) / (n - 1) > HALF_TURN * (1.0 + 1e-9):

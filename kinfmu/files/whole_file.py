@@ -41,7 +41,7 @@ def replacement(target: Path) -> Iterator[Path]:
 
     target: the file itself, no link to it. Raises an OSError if a file cannot be written or is being written to.
     """
-    temporary = beside(target)
+    temporary = hidden_sibling(target)
     try:
         temporary.open("xb").close()  # not tempfile: its files are readable by their owner only
         yield temporary
@@ -53,12 +53,12 @@ def replacement(target: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def beside(target: Path) -> Path:
+def hidden_sibling(target: Path) -> Path:
     """Return a hidden name in the same folder that no other file has."""
     return target.with_name(f".{target.stem[:100]}.{uuid4().hex[:8]}{target.suffix}")
 
 
-def hold(descriptor: int) -> None:
+def lock_for_writing(descriptor: int) -> None:
     """Mark an open file as being written to, until it is closed or its process ends."""
     if fcntl:
         with suppress(OSError):  # a file system without locks

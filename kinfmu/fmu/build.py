@@ -14,7 +14,7 @@ from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.laws import External
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.mechanism import refuse_other
+from kinfmu.mechanism.mechanism import require_mechanism
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -46,7 +46,7 @@ def build(
     not there or not together, a MechanismError or AssemblyError for a mechanism that cannot be solved, a CompilerError
     if there is no compiler, an FmuError if the file cannot be written.
     """
-    refuse_other(mechanism, "build")
+    require_mechanism(mechanism, "build")
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)

@@ -13,7 +13,7 @@ from kinfmu.fmu.interface import Interface
 from kinfmu.mechanism import RunSettings
 from kinfmu.run import Event
 from kinfmu.run.unwrap import is_long
-from kinfmu.units import in_turns, like_degrees
+from kinfmu.units import in_turns, looks_like_degrees
 
 
 def input_notes(interface: Interface, table: InputTable, start: float | None, stop: float | None) -> Iterator[Event]:
@@ -51,7 +51,7 @@ def _unlikely(name: str, table: InputTable) -> Iterator[Event]:
     angles = table.values[:, table.names.index(name)]
     low, high = float(angles.min()), float(angles.max())
     long = np.flatnonzero(is_long(np.diff(angles)))
-    if name in table.unitless and (like_degrees(low) or like_degrees(high)):
+    if name in table.unitless and (looks_like_degrees(low) or looks_like_degrees(high)):
         yield Event(
             table.start,
             "info",

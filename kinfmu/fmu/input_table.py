@@ -13,7 +13,7 @@ import numpy as np
 
 from kinfmu.errors import FmuError, RequestError, listed, suggestion
 from kinfmu.fmu.interface import Interface
-from kinfmu.mechanism.decimal_number import decimal
+from kinfmu.mechanism.decimal_number import read_decimal
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.run import MOST_SAMPLES
 from kinfmu.run.unwrap import short_way
@@ -121,7 +121,7 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
             raise FmuError(f"{path}, line {line}: {len(row)} values, the header names {len(header)} columns")
         for name, cell, factor, column in zip(header, row, into, columns, strict=True):
             try:
-                column.append(decimal(cell) * factor)
+                column.append(read_decimal(cell) * factor)
             except ValueError:
                 point = "; decimals are written with a point" if "," in cell else ""
                 raise FmuError(f"{path}, line {line}: {name} = {quoted(cell.strip())} is not a number{point}") from None
@@ -195,7 +195,7 @@ def _meant(title: str, known: Sequence[str]) -> str:
     if any(name in title.split() for name in names):
         return "; columns are parted by commas, semicolons or tabs"
     try:
-        decimal(title)
+        read_decimal(title)
     except ValueError:
         return suggestion(title, names)
     return "; the first line must name the columns"

@@ -25,7 +25,7 @@ from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
-from kinfmu.mechanism.number import measured
+from kinfmu.mechanism.number import read_constant
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.run.channels import kept_samples
 from kinfmu.run.sink import Sink
@@ -169,7 +169,7 @@ def _parameters(
         else:
             quantity = quantity_in(known[name].unit or "1", interface.length_unit)
             try:
-                number = measured(f"{where}: {name}", value, quantity, interface.length_unit)
+                number = read_constant(f"{where}: {name}", value, quantity, interface.length_unit)
             except MechanismError as error:
                 raise RequestError(str(error)) from None
             _check_range(known[name], number, where)

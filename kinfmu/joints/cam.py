@@ -63,7 +63,7 @@ class Cam(Joint):
             raise MechanismError(
                 f"{where} cam = '{self.cam}' must be another body than the follower and what holds it", joint=self.name
             )
-        why = self.law.why_no_turn() if self.law.repeats else ""
+        why = self.law.why_not_periodic() if self.law.repeats else ""
         if why:
             raise MechanismError(
                 f"{where} law: {why}; a follower that goes on turn after turn needs a coupling", joint=self.name

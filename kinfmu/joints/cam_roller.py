@@ -57,7 +57,7 @@ class CamRoller(Joint):
     def check(self) -> None:
         where = f"[joints.{self.name}]"
         self.law.check(where)
-        why = self.law.why_no_turn()
+        why = self.law.why_not_periodic()
         if why:
             raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
         for degrees in range(_LOOKS):

@@ -35,7 +35,7 @@ class Coupling(Joint):
         return self.output.kind, self.input.kind
 
     @property
-    def is_tied(self) -> bool:
+    def depends_on_origin(self) -> bool:
         return self.input.is_absolute or self.output.is_absolute
 
     def bodies(self) -> tuple[str, ...]:

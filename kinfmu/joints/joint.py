@@ -13,12 +13,12 @@ from kinfmu.measures.placement import Placement
 class Condition(NamedTuple):
     """What a number of a joint must be; it may follow from parameters, so it is in any arithmetic.
 
-    key: how messages call it; meant: 'positive', 'other than 0' or '0' (to NEARLY).
+    key: how messages call it; required: 'positive', 'other than 0' or '0' (to NEARLY).
     """
 
     key: str
     value: Value
-    meant: str
+    required: str
 
 
 class Joint(ABC):
@@ -34,7 +34,7 @@ class Joint(ABC):
     name: str
 
     @property
-    def is_tied(self) -> bool:
+    def depends_on_origin(self) -> bool:
         """True if it depends on where the world's origin lies and `moved` cannot make up for it."""
         return False
 

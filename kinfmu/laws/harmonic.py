@@ -27,7 +27,7 @@ class Harmonic(Law):
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["amplitude"] * sine_of_line(constants["frequency"], x, constants["phase"])
 
-    def why_no_turn(self) -> str:
+    def why_not_periodic(self) -> str:
         if abs(self.frequency - round(self.frequency)) <= NEARLY:
             return ""
         return f"frequency = {float(self.frequency)!r} must be a whole number of waves in a turn"

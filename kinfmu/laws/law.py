@@ -99,7 +99,7 @@ class Law(ABC):
         """Numbers that are 0 where f(x + 2 pi) is f(x), by what they are; in any arithmetic, as parameters may be."""
         return {}
 
-    def why_no_turn(self) -> str:
+    def why_not_periodic(self) -> str:
         """Why f(x + 2 pi) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
 
         For laws of an angle: the lift of a cam, the radius of a pitch curve.

@@ -46,5 +46,5 @@ class Polynomial(Law):
                 f"they must be 1 to {HIGHEST_DEGREE + 1}, [c0, c1, ...]"
             )
 
-    def why_no_turn(self) -> str:
-        return "" if not any(self.coefficients[1:]) else super().why_no_turn()
+    def why_not_periodic(self) -> str:
+        return "" if not any(self.coefficients[1:]) else super().why_not_periodic()

@@ -17,7 +17,7 @@ from kinfmu.laws.polynomial_345 import Polynomial345
 from kinfmu.laws.polynomial_4567 import Polynomial4567
 from kinfmu.laws.rise import Rise
 from kinfmu.laws.simple_harmonic import SimpleHarmonic
-from kinfmu.measures.arithmetic import Value, curve, sqrt, without_periods
+from kinfmu.measures.arithmetic import Value, curve, split_periods, sqrt
 
 RISES: tuple[type[Rise], ...] = (
     SimpleHarmonic,
@@ -86,7 +86,7 @@ class MotionSequence(Law):
         durations = {k: constants[f"duration_{k}"] for k, _ in numbered}
         value, begin = constants["start"], constants["begin"]
         if self.repeat:
-            times, x = without_periods(x, begin, *durations.values())
+            times, x = split_periods(x, begin, *durations.values())
             value = value + sum(rises.values()) * times
         since = x - begin
         begin = 0.0
@@ -132,7 +132,7 @@ class MotionSequence(Law):
             found["rises in all over their size"] = sum(rises) / sqrt(sum(rise * rise for rise in rises))
         return found
 
-    def why_no_turn(self) -> str:
+    def why_not_periodic(self) -> str:
         if not self.repeat:
             return "its sequence does not repeat; say repeat = true"
         whole = sum(segment.duration for segment in self.segments)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.laws.jumps import Jumps, jumping_breaks
 from kinfmu.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
-from kinfmu.measures.arithmetic import Value, curve, without_periods
+from kinfmu.measures.arithmetic import Value, curve, split_periods
 from kinfmu.measures.placement import Reference
 from kinfmu.solver.python.curve import CurveData, Piece
 
@@ -65,7 +65,7 @@ class Spline(Law):
     def target(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it has none
         if self.ends == PERIODIC:
             first, last = self.points[0][0], self.points[-1][0]
-            x = without_periods(x, first, last, -first)[1]
+            x = split_periods(x, first, last, -first)[1]
         return curve(x, self.data)
 
     def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  it has none
@@ -98,7 +98,7 @@ class Spline(Law):
     def repeats(self) -> bool:
         return self.ends == PERIODIC
 
-    def why_no_turn(self) -> str:
+    def why_not_periodic(self) -> str:
         if self.ends != PERIODIC:
             return "its table does not repeat; say ends = 'periodic'"
         width = self.points[-1][0] - self.points[0][0]

@@ -9,7 +9,7 @@ from io import FileIO
 from pathlib import Path
 from shlex import quote
 
-from kinfmu.files.whole_file import hold
+from kinfmu.files.whole_file import lock_for_writing
 from kinfmu.log.clock import zero_of
 from kinfmu.log.mcap_file import Content
 from kinfmu.log.target import check_room, checked, replacing, unwritable
@@ -69,7 +69,7 @@ class McapLog:
         try:
             with replacing(self.path) as temporary:
                 file = FileIO(temporary, "w")
-                hold(file.fileno())
+                lock_for_writing(file.fileno())
                 content = Content(file, run, zero_of(run.t), drawn=self._drawn, at_once=True)
                 self._put(content, run)
                 if sys.platform == "win32":  # where an open file cannot be renamed

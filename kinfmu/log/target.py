@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import LogError
-from kinfmu.files.whole_file import beside, check_is_free, replacement
+from kinfmu.files.whole_file import check_is_free, hidden_sibling, replacement
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def checked(path: str | Path) -> Path:
 def check_room(path: str | Path) -> None:
     """LogError if no file can be made where `path` is to be, or if another run is being written to it."""
     target = checked(path)
-    temporary = beside(target)
+    temporary = hidden_sibling(target)
     try:
         check_is_free(target)
         temporary.open("xb").close()

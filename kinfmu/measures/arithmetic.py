@@ -58,7 +58,7 @@ def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  it de
     return math.atan2(y, x)
 
 
-def without_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]:
+def split_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]:
     """Return how many whole periods lie between begin and x, and x without them, exact after millions of them.
 
         n = floor((x - begin) / p),   rest = x - n p,   p = the sum of `period`

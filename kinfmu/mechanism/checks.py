@@ -12,7 +12,7 @@ from kinfmu.joints import Joint
 from kinfmu.measures import Measure
 from kinfmu.measures.placement import Reference, is_pair
 from kinfmu.mechanism.body import GROUND_NAME, Body
-from kinfmu.mechanism.places import hints_of, told
+from kinfmu.mechanism.members import hints_of, path_text
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name
 from kinfmu.units import METRES
@@ -131,7 +131,7 @@ def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
-        said = [f"{told(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
+        said = [f"{path_text(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
         said += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
         raise type(error)(f"{error} ({listed(said)})", **error.data) from None
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from kinfmu.drivers import Driver
 from kinfmu.laws.law import Path
-from kinfmu.mechanism.places import Place
+from kinfmu.mechanism.members import NumberPath
 from kinfmu.units import Quantity
 
 
@@ -21,7 +21,7 @@ class LawConstant(NamedTuple):
     is_positive: bool = False  # other values are refused
 
 
-def law_constants(drivers: Sequence[Driver], computed: Collection[Place]) -> Iterator[LawConstant]:
+def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
     """The constants of all drivers' laws in file order, without those that an expression gives (`computed`)."""
     for driver in drivers:
         for key, (value, said) in driver.law.constants().items():

@@ -16,9 +16,9 @@ from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.law_constant import LawConstant, law_constants, with_law_constants
-from kinfmu.mechanism.number import measured
-from kinfmu.mechanism.parameters import Parameter, evaluated
-from kinfmu.mechanism.places import Members, Place
+from kinfmu.mechanism.members import Members, NumberPath
+from kinfmu.mechanism.number import read_constant
+from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.run_settings import RunSettings
@@ -48,7 +48,7 @@ class Mechanism:
     length_unit: str = "m"
     title: str = ""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
-    expressions: Mapping[Place, Expression] = field(init=False)
+    expressions: Mapping[NumberPath, Expression] = field(init=False)
 
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers"):
@@ -102,7 +102,7 @@ class Mechanism:
         """Bodies, joints, drivers and run, with their numbers."""
         return Members(self.bodies, self.joints, self.drivers, self.run)
 
-    def written(self) -> Members:
+    def with_expressions(self) -> Members:
         """The members with expressions in the places where they were written, instead of their numbers."""
         return self.members.changed(lambda _, value, __: value.expression if isinstance(value, Computed) else value)
 
@@ -112,9 +112,9 @@ class Mechanism:
         Parameters that are not given are computed from those that are, or keep their numbers. Nothing is checked:
         `with_parameters` does that.
         """
-        known = evaluated(self.parameters, values)
+        known = parameter_values(self.parameters, values)
 
-        def computed(place: Place, value: Any, _: Quantity) -> Any:
+        def computed(place: NumberPath, value: Any, _: Quantity) -> Any:
             is_open = isinstance(value, Computed) and place[0] != "run"  # the run does not move with the geometry
             return value.expression.value(known) if is_open else value
 
@@ -136,7 +136,7 @@ class Mechanism:
         constants: dict[str, float] = {}
         for name, value in values.items():
             if name in settable:
-                constants[name] = measured(name, value, settable[name].quantity, self.length_unit)
+                constants[name] = read_constant(name, value, settable[name].quantity, self.length_unit)
                 continue
             if name not in parameters:
                 known = [*parameters, *settable]
@@ -149,7 +149,7 @@ class Mechanism:
         return replace(self, parameters=parameters, drivers=with_law_constants(self.drivers, constants))
 
 
-def refuse_other(value: object, purpose: str) -> None:
+def require_mechanism(value: object, purpose: str) -> None:
     """Raise a RequestError if a value is not a Mechanism but its name, its path or anything else; purpose: 'solve'."""
     if isinstance(value, str | PurePath):
         raise RequestError(f"{purpose} needs a Mechanism: kinfmu.load({str(value)!r}) gives it")

@@ -17,7 +17,7 @@ _WORDS = re.compile(r"\s*+[+-]?\s*+[^\W\d]\w*+(?:[\s-]++\w++)*+\s*+")  # 'y', '-
 _EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
 
 
-def written(where: str, value: object, quantity: Quantity | None, length_unit: str) -> float | Expression:
+def read_number(where: str, value: object, quantity: Quantity | None, length_unit: str) -> float | Expression:
     """A number in the units used inside, or the expression that gives it; a MechanismError says what would be valid.
 
     value: a number, text such as '60 deg' with a unit of that quantity (of any if it is None), text such as
@@ -35,7 +35,7 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
             plain = _PLAIN.fullmatch(value)
             if plain and quantity and known:  # no expression was meant: what fits this place is enough to tell
                 raise _wrong_unit(where, value, plain[1], known) from None
-            raise no_expression(where, value, quantity, length_unit, error) from None
+            raise expression_error(where, value, quantity, length_unit, error) from None
         literal = expression.literal
         if literal is None:
             return expression
@@ -52,13 +52,13 @@ def written(where: str, value: object, quantity: Quantity | None, length_unit: s
     return float(value)  # type: ignore[arg-type]  # is_number said so
 
 
-def measured(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
+def read_constant(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
     """A number, or what text such as '30 rpm' says in the units used inside; expressions are not taken.
 
     Raises a MechanismError that says what would be valid.
     """
     if isinstance(value, str):
-        number = written(where, value, quantity, length_unit)
+        number = read_number(where, value, quantity, length_unit)
         if isinstance(number, Expression):
             known = factors(quantity, length_unit)
             valid = f"a number, alone or with a unit: {listed(known)}" if known else "a number"
@@ -68,7 +68,7 @@ def measured(where: str, value: object, quantity: Quantity, length_unit: str) ->
     return float(value)  # type: ignore[arg-type]  # check_number said so
 
 
-def no_expression(
+def expression_error(
     where: str, text: str, quantity: Quantity | None, length_unit: str, error: MechanismError
 ) -> MechanismError:
     """`error` about an expression, with its place; of words alone it tells first what must stand there."""

@@ -11,7 +11,7 @@ from kinfmu.errors import MechanismError, listed
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
-from kinfmu.mechanism.number import written
+from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_line, check_name, check_number
 from kinfmu.units import Quantity, every_unit
@@ -44,7 +44,7 @@ class Parameter:
         return self.value.expression if isinstance(self.value, Computed) else None
 
 
-class Said(NamedTuple):
+class UnresolvedParameter(NamedTuple):
     """A parameter as it is said: not yet computed."""
 
     value: float | Expression
@@ -52,7 +52,7 @@ class Said(NamedTuple):
     description: str
 
 
-def read(name: str, parameter: Parameter | float | str, length_unit: str) -> Said:
+def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> UnresolvedParameter:
     """What is said of a parameter; a MechanismError tells what cannot be meant."""
     check_name("[parameters]", name)
     if name in WORDS:
@@ -60,19 +60,30 @@ def read(name: str, parameter: Parameter | float | str, length_unit: str) -> Sai
     if not isinstance(parameter, Parameter):
         parameter = Parameter(parameter)  # type: ignore[arg-type]  # text until it is resolved
     check_line(f"[parameters] {name} description", parameter.description)
-    value = written(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
+    value = read_number(f"[parameters] {name}", parameter.value, parameter.quantity, length_unit)
     quantity = parameter.quantity
     if quantity is None and isinstance(parameter.value, str) and not isinstance(value, Expression):
         literal = Expression(parameter.value, length_unit).literal
         if literal and literal.unit:
             quantity, _ = every_unit(length_unit)[literal.unit]
-    return Said(value, quantity, parameter.description)
+    return UnresolvedParameter(value, quantity, parameter.description)
 
 
-def resolved(parameters: Mapping[str, Said], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
-    """Parameters with their values and quantities; MechanismErrors name what is unknown, circles and wrong units.
+def resolve_parameters(
+    parameters: Mapping[str, UnresolvedParameter], alone: Mapping[str, set[Quantity]]
+) -> dict[str, Parameter]:
+    """Compute values and quantities of all parameters.
 
-    parameters: as `read` gives them; alone: for a parameter the quantities of the places where its name stands alone.
+    Args:
+        parameters: As `read_parameter` returns them, by name.
+        alone: For a parameter the quantities of the places where its name is the whole expression.
+
+    Returns:
+        The parameters in the given order.
+
+    Raises:
+        MechanismError: An unknown name, a parameter that needs itself, or a unit that does not fit.
+
     """
     expressions = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
     order = _in_order(parameters, expressions)
@@ -133,7 +144,7 @@ def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
     return found
 
 
-def evaluated(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
+def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
     """Values of all parameters, in any arithmetic: those in `values` as given, what follows from them computed."""
     expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in values}
     found: dict[str, Value] = {}

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.number import no_expression, written
-from kinfmu.mechanism.parameters import Parameter, dimensions_of, read, resolved
-from kinfmu.mechanism.places import Members, Place, told
+from kinfmu.mechanism.members import Members, NumberPath, path_text
+from kinfmu.mechanism.number import expression_error, read_number
+from kinfmu.mechanism.parameters import Parameter, dimensions_of, read_parameter, resolve_parameters
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.valid import check_number
 from kinfmu.units import Quantity
@@ -23,7 +23,7 @@ class Resolved(NamedTuple):
 
     members: Members
     parameters: dict[str, Parameter]
-    expressions: dict[Place, Expression]
+    expressions: dict[NumberPath, Expression]
 
 
 def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Resolved:
@@ -34,12 +34,12 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     """
     if len(given) > MOST_PARAMETERS:
         raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")
-    said = {name: read(name, parameter, unit) for name, parameter in given.items()}
-    expressions: dict[Place, Expression] = {}
+    said = {name: read_parameter(name, parameter, unit) for name, parameter in given.items()}
+    expressions: dict[NumberPath, Expression] = {}
     alone: dict[str, set[Quantity]] = {}
 
-    def as_written(place: Place, value: Any, quantity: Quantity) -> Any:
-        number = written(told(place), value, quantity, unit)
+    def as_written(place: NumberPath, value: Any, quantity: Quantity) -> Any:
+        number = read_number(path_text(place), value, quantity, unit)
         if isinstance(number, Expression):
             expressions[place] = number
             if number.alone:
@@ -47,26 +47,26 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
         return number
 
     members = members.changed(as_written)
-    parameters = resolved(said, alone)
+    parameters = resolve_parameters(said, alone)
     values = {name: float(parameter.value) for name, parameter in parameters.items()}
     dimensions = dimensions_of(parameters)
 
-    def computed(place: Place, value: Any, quantity: Quantity) -> Any:
+    def computed(place: NumberPath, value: Any, quantity: Quantity) -> Any:
         if not isinstance(value, Expression):
             return value
         try:
             value.refuse_unknown(values)
         except MechanismError as error:
-            raise no_expression(told(place), value.text, quantity, unit, error) from None
+            raise expression_error(path_text(place), value.text, quantity, unit, error) from None
         try:
             found = value.dimension(dimensions)
             number = float(value.value(values))
         except MechanismError as error:
-            raise MechanismError(f"{told(place)} = {error}") from None
+            raise MechanismError(f"{path_text(place)} = {error}") from None
         needed = Dimension.of(quantity)
         if not found.fits(needed):
-            raise MechanismError(f"{told(place)} = {quoted(value.text)} is {found} and must be {needed}")
-        check_number(f"{told(place)} = {quoted(value.text)}", number)
+            raise MechanismError(f"{path_text(place)} = {quoted(value.text)} is {found} and must be {needed}")
+        check_number(f"{path_text(place)} = {quoted(value.text)}", number)
         return Computed(number, value)
 
     return Resolved(members.changed(computed), parameters, expressions)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.decimal_number import decimal
+from kinfmu.mechanism.decimal_number import read_decimal
 from kinfmu.mechanism.quoted import quoted
 
 LARGEST_TABLE = 4_000_000  # [bytes]
@@ -56,7 +56,7 @@ def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, A
 
 def _is_number(cell: str) -> bool:
     try:
-        decimal(cell)
+        read_decimal(cell)
     except ValueError:
         return False
     return True
@@ -71,7 +71,7 @@ def _unit(title: str) -> str:
 def _number(where: str, line: int, cell: str, unit: str) -> float | str:
     if not _is_number(cell):
         raise MechanismError(f"{where}, line {line}: {quoted(cell)} must be a number")
-    number = decimal(cell)
+    number = read_decimal(cell)
     if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
     return f"{number!r} {unit}" if unit else number

@@ -18,18 +18,18 @@ from kinfmu.measures.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.law_table import law_keys, read_law
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.mechanism.number import written
+from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.run_settings import RunSettings
 from kinfmu.mechanism.toml_tables import (
     check_keys,
-    chosen,
+    class_of_type,
     member_keys,
-    named,
+    named_tables,
+    named_values,
     subtable,
     table_of,
-    tables_of,
     text_of,
 )
 from kinfmu.mechanism.valid import check_name
@@ -122,15 +122,15 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
         name=text_of("name", document["name"]),
         title=text_of("title", document.get("title", "")),
         length_unit=unit,
-        bodies=tuple(reader.body(name, body) for name, body in tables_of(document, "bodies")),
-        joints=tuple(reader.joint(name, joint) for name, joint in tables_of(document, "joints")),
-        drivers=tuple(reader.driver(name, driver) for name, driver in tables_of(document, "drivers")),
+        bodies=tuple(reader.body(name, body) for name, body in named_tables(document, "bodies")),
+        joints=tuple(reader.joint(name, joint) for name, joint in named_tables(document, "joints")),
+        drivers=tuple(reader.driver(name, driver) for name, driver in named_tables(document, "drivers")),
         points={
             name: text_of(f"[points] {name}", target, "text such as 'body.point'")
-            for name, target in named(document, "points")
+            for name, target in named_values(document, "points")
         },
         coordinates=coordinates,
-        parameters={name: _parameter(name, value) for name, value in named(document, "parameters")},
+        parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
         run=reader.run(table_of(document, "run")),
     )
 
@@ -152,7 +152,7 @@ class _Reader:
 
     def number(self, where: str, value: object, quantity: Quantity) -> Any:
         """A number, from text such as '60 deg' too, or the expression of parameters that the mechanism resolves."""
-        return written(where, value, quantity, self.length_unit)
+        return read_number(where, value, quantity, self.length_unit)
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
         where = f"[bodies.{name}]"
@@ -183,11 +183,11 @@ class _Reader:
         self, where: str, name: str, table: Mapping[str, Any], classes: Iterable[Any], laws: Iterable[type[Law]]
     ) -> Any:
         """A joint or driver; one that has a law finds the law's keys in its own table."""
-        cls = chosen(where, table, "type", classes)
+        cls = class_of_type(where, table, "type", classes)
         keys = member_keys(cls)
         values: dict[str, Any] = {}
         if "law" in keys:
-            law = chosen(where, table, "law", laws)
+            law = class_of_type(where, table, "law", laws)
             check_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *law_keys(law)))
             values["law"] = read_law(where, table, law, self.folder)
         else:
@@ -228,7 +228,7 @@ class _Reader:
         if not isinstance(table, dict):
             example = '{ measure = "angle", of = "rocker" }'
             raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
-        cls = chosen(where, table, "measure", MEASURES)
+        cls = class_of_type(where, table, "measure", MEASURES)
         check_keys(where, table, ("measure", *member_keys(cls)))
         measure: Measure = cls(**self.values(where, cls, table))
         return measure

@@ -16,7 +16,7 @@ def member_keys(cls: type) -> list[str]:
     return [key.name for key in fields(cls) if key.name != "name"]
 
 
-def chosen(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
+def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
     """The class whose `type` the table names under `key`."""
     known = {cls.type: cls for cls in classes}
     if key not in table:
@@ -49,16 +49,16 @@ def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     return table
 
 
-def named(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
+def named_values(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
     """What stands in the table [name], by names that can be names."""
     for key, value in table_of(document, name).items():
         check_name(f"[{name}]", key)
         yield key, value
 
 
-def tables_of(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
+def named_tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
     """The tables [name.KEY]."""
-    for key, table in named(document, name):
+    for key, table in named_values(document, name):
         if not isinstance(table, dict):
             raise MechanismError(f"[{name}] {key} = {quoted(table)} must be a table [{name}.{key}]")
         yield key, table

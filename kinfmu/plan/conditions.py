@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from kinfmu.equations.graph import Node
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.places import Place, told
+from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import Quantity
 
@@ -14,28 +14,28 @@ from kinfmu.units import Quantity
 class PlanCondition(NamedTuple):
     """What messages call a number, its node, of parameters alone, and what it must be (see joints' Condition)."""
 
-    told: str
+    label: str
     node: Node
-    meant: str
+    required: str
 
 
 def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition, ...]:
     """The conditions on the numbers of a mechanism that are written as expressions; `check` looks at the others."""
     found = [
-        PlanCondition(f"[joints.{joint.name}] {key}", value, meant)
+        PlanCondition(f"[joints.{joint.name}] {key}", value, required)
         for joint in tracer.joints
-        for key, value, meant in joint.conditions()
+        for key, value, required in joint.conditions()
         if isinstance(value, Node) and value.constant is None
     ]
     laws = {("joints", joint.name): getattr(joint, "law", None) for joint in mechanism.joints}
     laws |= {("drivers", driver.name): driver.law for driver in mechanism.drivers}
 
-    def look(place: Place, value: Any, _: Quantity) -> Any:
+    def look(place: NumberPath, value: Any, _: Quantity) -> Any:
         if place in mechanism.expressions and isinstance(value, Node) and value.constant is None:
             table, name, key, *path = place
             law = laws.get((str(table), str(name)))
             if key == "law" and law is not None and law.numbers()[tuple(path)].measures.is_positive:
-                found.append(PlanCondition(told(place), value, "positive"))
+                found.append(PlanCondition(path_text(place), value, "positive"))
         return value
 
     tracer.members.changed(look)

@@ -21,7 +21,7 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     ground = next(body for body in mechanism.bodies if body.is_ground)
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
     is_tied = any(driver.measured().is_absolute for driver in mechanism.drivers)
-    is_tied = is_tied or any(joint.is_tied for joint in mechanism.joints)
+    is_tied = is_tied or any(joint.depends_on_origin for joint in mechanism.joints)
     if is_tied or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first
@@ -29,7 +29,7 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
 
 def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
     """The same mechanism elsewhere: ground points, start poses and absolute joints, their expressions too."""
-    bodies, written = [], mechanism.written()
+    bodies, written = [], mechanism.with_expressions()
     for body in written.bodies:
         if body.is_ground:
             points = {

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from kinfmu.codegen.python import load_model, load_module
 from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, RunSettings
-from kinfmu.mechanism.mechanism import refuse_other
-from kinfmu.mechanism.number import measured
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.toml_text import text
 from kinfmu.mechanism.valid import is_number
@@ -74,7 +74,7 @@ def solve(
             raise RequestError("outputs are chosen when a plan is compiled: compile_plan(mechanism, outputs)")
         plan = mechanism
     else:
-        refuse_other(mechanism, "solve")
+        require_mechanism(mechanism, "solve")
         plan = compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
     own = {name: value for name, value in (parameters or {}).items() if name not in geometry}
@@ -124,7 +124,7 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
         known = [*plan.mechanism.parameters, *constants]
         if name not in constants:
             raise RequestError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
-        constants[name] = measured(f"parameter '{name}'", value, quantities[name], plan.mechanism.length_unit)
+        constants[name] = read_constant(f"parameter '{name}'", value, quantities[name], plan.mechanism.length_unit)
         if name in positive and not constants[name] > 0.0:
             raise RequestError(f"parameter '{name}' = {value!r} must be positive")
     return constants, geometry

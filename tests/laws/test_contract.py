@@ -140,7 +140,7 @@ def turning(draw: st.DrawFn) -> Law:
 
 @given(law=turning(), x=coordinates)
 def test_a_law_that_comes_back_after_a_turn_says_so_and_does(law: Law, x: float) -> None:
-    assert law.why_no_turn() == ""
+    assert law.why_not_periodic() == ""
     assert law.at(x + 2.0 * math.pi) == pytest.approx(law.at(x), abs=1e-11)  # x + 2 pi is rounded, and slopes are steep
 
 

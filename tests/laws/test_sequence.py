@@ -110,7 +110,7 @@ TURN = 2.0 * math.pi
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_a_law_says_why_it_does_not_repeat_after_a_turn(law: Polynomial, why: str) -> None:
-    assert law.why_no_turn() == why
+    assert law.why_not_periodic() == why
 
 
 @pytest.mark.parametrize("turns", [0, 1, 1000, 10**6, -(10**6)])

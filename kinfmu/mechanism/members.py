@@ -19,12 +19,12 @@ from kinfmu.units import Quantity
 if TYPE_CHECKING:
     from kinfmu.mechanism.run_settings import RunSettings
 
-Place = tuple[str | int, ...]
+NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
 ("joints", joint, key), ("drivers", driver, key), ("joints", joint, measure, key), ("run", key), and of a law
 ("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1)."""
 
-Change = Callable[[Place, Any, Quantity], Any]  # place, value and quantity -> new value
+Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
@@ -54,7 +54,7 @@ class Members:
         )
 
 
-def told(place: Place) -> str:
+def path_text(place: NumberPath) -> str:
     """A place as messages name it: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
     if place[0] == "run":
         return f"[run] {place[1]}"
@@ -91,7 +91,7 @@ def _body(body: Body, change: Change) -> Body:
     return body if is_same else Body(body.name, points, start)
 
 
-def _member(member: Any, place: Place, change: Change) -> Any:
+def _member(member: Any, place: NumberPath, change: Change) -> Any:
     cls: object = type(member)  # object: mypy holds that type[Any] has no hash
     numbers = quantities_of(cls).items()
     values = {key: change((*place, key), getattr(member, key), quantity) for key, quantity in numbers}
@@ -104,7 +104,7 @@ def _member(member: Any, place: Place, change: Change) -> Any:
     return _replaced(member, values)
 
 
-def _law(law: Law, kinds: tuple[str, str], place: Place, change: Change) -> Law:
+def _law(law: Law, kinds: tuple[str, str], place: NumberPath, change: Change) -> Law:
     old = law.numbers()
     new = {path: change((*place, *path), value, said.quantity(*kinds)) for path, (value, said) in old.items()}
     return law if all(new[path] is old[path].value for path in old) else law.with_numbers(new)
