@@ -24,7 +24,7 @@ from kinfmu.draw.writing import house_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
 from kinfmu.files.suffix import suffix_of
 from kinfmu.measures.placement import body_of
-from kinfmu.mechanism import Mechanism, toml_file
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
@@ -82,12 +82,12 @@ def animate(run: Run, path: str | Path) -> None:
 
 def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
     """The run's mechanism, and poses (n, 3) by body, the ground too; a gap holds the pose before it."""
-    if not run.mechanism_text:
-        raise FigureError(f"{path}: the run does not hold its mechanism, so there is nothing to draw")
     try:
-        mechanism = toml_file.parse(run.mechanism_text, "the run's mechanism")
+        mechanism = run.mechanism
     except MechanismError as error:
         raise FigureError(f"{path}: {error}") from None
+    if mechanism is None:
+        raise FigureError(f"{path}: the run does not hold its mechanism, so there is nothing to draw")
     poses, missing = poses_of(run, mechanism)
     if missing:
         names = [name for columns in missing.values() for name in columns]

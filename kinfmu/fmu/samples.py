@@ -13,6 +13,7 @@ from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import Slave
+from kinfmu.mechanism import Mechanism
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
 from kinfmu.run.sink import Sink
@@ -37,7 +38,7 @@ class Samples:
         count: int,
         *,
         settings: Mapping[str, float | bool | str],
-        mechanism_text: str,
+        mechanism: Mechanism,
         model_description: str,
     ) -> None:
         interface = self._interface = about.interface
@@ -52,7 +53,7 @@ class Samples:
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()
         self._asked: list[int] | None = None  # columns that are asked for; None: all
-        self._mechanism_text, self._model_description = mechanism_text, model_description
+        self._mechanism, self._model_description = mechanism, model_description
         self._info = {
             "name": interface.name,
             "title": interface.title,
@@ -225,7 +226,7 @@ class Samples:
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],
             length_unit=interface.length_unit,
-            mechanism_text=self._mechanism_text,
+            mechanism_source=self._mechanism,
             model_description=self._model_description,
             info=self._info,
             events=events,

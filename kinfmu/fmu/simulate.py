@@ -24,7 +24,7 @@ from kinfmu.fmu.interrupt import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
-from kinfmu.mechanism import Mechanism, RunSettings, toml_file, toml_text
+from kinfmu.mechanism import Mechanism, RunSettings, toml_file
 from kinfmu.mechanism.number import read_constant
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.run.channels import kept_samples
@@ -93,8 +93,8 @@ def simulate(
             rows = np.empty((len(t), 0)) if table is None else table.at(t)
             kept = kept_samples(t, rate)
             settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-            text = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
-            samples = Samples(about, len(kept), settings=settings, mechanism_text=text, model_description=xml)
+            mechanism = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
+            samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
             if not _time_drives(interface, settings):
                 samples.extend(undriven(interface, table, float(t[0])))
             if table is not None:
@@ -118,15 +118,15 @@ def simulate(
         interrupted.deliver()
 
 
-def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> str:
+def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> Mechanism:
     """The mechanism as it moves: with the values that the FMU is given, where it can have them."""
     mechanism = toml_file.parse(mechanism_text, where)
     own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
     values = {name: value for name, value in settings.items() if name in own}
     try:
-        return toml_text.text(mechanism.with_parameters(values)) if values else mechanism_text
+        return mechanism.with_parameters(values) if values else mechanism
     except MechanismError:
-        return mechanism_text  # the FMU will say why
+        return mechanism  # the FMU reports why
 
 
 def _times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:

@@ -34,7 +34,6 @@ from kinfmu.log.drawn import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTo
 from kinfmu.log.record import description, ending, is_integer, layout, tables
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import sentence, status_events, unexplained
-from kinfmu.mechanism import toml_file
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_drawn, select
@@ -97,12 +96,11 @@ class Content:
         self._log: LogTopic | None = None
         if drawn:
             self._topics += joint_topics(writer, run)
-            if run.mechanism_text:
-                try:
-                    mechanism = toml_file.parse(run.mechanism_text, "the run's mechanism")
-                    self._topics.append(LinkTopic(writer, run, mechanism))
-                except MechanismError as error:
-                    about["linkage"] = f"not drawn: {error}"
+            try:
+                if run.mechanism:
+                    self._topics.append(LinkTopic(writer, run, run.mechanism))
+            except MechanismError as error:
+                about["linkage"] = f"not drawn: {error}"
             self._log = LogTopic(writer, zero)
         writer.metadata(ABOUT, about)
 

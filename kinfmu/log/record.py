@@ -106,7 +106,7 @@ def run_of(
     """
     run = replace(
         _empty(about, sum(map(len, blocks))),
-        mechanism_text=mechanism_text,
+        mechanism_source=mechanism_text,
         model_description=model_description,
         info=dict(info),
         events=tuple(events),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib import import_module
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
 from kinfmu.units import unit_of
+
+if TYPE_CHECKING:
+    from kinfmu.mechanism import Mechanism
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -79,6 +83,7 @@ class Run:
     as functions that compute them when they are first read.
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
     absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
+    mechanism_source: the mechanism with the parameters set, or its TOML text as a file holds it, empty if unknown.
     axis: what pictures and reports show the samples over: 'time'; of driver values given instead of times the input
     that changes, such as 'crank_angle', or 'sample' where more than one does. t then counts the samples.
     """
@@ -100,12 +105,35 @@ class Run:
     watch_names: tuple[str, ...]
     watch: FloatArray
     length_unit: str = "m"
-    mechanism_text: str = ""  # the mechanism as TOML
+    mechanism_source: Mechanism | str = ""
     model_description: str = ""  # of the FMU that was stepped, as XML
     info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
     events: tuple[Event, ...] = ()
     absent: frozenset[str] = frozenset()
     axis: str = TIME
+
+    @cached_property
+    def mechanism(self) -> Mechanism | None:
+        """The mechanism with the parameters set; None if the run does not hold it.
+
+        Raises:
+            MechanismError: The run was read from a file whose text is not a mechanism.
+
+        """
+        if not isinstance(self.mechanism_source, str):
+            return self.mechanism_source
+        from kinfmu.mechanism import toml_file  # a run that is only read and converted does not need it
+
+        return toml_file.parse(self.mechanism_source, "the run's mechanism") if self.mechanism_source else None
+
+    @cached_property
+    def mechanism_text(self) -> str:
+        """The mechanism as TOML for files; empty if the run does not hold it."""
+        if isinstance(self.mechanism_source, str):
+            return self.mechanism_source
+        from kinfmu.mechanism import toml_text
+
+        return toml_text.text(self.mechanism_source)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,7 +11,6 @@ import numpy as np
 from kinfmu.errors import MechanismError
 from kinfmu.joints import Distance, Fixed, Revolute
 from kinfmu.measures.placement import body_of
-from kinfmu.mechanism import toml_file
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
@@ -98,11 +97,11 @@ class Scene:
 
 
 def drawable(run: Run) -> tuple[Scene | None, str]:
-    """The scene of a run after its own mechanism text, and one sentence on what cannot be drawn, empty if nothing."""
-    if not run.mechanism_text:
-        return None, "Not drawn: the run does not hold its mechanism."
+    """Return the scene of a run, and one sentence on what cannot be drawn, empty if nothing."""
     try:
-        found = scene(run, toml_file.parse(run.mechanism_text, "the run's mechanism"))
+        if run.mechanism is None:
+            return None, "Not drawn: the run does not hold its mechanism."
+        found = scene(run, run.mechanism)
     except MechanismError as error:
         return None, f"Not drawn: {error}"
     parts = [f"{body} (the run does not hold {', '.join(names)})" for body, names in found.left_out.items()]

@@ -16,7 +16,6 @@ from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.toml_text import text
 from kinfmu.mechanism.valid import is_number
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
@@ -271,7 +270,7 @@ def _swept(
         watch_names=plan.watch_names,
         watch=told.watch,
         length_unit=plan.mechanism.length_unit,
-        mechanism_text=text(plan.mechanism),
+        mechanism_source=plan.mechanism,
         info={
             "name": plan.mechanism.name,
             "title": plan.mechanism.title,

@@ -120,9 +120,9 @@ def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
     run = fourbar(np.arange(181.0))
     path = tmp_path / "run.gif"
     with pytest.raises(FigureError, match=r"run\.gif: the run does not hold its mechanism, so there"):
-        animate(dataclasses.replace(run, mechanism_text=""), path)
+        animate(dataclasses.replace(run, mechanism_source=""), path)
     with pytest.raises(FigureError, match=r"run\.gif: the run's mechanism: not valid TOML"):
-        animate(dataclasses.replace(run, mechanism_text="name = ["), path)
+        animate(dataclasses.replace(run, mechanism_source="name = ["), path)
     remedy = r"without which the linkage cannot be drawn; keep them: --channels all"
     with pytest.raises(FigureError, match=rf"the run does not hold coupler\.x, coupler\.y, {remedy}"):
         animate(run.without(["coupler.x", "coupler.y"]), path)

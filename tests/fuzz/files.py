@@ -218,7 +218,7 @@ def _record_texts(drawn: random.Random, find: Find) -> None:
     run = a_run()
     if drawn.random() < 0.3:
         info = {key: hostile(drawn).encode("utf-8", "replace").decode() for key in ("name", "title")}
-        run = _replaced(run, info=info, mechanism_text=_mechanism(drawn))
+        run = _replaced(run, info=info, mechanism_source=_mechanism(drawn))
     _written(run, Path("a.mcap"), texts)
     _use(Path("a.mcap"), drawn, find)
 

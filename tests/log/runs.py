@@ -38,7 +38,7 @@ def fourbar(t: np.ndarray) -> Run:
         error=np.where(status[:, None] == Status.BRIDGED, [[1e-14, 1e-13, 1e-12]], 0.0),
         watch_names=("AB",),
         watch=(np.abs(c) * 2.2e-16)[:, None],
-        mechanism_text=FOURBAR.read_text(encoding="utf-8"),
+        mechanism_source=FOURBAR.read_text(encoding="utf-8"),
         info={"name": "fourbar", "title": "Four-bar crank with a redundant constraint"},
     )
 
@@ -75,5 +75,5 @@ KINDS: dict[str, Callable[[], Run]] = {
     "before zero": lambda: fourbar(np.linspace(-1.5, 1.5, 31)),
     "unicode title": lambda: _unicode(fourbar(np.arange(3.0))),
     "many watches": lambda: _watched(fourbar(np.arange(0.0, 3.0, 0.001))),
-    "no mechanism": lambda: dataclasses.replace(fourbar(np.arange(3.0)), mechanism_text="", info={}),
+    "no mechanism": lambda: dataclasses.replace(fourbar(np.arange(3.0)), mechanism_source="", info={}),
 }

@@ -198,7 +198,7 @@ def test_a_gap_is_one_empty_message_and_no_numbers(run_with_gap: Run, tmp_path: 
 
 def test_drawn_lengths_are_metres_and_the_record_keeps_the_unit(run: Run, tmp_path: Path) -> None:
     text = run.mechanism_text.replace('length = "m"', 'length = "mm"')
-    write_mcap(dataclasses.replace(run, length_unit="mm", mechanism_text=text), tmp_path / "run.mcap")
+    write_mcap(dataclasses.replace(run, length_unit="mm", mechanism_source=text), tmp_path / "run.mcap")
     _, (position, *_) = numbers_of_joint_state(messages(tmp_path / "run.mcap", "/joint_states")[60][1])
     np.testing.assert_allclose(position, run.values[60] * np.where([n.endswith("phi") for n in run.outputs], 1, 1e-3))
     with (tmp_path / "run.mcap").open("rb") as file:

@@ -108,6 +108,7 @@ def test_samples_that_could_not_be_reached_are_gaps_with_a_status() -> None:
 
 
 def test_a_run_keeps_the_mechanism_it_is_of(run: Run) -> None:
-    assert parse(run.mechanism_text) == kinfmu.load("fourbar")
+    assert run.mechanism == kinfmu.load("fourbar")
+    assert parse(run.mechanism_text) == run.mechanism
     assert run.info["name"] == "fourbar"
     assert run.length_unit == "m"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.mechanism.toml_text import text
 from kinfmu.run import Run
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene, drawable
@@ -98,7 +97,7 @@ def test_a_run_of_few_outputs_with_other_parameters_is_drawn_with_these() -> Non
     whole = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value})
     few = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value}, outputs=whole.names[-1:])
     of_fmu = dataclasses.replace(
-        few, mechanism_text=text(mechanism), info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
+        few, mechanism_source=mechanism, info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
     )
     expected, _ = drawable(whole)
     for run in (few, of_fmu):
@@ -118,11 +117,11 @@ def test_what_would_be_drawn_otherwise_than_the_run_says_is_left_out_with_the_re
 
 
 def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
-    assert drawable(dataclasses.replace(run, mechanism_text="")) == (
+    assert drawable(dataclasses.replace(run, mechanism_source="")) == (
         None,
         "Not drawn: the run does not hold its mechanism.",
     )
-    found, note = drawable(dataclasses.replace(run, mechanism_text="name = ["))
+    found, note = drawable(dataclasses.replace(run, mechanism_source="name = ["))
     assert found is None
     assert note.startswith("Not drawn: the run's mechanism: not valid TOML")
 

@@ -198,7 +198,7 @@ def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -
 def renamed(run: Run, *kept: str) -> Run:
     """A run of another mechanism, whose coordinates have other names but for those that are kept."""
     outputs = tuple(name if name in kept else f"other_{name}" for name in run.outputs)
-    return dataclasses.replace(run, outputs=outputs, mechanism_text="", info={})
+    return dataclasses.replace(run, outputs=outputs, mechanism_source="", info={})
 
 
 def test_a_comparison_says_what_runs_of_two_mechanisms_have_in_common(run: Run, tmp_path: Path) -> None:
