@@ -1,4 +1,4 @@
-"""The zip archive of an FMU: bytes that depend on the contents alone, and the token that names them."""
+"""The zip archive of an FMU: reproducible bytes, and the token that identifies them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 
 def digest(contents: Mapping[str, bytes]) -> str:
-    """Hash of files by path, 64 hexadecimal digits."""
+    """Return the SHA-256 of files and their paths as 64 hexadecimal digits."""
     return hashlib.sha256(b"".join(name.encode() + b"\0" + data for name, data in contents.items())).hexdigest()
 
 
 def token(digits: str) -> str:
-    """A hash in the form of a guid, which FMI 2.0 calls it: '{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}'."""
+    """Return a hash in the form of a GUID: '{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}'."""
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
-    """A zip archive with fixed dates, permissions, system and order; modelDescription.xml comes first."""
+    """Return a zip archive with fixed dates, permissions, system and order; modelDescription.xml is first."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):

@@ -1,8 +1,8 @@
-"""Margins and estimated errors of many samples at once, by the functions that a python FMU has for one sample.
+"""Margins and estimated errors of many samples at once, with the functions that a python FMU has for one sample.
 
-They follow from driver values, unknowns and rates, which a run records. So a run need not ask for them in every step:
-the FMU's own modules compute them here, with numpy arrays in the place of numbers. All operations round in the same
-way, and sines and cosines come from the same library, so the results are equal to the bit.
+They follow from driver values, unknowns and rates, which a run records, so a run does not read them in every step. The
+FMU's own modules compute them here, with numpy arrays in place of numbers. All operations round in the same way, and
+sines and cosines come from the same library, so the results are equal to the bit.
 """
 
 from __future__ import annotations
@@ -23,19 +23,24 @@ from kinfmu.fmu.layout import UNKNOWN_ERROR
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
 
-ENTRY = "resources/slavemodule.txt"  # of a python FMU
-ROWS = 1024  # samples at once: their arrays stay in the cache
-MOST_BLOCKS = 2  # blocks of more unknowns, and sums over more blocks, take an order that depends on the values
+ENTRY = "resources/slavemodule.txt"  # in a python FMU
+ROWS = 1024  # samples computed at once: their arrays stay in the cache
+MOST_BLOCKS = 2  # of larger blocks, and of sums over more blocks, the order of operations depends on the values
 MOST_UNKNOWNS = 2
-LEAST_MARGIN = 0.0125  # determinant of the samples that are computed at once; the functions branch near singular poses
+LEAST_MARGIN = 0.0125  # smallest determinant of samples computed at once: the functions branch near singular poses
 
 
 class BlockEstimates:
     """Margins and estimated errors of samples of status ok, from columns of a run.
 
-    folder: of the unpacked FMU, which runs in this process; parameters: values of the mechanism's parameters.
-    LookupError if its functions do not take arrays: blocks that are too large, a cam in the equations, or an FMU of
-    another version.
+    Args:
+        folder: Folder of the unpacked FMU, which runs in this process.
+        parameters: Values of the mechanism's parameters.
+
+    Raises:
+        LookupError: If the FMU's functions do not take arrays: blocks are too large, a cam is in the equations, or
+            another version of kinfmu built the FMU.
+
     """
 
     def __init__(self, folder: Path, parameters: Row) -> None:
@@ -57,7 +62,7 @@ class BlockEstimates:
         self._check()
 
     def _check(self) -> None:
-        """Compare both ways at the anchor; LookupError if they differ."""
+        """Raise a LookupError if arrays and numbers give different results at the anchor."""
         u, z = self._model.ANCHOR
         drive = u, (1.0,) * len(u), (0.0,) * len(u)
         try:
@@ -69,9 +74,17 @@ class BlockEstimates:
             raise LookupError(f"at the anchor arrays give {two[0]}, numbers {one}")
 
     def __call__(self, u: Array, ud: Array, udd: Array, z: Array) -> Array:
-        """Return margin, error_q, error_qd and error_qdd (n, 4) of samples of status ok.
+        """Return margin, error_q, error_qd and error_qdd of samples of status ok.
 
-        u, ud, udd: (n, drivers); z: (n, unknowns).
+        Args:
+            u: (n, drivers) driver values.
+            ud: (n, drivers) their rates.
+            udd: (n, drivers) their accelerations.
+            z: (n, unknowns) solved unknowns.
+
+        Returns:
+            (n, 4) columns in this order.
+
         """
         columns = u, ud, udd, z
         found = np.empty((len(u), 4))
@@ -83,7 +96,7 @@ class BlockEstimates:
         return np.minimum(found, UNKNOWN_ERROR)
 
     def _of_part(self, u: Array, ud: Array, udd: Array, z: Array) -> Array:
-        """Return the four columns (n, 4), not finite where a sample needs to be looked at by itself."""
+        """Return the four columns (n, 4), not finite where a sample has to be computed alone."""
         found = np.full((len(u), 4), np.nan)
         model, at = self._arrays, _columns(u)
         try:
@@ -105,18 +118,18 @@ class BlockEstimates:
 
 
 def block_estimates(folder: Path, parameters: Row) -> BlockEstimates | None:
-    """Return the estimates of an unpacked FMU that runs in this process, or None where it has to be asked for them."""
+    """Return the estimates of an unpacked FMU that runs in this process, or None if they must be read from the FMU."""
     try:
         return BlockEstimates(folder, parameters)
     except (OSError, LookupError):
         return None
 
 
-# Functions of numbers, for arrays
+# Replacements, for arrays, of the functions of numbers
 
 
 class _Every:
-    """A bound that holds for every array: `array <= EVERY` is true, where `array <= number` has no truth value."""
+    """A bound that every array meets: `array <= EVERY` is true, while `array <= number` has no truth value."""
 
     __array_ufunc__ = None
 
@@ -132,7 +145,7 @@ def _columns(table: Array) -> tuple[Array, ...]:
 
 
 def _evaluated(model: Any, u: Sequence[Array], z: Sequence[Array]) -> Any:
-    """As kinfmu.solver.python.pose.evaluated: what `position` gives for unknowns that are known."""
+    """Return what `position` gives for known unknowns, as kinfmu.solver.python.pose.evaluated does."""
     rest = (0.0,) * len(z)
     return model.position(u, z, rest, rest, -0.0, -1, EVERY)
 
@@ -142,7 +155,7 @@ def _choose(number: Any, if_positive: Any, otherwise: Any) -> Any:
 
 
 def _first_of(is_better: Callable[[Any, Any], Any]) -> Callable[..., Any]:
-    """Python's `max` or `min` of arrays: a value gives way to a later one that is better."""
+    """Return Python's `max` or `min` for arrays: a later value replaces an earlier one only if it is better."""
 
     def chosen(*values: Any, default: Any = None) -> Any:
         found, *more = values if len(values) > 1 else (list(values[0]) or [default])
@@ -154,7 +167,7 @@ def _first_of(is_better: Callable[[Any, Any], Any]) -> Callable[..., Any]:
 
 
 def _each(function: Callable[[float], float]) -> Callable[[Any], Any]:
-    """A function of the C library for an array: numpy's own ones round otherwise."""
+    """Return a function of the C library applied to each element: numpy's own functions round differently."""
 
     def of_each(values: Any) -> Any:
         return np.array(list(map(function, values.tolist()))) if isinstance(values, np.ndarray) else function(values)
@@ -175,7 +188,7 @@ _FUNCTIONS: dict[str, Any] = {
 
 
 def _with_arrays(module: ModuleType, folder: Path, others: Mapping[str, Any] | None = None) -> Any:
-    """Return a second copy of a module of the FMU, with functions of arrays under the names of those of numbers."""
+    """Return a second copy of a module of the FMU, in which functions of arrays replace those of numbers."""
     path = folder.joinpath("resources", *module.__name__.split(".")).with_suffix(".py")
     spec = spec_from_file_location(module.__name__, path)
     if spec is None or spec.loader is None:

@@ -34,17 +34,30 @@ def build(
 ) -> Path:
     """Write the FMU of a mechanism and return its path.
 
-    path: a file that ends in .fmu or a folder; default: `<name>.fmu` here. flavour: 'native' (C, for all
-    hosts) or 'python' (through pythonfmu, for hosts that are Python processes); default: native where a C compiler is
-    found, else python. drive: what drives at first, 'time' (the law in the file) or 'inputs'; default: time,
-    unless a driver's law is external. outputs: coordinates such as 'coupler.x' that the FMU has; default:
-    all; what no output needs is not solved. fmi: 2 or 3; the python flavour is FMI 2.0 only. platforms: of the
-    native flavour, 'host' (by the system's compiler) or 'all' (by zig). progress: called with (platforms done,
-    platforms in all) while they compile.
+    The same mechanism, compiled by the same compiler, gives the same bytes.
 
-    The same mechanism, compiled by the same compiler, gives the same bytes. Raises a RequestError for choices that are
-    not there or not together, a MechanismError or AssemblyError for a mechanism that cannot be solved, a CompilerError
-    if there is no compiler, an FmuError if the file cannot be written.
+    Args:
+        mechanism: Mechanism to build.
+        path: File that ends in .fmu, or a folder. Default: `<name>.fmu` in the current folder.
+        flavour: 'native' (C, for all hosts) or 'python' (through pythonfmu, for hosts that are Python processes).
+            Default: native where a C compiler is found, else python.
+        drive: Default of the parameter `driven_by_time`: 'time' (the laws in the file drive) or 'inputs'. Default:
+            time, but inputs if a driver's law is external.
+        outputs: Coordinates such as 'coupler.x' that the FMU has. Default: all. What no output needs is not solved.
+        fmi: Version of FMI, 2 or 3. The python flavour is FMI 2.0 only.
+        platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
+        progress: Called with (platforms done, number of platforms) during compilation.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        RequestError: If a choice is unknown, or two choices exclude each other.
+        MechanismError: If the mechanism is not valid.
+        AssemblyError: If the mechanism cannot be assembled.
+        CompilerError: If no compiler is found.
+        FmuError: If the file cannot be written.
+
     """
     require_mechanism(mechanism, "build")
     drive = default_drive(mechanism) if drive is None else drive
@@ -68,7 +81,7 @@ def build(
 
 
 def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
-    """Raise a RequestError for choices that are not there, or not together."""
+    """Raise a RequestError for unknown choices and for choices that exclude each other."""
     if flavour not in FLAVOURS:
         raise RequestError(
             f"flavour '{flavour}' is not known{suggestion(flavour, FLAVOURS)}; flavours: {listed(FLAVOURS)}"
@@ -82,12 +95,12 @@ def _check(flavour: str, drive: str, fmi: int, platforms: str) -> None:
             f"platforms = '{platforms}' is not known{suggestion(platforms, PLATFORMS)}; known: {listed(PLATFORMS)}"
         )
     if flavour == "python" and (fmi != 2 or platforms != "host"):
-        said = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
-        raise RequestError(f"{said} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")
+        choice = f"fmi = {fmi}" if fmi != 2 else f"platforms = '{platforms}'"
+        raise RequestError(f"{choice} needs flavour = 'native'; the python flavour is FMI 2.0 on pythonfmu's platforms")
 
 
 def default_drive(mechanism: Mechanism) -> Drive:
-    """'inputs' if a driver's law is external, else 'time'."""
+    """Return 'inputs' if a driver's law is external, else 'time'."""
     return "inputs" if any(isinstance(driver.law, External) for driver in mechanism.drivers) else "time"
 
 
@@ -97,7 +110,7 @@ def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
 
 
 def native_obstacle() -> str:
-    """Return why no native FMU can be built for this machine; nothing if one can."""
+    """Return why no native FMU can be built for this machine, or an empty text."""
     from kinfmu.codegen.c import compiler
     from kinfmu.fmu.native.platforms import host
 
@@ -128,7 +141,7 @@ def _file(path: str | Path | None, name: str) -> Path:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """The whole file or none: a host never sees half an FMU."""
+    """Write the whole file or none, so that a host never reads an incomplete FMU."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)

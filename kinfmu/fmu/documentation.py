@@ -1,10 +1,11 @@
-"""documentation/index.html of an FMU: what it is, how it is driven, its variables."""
+"""documentation/index.html of an FMU: the mechanism, its drivers and its variables."""
 
 from __future__ import annotations
 
 from html import escape
 
 from kinfmu.fmu.interface import Interface, Variable
+from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.solver.python.status import Status
 
 _MIT = """\
@@ -38,18 +39,18 @@ _PAGE = """<!DOCTYPE html>
 text-align: left; vertical-align: top }}</style></head>
 <body>
 <h1>{title}</h1>
-<p>Kinematics of a planar mechanism, solved to round-off. Lengths are in {unit}, angles in rad.</p>
-<h2>Driving it</h2>
-<p>While <code>driven_by_time</code> is true the law in the mechanism file drives; its constants are parameters. While
-it is false the inputs drive: {inputs}. Outputs follow a set input at once. Speed and acceleration inputs may stay
-unwired: in co-simulation they are then estimated from the samples, until they are first set to other than 0, with
-errors that fall with the step as h<sup>2</sup> and h. Model exchange takes them as they are: unwired they are 0.
-<code>solver.error_qd</code> and <code>solver.error_qdd</code> count these errors; they are infinite at the first two
-and three samples, of which nothing is known.</p>
+<p>Kinematics of a planar mechanism, solved to round-off. Unit of length: {unit}; angles in rad.</p>
+<h2>Drivers</h2>
+<p>If <code>driven_by_time</code> is true, the law in the mechanism file drives; its constants are parameters. If it is
+false, the inputs drive: {inputs}. Outputs follow a set input at once. Speed and acceleration inputs may be left
+unconnected. Co-simulation then estimates them from the samples until they are first set to a value other than 0; the
+errors of the estimates fall with the step as h<sup>2</sup> and h. Model exchange does not estimate: unconnected inputs
+are 0. <code>solver.error_qd</code> and <code>solver.error_qdd</code> include these errors; at the first two and three
+samples there is no estimate, and they are {unknown:g}.</p>
 <h2>When a pose cannot be reached</h2>
-<p><code>solver.status</code> says so, outputs keep the last good values, <code>solver.message</code> names driver,
-value and limit, and the next step is Discard (in FMUs of native code a get of positions, rates and accelerations, too).
-The host may set other inputs and go on. Status: {statuses}.</p>
+<p><code>solver.status</code> reports it, outputs keep the last good values, <code>solver.message</code> states driver,
+value and limit, and the next step returns Discard (in native FMUs also a get of positions, rates and accelerations).
+The host may set other inputs and continue. Status: {statuses}.</p>
 <h2>Variables</h2>
 <table>
 <tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th></th></tr>
@@ -62,22 +63,25 @@ The host may set other inputs and go on. Status: {statuses}.</p>
 
 
 def licence(*others: str) -> str:
-    """Return documentation/licenses/license.txt: kinfmu's licence, and whose code is inside besides.
+    """Return documentation/licenses/license.txt: kinfmu's licence and other code inside.
 
-    others: such as "pythonfmu, in pythonfmu.txt".
+    Args:
+        others: Other code and the file of its licence, such as "pythonfmu, in pythonfmu.txt".
+
     """
     also = "".join(f"It also holds code of {other}.\n" for other in others)
     return f"""\
-This FMU holds code of kinfmu, under the MIT License below. The mechanism in it belongs to who wrote it.
+This FMU holds code of kinfmu, under the MIT License below. The mechanism in it belongs to its author.
 {also}
 {_MIT}"""
 
 
 def page(interface: Interface) -> str:
-    """The page as HTML."""
+    """Return the page as HTML."""
     return _PAGE.format(
         title=escape(interface.title or interface.name),
         unit=escape(interface.length_unit),
+        unknown=UNKNOWN_ERROR,
         inputs=", ".join(f"<code>{escape(v.name)}</code>" for v in interface.part("inputs")) or "there are none",
         statuses=", ".join(f"{int(status)} {status.name.lower()}" for status in Status),
         rows="\n".join(_row(variable) for variable in interface),

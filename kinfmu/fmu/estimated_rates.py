@@ -1,4 +1,4 @@
-"""Rates of a driver estimated from samples of its value, for hosts that wire no rates. Standard library only."""
+"""Rates of a driver estimated from samples of its value, for hosts that connect no rates. Standard library only."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from enum import IntEnum
 from math import inf
 
 KEPT = 4  # samples that a slave remembers: the last one, two for the estimates and one more for their errors
-LARGEST = 1e100  # of rates, and of what a host sets: the squares of larger numbers are infinite
+LARGEST = 1e100  # of rates and of values that a host sets: squares of larger numbers overflow
 EPS = 2.220446049250313e-16
-UNSURE = 2.0  # what one term more says may change by this much over the step
+UNSURE = 2.0  # safety factor: the next term may change by this much over the step
 Sample = tuple[float, tuple[float, ...]]  # a communication point t [s] and the driver values u there
 
 
 class Rates(IntEnum):
-    """Values of the parameter `rates`: where co-simulation takes the drivers' speeds and accelerations from."""
+    """Values of the parameter `rates`: the source of the drivers' speeds and accelerations in co-simulation."""
 
     AUTO = 0
     ESTIMATED = 1
@@ -24,16 +24,26 @@ class Rates(IntEnum):
 def estimated_rates(
     samples: Sequence[Sample], t: float, u: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Speed and acceleration of each driver at t, from the parabola through its last three samples.
+    """Return speed and acceleration of each driver at t, from the parabola through its last three samples.
 
         a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
 
-    Backward differences on a non-uniform grid: v is of order 2, a of order 1 in the steps between the samples. Of two
-    samples v is the slope, of order 1, and a is 0; of one both are 0. samples: committed ones, oldest first; those
-    before t count.
+    Backward differences on a non-uniform grid: v is of order 2, a of order 1 in the steps between the samples. With two
+    samples v is the slope, of order 1, and a is 0; with one both are 0.
+
+    Args:
+        samples: Committed samples, oldest first; only those before t are used.
+        t: Time [s].
+        u: Driver values at t.
+
+    Returns:
+        Speeds and accelerations, one of each per driver.
+
     """
     count = len(samples)
-    if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:  # most calls: at the last of all samples
+    if (
+        count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1
+    ):  # the most frequent case: t is at the last sample
         (first, (a,)), (second, (b,)) = samples[1], samples[2]
         step = t - second
         slope = (u[0] - b) / step
@@ -61,19 +71,28 @@ def estimated_rates(
 
 
 def _usable(rate: float) -> float:
-    """A rate beyond LARGEST, from samples at almost the same time, is no estimate."""
+    """Return the rate, or 0 if it exceeds LARGEST because two samples are at almost the same time."""
     return rate if -LARGEST <= rate <= LARGEST else 0.0
 
 
 def errors_of_estimated_rates(
     samples: Sequence[Sample], t: float, u: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """How far the estimated speed and acceleration of each driver may be off: what one sample more says otherwise.
+    """Return the errors of the estimated speed and acceleration of each driver: the term of one more sample.
 
         v: c3 (t - t2) (t - t1),   a: 2 c3 ((t - t2) + (t - t1)),   c3 the third divided difference
 
-    and what the differences take of the digits of u. Of an acceleration from three samples nothing is known, nor of
-    anything from two: inf.
+    plus the round-off of the differences. The error is inf for an acceleration from three samples and for both rates
+    from two: one more sample is missing.
+
+    Args:
+        samples: Committed samples, oldest first; only those before t are used.
+        t: Time [s].
+        u: Driver values at t.
+
+    Returns:
+        Errors of speeds and accelerations, one of each per driver; inf where there is no estimate.
+
     """
     before = [sample for sample in samples if sample[0] < t][-3:]
     speeds, accelerations = [], []
@@ -98,7 +117,7 @@ def errors_of_estimated_rates(
 
 
 def _divided(times: Sequence[float], values: Sequence[float]) -> list[float]:
-    """Divided differences of the first value with one more, two more, ... of those that follow."""
+    """Return the divided differences of the first value with one, two, ... of the values after it."""
     column, leading = list(values), [values[0]]
     for order in range(1, len(values)):
         column = [(column[i] - column[i + 1]) / (times[i] - times[i + order]) for i in range(len(column) - 1)]

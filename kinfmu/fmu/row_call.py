@@ -1,7 +1,7 @@
 """C functions of an FMU that are called in every step, with arguments that are built once.
 
-fmpy's own methods build arrays and lists in every call, which takes longer than a step of a native FMU. So does the
-conversion of Python numbers that ctypes does by declared types: numbers of C are changed in place here.
+fmpy's own methods build arrays and lists in every call, which takes longer than a step of a native FMU. ctypes converts
+Python numbers to declared types, which takes as long. So numbers of C are changed in place here.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ WARNING = 1  # fmi2Warning and fmi3Warning; a greater status is a failure
 
 
 class RowCall:
-    """Gets variables into a row of a table, or sets them to its values: `call(row)`.
+    """A get of variables into a row of a table, or a set from it: `call(row)`.
 
     Args:
         fmu: Instance, of fmpy.
         function: Name of the C function, such as "fmi2GetReal".
         references: The k value references.
         rows: (n, k) table of the function's type, each row without gaps.
-        has_value_count: True for FMI 3.0, whose functions take the number of values, too.
+        has_value_count: True for FMI 3.0, whose functions also take the number of values.
 
     """
 
@@ -42,7 +42,7 @@ class RowCall:
         self._rows, self._base, self._stride = rows, rows.ctypes.data, rows.strides[0]
 
     def __call__(self, row: int) -> None:
-        """Get or set; raises fmpy's FMICallException for a status above Warning."""
+        """Get or set; raise fmpy's FMICallException for a status above Warning."""
         self._address.value = self._base + row * self._stride
         status = self._function()
         if status > WARNING:
@@ -52,7 +52,7 @@ class RowCall:
 
 
 class StepCall:
-    """Steps an FMU: `call(time, step)` returns the status of its DoStep.
+    """A DoStep of an FMU: `call(time, step)` returns its status.
 
     Args:
         fmu: Instance, of fmpy.
@@ -74,5 +74,5 @@ class StepCall:
 
 
 def function_of(fmu: Any, name: str, *arguments: Any) -> partial[int]:
-    """Return a C function of an FMU with its arguments, values of ctypes, of which the first is the instance."""
+    """Return a C function of an FMU bound to its instance and these arguments, values of ctypes."""
     return partial(CFUNCTYPE(c_int)((name, fmu.dll)), c_void_p.from_param(fmu.component), *arguments)

@@ -1,4 +1,4 @@
-"""The samples of a run while an FMU is stepped: read, kept, and passed on to a sink in pieces."""
+"""The samples of a run while an FMU is stepped: read, stored, and passed to a sink in pieces."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from kinfmu.run.channels import absent_columns
 from kinfmu.run.sink import Sink
 from kinfmu.solver.python.status import Status
 
-PIECE = 1024 * 1024  # [bytes] of a run that a sink gets at once, or what there is after PERIOD
-FEWEST = 16  # samples in a piece, where a few of a large mechanism fill it: a piece has a price of its own
-PERIOD = 0.5  # [s] by the clock
+PIECE = 1024 * 1024  # [bytes] of a run passed to a sink at once, or fewer after PERIOD
+FEWEST = 16  # samples in a piece of a large mechanism: each piece has a fixed cost
+PERIOD = 0.5  # [s] of wall-clock time
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
 _REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", "margin", "errors")
-_ESTIMATES = 2  # the last of them, which follow from the others
+_ESTIMATES = 2  # number of parts at the end that follow from the others
 
 
 class Samples:
-    """Rows of a run as they come, and what the FMU says meanwhile."""
+    """The samples of a run that an FMU has given so far, and its messages."""
 
     def __init__(
         self,
@@ -43,16 +43,20 @@ class Samples:
     ) -> None:
         interface = self._interface = about.interface
         self._ends: list[int] = np.cumsum([len(interface.part(part)) for part in _REALS]).tolist()
-        self._most = count + 1  # samples, and one without numbers
-        self._reals = np.empty((0, self._ends[-1]))  # the columns that are asked for
+        self._most = count + 1  # samples, and a last one without numbers
+        self._reals = np.empty((0, self._ends[-1]))  # the columns that are read
         self._t = np.empty(self._most)
         self._status, self._iterations = np.empty((2, self._most), np.int64)
-        columns: list[Any] = [self._t.data, self._status.data, self._iterations.data]  # which numbers enter faster
+        columns: list[Any] = [
+            self._t.data,
+            self._status.data,
+            self._iterations.data,
+        ]  # assignment to items is faster than with arrays
         self._columns = columns
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()
-        self._asked: list[int] | None = None  # columns that are asked for; None: all
+        self._asked: list[int] | None = None  # columns that are read; None: all
         self._mechanism, self._model_description = mechanism, model_description
         self._info = {
             "name": interface.name,
@@ -65,29 +69,29 @@ class Samples:
         self.now = 0.0
         self.fixed: dict[str, float] = {}
         self._sink: Sink | None = None
-        self._passed_on = self._events_passed_on = 0  # samples and events that the sink has
-        self._estimates: BlockEstimates | None = None  # where the FMU is not asked for those of samples of status ok
-        self._with_estimates = 0  # samples that have them
-        self._piece = 1  # samples that the sink gets at once
-        self._full_at = self._most + 1  # number of samples from which it gets them
-        self._due = inf  # when it gets what there is, by the clock
+        self._passed_on = self._events_passed_on = 0  # number of samples and events that the sink has
+        self._estimates: BlockEstimates | None = None  # replaces reads of samples of status ok
+        self._with_estimates = 0  # number of samples that have them
+        self._piece = 1  # number of samples passed to the sink at once
+        self._full_at = self._most + 1  # number of samples at which the next piece is passed
+        self._due = inf  # wall-clock time at which the next piece is passed in any case
 
     def log(self, status: int, text: str) -> None:
-        """A message of the FMU becomes an event at the current time."""
+        """Store a message of the FMU as an event at the current time."""
         event = Event(self.now, _LEVELS[status] if 0 <= status < len(_LEVELS) else "error", text)
         if not self._events or self._events[-1] != event:
             self._events.append(event)
 
     def extend(self, events: Iterable[Event]) -> None:
-        """Events of their own times."""
+        """Store events that have their own times."""
         self._events.extend(events)
 
     def first_error(self) -> str:
-        """The first message that tells of an error, empty if there is none."""
+        """Return the first message of level error, or an empty text."""
         return next((event.text for event in self._events if event.level == "error"), "")
 
     def read_fixed(self, slave: Slave) -> None:
-        """Coordinates that never move: constants, or what follows from the parameters."""
+        """Read the fixed coordinates: constants, and those that follow from the parameters."""
         names = [variable.name for variable in self._interface.part("fixed")]
         values = slave.get([slave.references[name] for name in names]) if names else []
         self.fixed = dict(zip(names, values, strict=True))
@@ -99,15 +103,20 @@ class Samples:
         sink: Sink | None,
         estimates: Callable[[], BlockEstimates | None] = lambda: None,
     ) -> None:
-        """Choose the variables to ask for, and begin the sink's run.
+        """Choose the variables to read, and begin the sink's run.
 
-        estimates: computes margins and estimated errors of samples of status ok, which the FMU is then not asked for;
-        called if a column of them is asked for.
+        Args:
+            slave: Slave of the FMU.
+            channels: Channels to record. None: all.
+            sink: Sink of the run, if any.
+            estimates: Returns what computes margins and estimated errors of samples of status ok, which are then not
+                read from the FMU. Called only if one of these columns is recorded.
+
         """
         run = self._run(slice(0, 0))
         self._absent = absent_columns(run, channels)
         references = self._interface.value_references()
-        columns = [name.removeprefix("driven.") for name in self._names]  # what a run calls them
+        columns = [name.removeprefix("driven.") for name in self._names]  # names in a run
         asked = [k for k, name in enumerate(columns) if name not in self._absent]
         self._asked = asked if len(asked) < len(columns) else None
         self._reals = np.empty((self._most, len(asked)))
@@ -131,7 +140,7 @@ class Samples:
     def _known_estimates(
         self, asked: Sequence[int], estimates: Callable[[], BlockEstimates | None]
     ) -> BlockEstimates | None:
-        """Estimates of samples, and the places of what they follow from; None if a column of it is not asked for."""
+        """Return the estimates and store the places of the columns they need; None if one of these is not read."""
         found = estimates() if len(self._drivers) == len(self._interface.part("driven")) else None
         places = {self._names[k]: place for place, k in enumerate(asked)}
         if found is None or not places.keys() >= set(found.unknowns):
@@ -140,7 +149,7 @@ class Samples:
         return found
 
     def _add_estimates(self) -> None:
-        """Compute margins and estimated errors of the samples of status ok since the last call."""
+        """Compute margins and estimated errors of the samples of status ok that were added since the last call."""
         first, self._with_estimates = self._with_estimates, self._size
         if self._estimates and first < self._size:
             rows = first + np.flatnonzero(self._status[first : self._size] == Status.OK)
@@ -150,7 +159,7 @@ class Samples:
             self._reals[rows, -len(self._estimated_columns) :] = found[:, self._estimated_columns]
 
     def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
-        """Read a sample if it is to be kept; False if it holds no numbers but the drivers' values asked for."""
+        """Read a sample, if it is to be kept; return False if it holds no numbers except the driver values."""
         status, iterations = slave.counts()
         good = status <= LAST_GOOD
         row = self._size
@@ -174,7 +183,7 @@ class Samples:
         return good
 
     def end(self, reason: str = "") -> Run:
-        """All rows as a Run; reason: why it ended by an error."""
+        """Return all samples as a Run and end the sink's run; reason: the error that ended it, if any."""
         if reason:
             self.log(ERROR, reason)
         self._add_estimates()
@@ -185,12 +194,12 @@ class Samples:
         return run
 
     def _pass_on(self) -> None:
-        """The sink gets what it has not got yet."""
+        """Pass the sink the samples and events that it does not have yet."""
         self._add_estimates()
         rows = slice(self._passed_on, self._size)
         events = tuple(self._events[self._events_passed_on :])
         self._passed_on, self._events_passed_on = self._size, len(self._events)
-        sink, self._sink = self._sink, None  # one that fails is not called again
+        sink, self._sink = self._sink, None  # a sink that raises is not called again
         if sink is not None and (events or rows.start < rows.stop):
             sink.add(self._run(rows, events))
         self._sink = sink

@@ -1,4 +1,4 @@
-"""Slaves of our FMUs through fmpy's low-level calls, with the same methods for both versions of FMI."""
+"""Slaves of kinfmu's FMUs through fmpy's low-level calls, with the same methods for both versions of FMI."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Log = Callable[[int, str], None]  # status and text of a message
 
 
 class Slave(ABC):
-    """One slave; `fmpy` is fmpy's, for what is not wrapped here.
+    """A slave of an FMU; `fmpy` is fmpy's object, for calls that are not wrapped here.
 
-    What is called in every step goes to the C functions directly: fmpy's methods take longer than a native step.
+    Calls that are made in every step go to the C functions directly: fmpy's methods take longer than a native step.
     """
 
     fmpy: Any
@@ -43,10 +43,11 @@ class Slave(ABC):
 
     @abstractmethod
     def get(self, references: Sequence[int]) -> list[float]:
-        """Numbers by their value references."""
+        """Return the numbers of these value references."""
 
     @abstractmethod
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None: ...
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
+        """Set the numbers of these value references."""
 
     def set_boolean(self, reference: int, value: bool) -> None:
         self.fmpy.setBoolean([reference], [value])
@@ -56,22 +57,22 @@ class Slave(ABC):
 
     @abstractmethod
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        """Return what reads Real variables into a row of the table (n, len(references))."""
+        """Return a call that reads Real variables into a row of the table (n, len(references))."""
 
     @abstractmethod
     def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        """Return what sets Real variables to the values in a row of the table (n, len(references))."""
+        """Return a call that sets Real variables to the values in a row of the table (n, len(references))."""
 
     @abstractmethod
     def counts(self) -> tuple[int, int]:
-        """solver.status and solver.iterations."""
+        """Return solver.status and solver.iterations."""
 
     @abstractmethod
     def message(self) -> str:
-        """solver.message."""
+        """Return solver.message."""
 
     def step(self, time: float, step: float) -> bool:
-        """DoStep; False if it is Discard. Every other failure is an FmuError."""
+        """Call DoStep; return False if it is discarded. Raise an FmuError for any other failure."""
         status = self._do_step(time, step)
         if status <= WARNING:
             return True
@@ -83,7 +84,7 @@ class Slave(ABC):
 
 
 class Slave2(Slave):
-    """A slave of FMI 2.0, of the FMU that was unpacked into a folder; raises what fmpy raises."""
+    """A slave of FMI 2.0, of an FMU unpacked into a folder; raises what fmpy raises."""
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi2 import FMU2Slave
@@ -103,10 +104,9 @@ class Slave2(Slave):
         self._found = found[0].data
 
     def _instantiate(self, folder: Path, callbacks: Any) -> None:
-        """What fmpy's `instantiate` does, with the resources' address unquoted.
+        """Do what fmpy's `instantiate` does, but leave the URI of the resources unquoted.
 
-        pythonfmu's binary turns back no quoted sign but a blank, and takes the process down when it finds no folder
-        there.
+        pythonfmu's binary unquotes blanks only, and crashes the process if the folder does not exist.
         """
         from ctypes import byref
 
@@ -151,7 +151,7 @@ class Slave2(Slave):
 
 
 class Slave3(Slave):
-    """A slave of FMI 3.0, alike."""
+    """A slave of FMI 3.0, of an FMU unpacked into a folder; raises what fmpy raises."""
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi3 import FMU3Slave
@@ -214,9 +214,9 @@ _SLAVES: Mapping[str, type[Slave2 | Slave3]] = {"2.0": Slave2, "3.0": Slave3}
 
 @contextmanager
 def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
-    """A slave of the FMU unpacked into a folder; freed in the end, its traces in `sys.path` removed."""
+    """Start a slave of an FMU unpacked into a folder; at the end free it and restore `sys.path`."""
     try:
-        import fmpy  # noqa: F401  # is it there?
+        import fmpy  # noqa: F401  # only to see if it is installed
     except ImportError:
         raise MissingPackageError("stepping an FMU needs fmpy; pip install fmpy") from None
     path_before = list(sys.path)
@@ -235,13 +235,14 @@ def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
         yield one
     finally:
         one.free()
-        sys.path[:] = path_before  # pythonfmu puts the FMU's resources there for good
+        sys.path[:] = path_before  # pythonfmu adds the FMU's resources and does not remove them
 
 
 def fmi2_callbacks(log: Log) -> Any:
-    """FMI 2.0's callbacks: messages go to `log`, nothing to the terminal.
+    """Return FMI 2.0's callbacks that pass messages to `log` and print nothing.
 
-    Without fmpy's proxy for printf-like messages: it serves one logger in a process, and our FMUs send finished text.
+    fmpy's proxy for printf-like messages is left out: it serves one logger per process, and kinfmu's FMUs send finished
+    text.
     """
     from fmpy import calloc, free
     from fmpy.fmi2 import (
@@ -253,7 +254,7 @@ def fmi2_callbacks(log: Log) -> Any:
 
     def logger(_environment: object, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
         text = (message or b"").decode("utf-8", errors="replace")
-        log(status, text.replace("%%", "%").replace("##", "#"))  # a format, in which % and # are doubled
+        log(status, text.replace("%%", "%").replace("##", "#"))  # the text is a format, in which % and # are doubled
 
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = fmi2CallbackLoggerTYPE(logger)

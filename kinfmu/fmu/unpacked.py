@@ -1,4 +1,4 @@
-"""FMUs of unknown origin, unpacked: damage is reported in one line, and what is too large is not unpacked."""
+"""Unpack FMUs of unknown origin: damage is reported in one line, and FMUs that are too large are not unpacked."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from kinfmu.errors import FmuError
 from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.toml_file import LARGEST_FILE
 
-LARGEST = 2**29  # [bytes] unpacked; the largest of our own take a tenth of it
-LARGEST_DESCRIPTION = 2**27  # [bytes]; of a chain of thousands of links
+LARGEST = 2**29  # [bytes] unpacked; the largest FMUs of kinfmu take a tenth of it
+LARGEST_DESCRIPTION = 2**27  # [bytes]; enough for a chain of thousands of links
 MOST_FILES = 10_000
 DESCRIPTION, MECHANISM = "modelDescription.xml", "resources/mechanism.toml"
-_ENCRYPTED = 1  # of the flags of a file in a zip archive
+_ENCRYPTED = 1  # bit of the flags of a file in a zip archive
 _DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
     struct.error,
     EOFError,
-    RuntimeError,  # as NotImplementedError a compression that zipfile does not know
+    RuntimeError,  # NotImplementedError is one: a compression that zipfile does not support
     ValueError,
     OverflowError,
 )
@@ -36,7 +36,15 @@ _DAMAGED = (
 def unpacked(path: Path) -> Iterator[Path]:
     """Unpack an FMU into a temporary folder, which is removed at the end.
 
-    Raises an FmuError for a file that is no FMU, is damaged, or would take more room than LARGEST.
+    Args:
+        path: File of the FMU.
+
+    Yields:
+        The folder.
+
+    Raises:
+        FmuError: If the file is not an FMU, is damaged, or is larger than LARGEST when unpacked.
+
     """
     with tempfile.TemporaryDirectory(prefix="kinfmu_", ignore_cleanup_errors=True) as folder:
         try:
@@ -53,9 +61,17 @@ def unpacked(path: Path) -> Iterator[Path]:
 
 
 def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) -> str:
-    """Return the text of a file of the FMU that was unpacked into `folder`.
+    """Return the text of a file of an unpacked FMU.
 
-    Raises an FmuError if there is none, it is too large, or it is not UTF-8.
+    Args:
+        path: File of the FMU, for messages.
+        folder: Folder into which it was unpacked.
+        name: Path of the file inside the FMU.
+        largest: Largest size [bytes].
+
+    Raises:
+        FmuError: If the file is missing, is too large, or is not UTF-8.
+
     """
     try:
         with (folder / name).open("rb") as file:
@@ -71,7 +87,7 @@ def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) ->
 
 
 def _check(path: Path, zipped: zipfile.ZipFile) -> None:
-    """Raise an FmuError for what is not unpacked: sizes are those of the directory, beyond which nothing is read."""
+    """Raise an FmuError for an FMU that is not unpacked; sizes are those in the directory, the most that is read."""
     entries = zipped.infolist()
     if len(entries) > MOST_FILES:
         raise FmuError(f"{path}: holds {len(entries)} files; an FMU has at most {MOST_FILES}")
@@ -85,7 +101,7 @@ def _check(path: Path, zipped: zipfile.ZipFile) -> None:
 
 
 def _extract(path: Path, zipped: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: str) -> None:
-    """Write one file below `folder`; a place outside it is refused."""
+    """Write one file below `folder`; raise an FmuError for a path outside it."""
     target = Path(folder, entry.filename).resolve()
     if not target.is_relative_to(Path(folder).resolve()):
         raise FmuError(f"{path}: is no FMU (file {quoted(entry.filename)} lies outside its folder)")

@@ -1,4 +1,4 @@
-"""What a model description must hold so that kinfmu can step its FMU: descriptions of others may hold anything."""
+"""Check that a model description, of any origin, describes an FMU that kinfmu can step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kinfmu.mechanism.quoted import quoted
 from kinfmu.naming import derivative_name, is_coordinate
 from kinfmu.units import METRES
 
-_ALONE = {  # parts of one variable, or of a fixed number of them
+_ALONE = {  # parts with a fixed list of variables
     "residual": ("solver.residual",),
     "margin": ("solver.margin",),
     "errors": ("solver.error_q", "solver.error_qd", "solver.error_qdd"),
@@ -20,7 +20,7 @@ _ALONE = {  # parts of one variable, or of a fixed number of them
 
 
 def check(interface: Interface) -> None:
-    """Raise an FmuError for an interface that is not as `interface` makes them."""
+    """Raise an FmuError for an interface that differs in structure from those of `interface`."""
     if interface.length_unit not in METRES:
         raise FmuError(f"unit of length {quoted(interface.length_unit)} is not one of {listed(METRES)}")
     for name, variables in _ALONE.items():

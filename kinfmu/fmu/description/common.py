@@ -1,4 +1,4 @@
-"""What model descriptions of both versions of FMI have in common."""
+"""Parts of model descriptions that both versions of FMI share."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from kinfmu.mechanism import RunSettings
 from kinfmu.solver.python.status import Status
 from kinfmu.units import METRES, display_units
 
-TOOL = "kinfmu"  # name of the annotation that tells our FMUs from others
+TOOL = "kinfmu"  # name of the annotation that identifies FMUs of kinfmu
 LOG_CATEGORIES = {
-    "logStatusWarning": "What the host may have meant otherwise",
-    "logStatusDiscard": "Steps that cannot be done: driver, value and limit",
+    "logStatusWarning": "Settings that the host may not have intended",
+    "logStatusDiscard": "Steps to unreachable poses: driver, value and limit",
     "logStatusError": "Values that were refused",
 }
 _STATUS_WORDS = {
@@ -32,28 +32,28 @@ _RATES_WORDS = {
     Rates.ESTIMATED: "estimated from the driver's values; inputs of rates have no effect",
     Rates.WIRED: "the inputs as they are, 0 too",
 }
-ENUMERATIONS: dict[str, Mapping[Any, str]] = {  # by the name of the type: its items and what they mean
+ENUMERATIONS: dict[str, Mapping[Any, str]] = {  # by name of the type: items and their meanings
     STATUS_TYPE: _STATUS_WORDS,
     RATES_TYPE: _RATES_WORDS,
 }
 UnknownKind = Literal["outputs", "initial"]
 Unknowns = dict[
     str, tuple[tuple[str, str], ...] | None
-]  # by name what it depends on, each with its kind, or nothing told
+]  # by name: dependencies with their kinds, or None if not listed
 
 
 def text(value: float | bool) -> str:
-    """A number so that it reads back bitwise, a truth value as XML writes it."""
+    """Return a number as text that reads back to the bit, or a truth value as XML writes it."""
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def number(value: str | None) -> float | None:
-    """The number that an attribute says; None if it is not there."""
+    """Return the number in an attribute, or None if it is missing."""
     return None if value is None else float(value)
 
 
 def limits(variable: Variable) -> dict[str, str]:
-    """The attributes min, max and start, of those that a variable has."""
+    """Return those of the attributes min, max and start that a variable has."""
     given = (("min", variable.minimum), ("max", variable.maximum), ("start", variable.start))
     return {
         key: text(float(value)) if variable.type == "Real" else text(value if isinstance(value, bool) else int(value))
@@ -63,7 +63,7 @@ def limits(variable: Variable) -> dict[str, str]:
 
 
 def units(root: Element, interface: Interface) -> None:
-    """UnitDefinitions: every unit that a variable has."""
+    """Write UnitDefinitions: every unit that a variable has."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({variable.unit for variable in interface if variable.unit}):
         unit = SubElement(definitions, "Unit", name=name)
@@ -73,7 +73,7 @@ def units(root: Element, interface: Interface) -> None:
 
 
 def _base_unit(name: str) -> dict[str, str]:
-    """Exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
+    """Return exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
     base, _, per = name.partition("/")
     exponents = {"s": -int(per[1:] or 1) if per else 0}
     factor = 1.0
@@ -94,68 +94,74 @@ def items(enumeration: Element, name: str) -> None:
 
 
 def log_categories(root: Element) -> None:
-    """LogCategories, with what they mean."""
+    """Write LogCategories with their meanings."""
     categories = SubElement(root, "LogCategories")
     for name, meaning in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=meaning)
 
 
 def experiment(root: Element, settings: RunSettings) -> None:
-    """DefaultExperiment."""
+    """Write DefaultExperiment."""
     attributes = {"startTime": text(float(settings.start))}
-    if settings.stop > settings.start:  # FMI wants stopTime > startTime
+    if settings.stop > settings.start:  # FMI requires stopTime > startTime
         attributes["stopTime"] = text(float(settings.stop))
     SubElement(root, "DefaultExperiment", attributes, stepSize=text(float(settings.step)))
 
 
 def annotation(parent: Element, interface: Interface) -> None:
-    """Which parts the list of variables has, for `read`."""
+    """Write the parts of the list of variables, for `read`."""
     parts = SubElement(parent, "Parts", coordinates=str(interface.coordinate_count), lengthUnit=interface.length_unit)
     for part in interface.parts:
         SubElement(parts, "Part", name=part.name, variables=str(len(part.variables)))
 
 
 def attributes(variable: Variable, references: Mapping[str, int]) -> dict[str, str]:
-    """The attributes that every variable has, whatever its type."""
-    told = {
+    """Return the attributes that variables of all types have."""
+    found = {
         "name": variable.name,
         "valueReference": str(references[variable.name]),
         "description": variable.description,
         "causality": variable.causality,
         "variability": variable.variability,
     }
-    return told | ({"initial": variable.initial} if variable.initial else {})
+    return found | ({"initial": variable.initial} if variable.initial else {})
 
 
 def shown(variable: Variable, kinds: Collection[str]) -> Variable:
-    """Return the variable as descriptions for these kinds of simulation show it.
+    """Return the variable as a description with these kinds of simulation lists it.
 
-    Where model exchange is offered it is not the derivative of another one: some importers, OMSimulator among them,
-    take every derivative for that of a continuous state, and there are none.
+    With model exchange it is not declared as the derivative of another one: some importers, OMSimulator among them,
+    take every derivative for that of a continuous state, and there are no states.
     """
     return replace(variable, derivative_of=None) if "ModelExchange" in kinds else variable
 
 
 def typed(variable: Variable) -> dict[str, str]:
-    """The attributes that depend on its type, but for what it is the derivative of."""
-    told: dict[str, str] = {}
+    """Return the attributes that depend on the type, except `derivative`."""
+    found: dict[str, str] = {}
     if variable.declared_type:
-        told["declaredType"] = variable.declared_type
+        found["declaredType"] = variable.declared_type
     if variable.unit:
-        told["unit"] = variable.unit
+        found["unit"] = variable.unit
     if variable.display_unit:
-        told["displayUnit"] = variable.display_unit
-    return told | limits(variable)
+        found["displayUnit"] = variable.display_unit
+    return found | limits(variable)
 
 
 def unknowns(
     interface: Interface, kind: UnknownKind, places: Mapping[str, int]
 ) -> list[tuple[Variable, dict[str, str]]]:
-    """What the model structure lists, with the attributes that tell what it depends on.
+    """Return the unknowns of the model structure with the attributes of their dependencies.
 
-    These are the outputs, and at first also what follows from parameters. places: by which variables are told. A kind
-    `fixed` says that the factor depends on fixed parameters alone, `driven_by_time` among them; of initial unknowns FMI
-    wants none but `dependent` and `constant`.
+    These are the outputs; the initial unknowns also include calculated parameters. The kind `fixed` states that the
+    factor depends on fixed parameters alone, `driven_by_time` among them; for initial unknowns FMI allows only
+    `dependent` and `constant`.
+
+    Args:
+        interface: Variables of the FMU.
+        kind: "outputs" or "initial".
+        places: Number by which dependencies are listed, by name of the variable.
+
     """
     causalities = ("output",) if kind == "outputs" else ("output", "calculatedParameter")
     found = []
@@ -163,17 +169,17 @@ def unknowns(
         if variable.causality in causalities:
             names = variable.dependencies if kind == "outputs" else variable.initial_dependencies
             linear_in = variable.linear_in if kind == "outputs" else ()
-            told: dict[str, str] = {}
+            listed: dict[str, str] = {}
             if names is not None:
                 ordered = sorted(names, key=places.__getitem__)
-                told["dependencies"] = " ".join(str(places[name]) for name in ordered)
-                told["dependenciesKind"] = " ".join("fixed" if name in linear_in else "dependent" for name in ordered)
-            found.append((variable, told))
+                listed["dependencies"] = " ".join(str(places[name]) for name in ordered)
+                listed["dependenciesKind"] = " ".join("fixed" if name in linear_in else "dependent" for name in ordered)
+            found.append((variable, listed))
     return found
 
 
 def read_unknowns(elements: Iterable[Element], place: str, names: Mapping[str, str]) -> Unknowns:
-    """What elements of the model structure tell; place: the attribute that names the unknown, names: of the places."""
+    """Return the unknowns in the model structure; place: attribute of the unknown's number, names: by number."""
     found: Unknowns = {}
     for unknown in elements:
         listed = unknown.get("dependencies")
@@ -186,7 +192,7 @@ def read_unknowns(elements: Iterable[Element], place: str, names: Mapping[str, s
 
 
 def dependencies(name: str, outputs: Unknowns, initial: Unknowns) -> dict[str, tuple[str, ...] | None]:
-    """The fields of a variable that tell what it depends on."""
+    """Return the fields of a variable that hold its dependencies."""
     now, first = outputs.get(name), initial.get(name)
     return {
         "dependencies": None if now is None else tuple(one for one, _ in now),

@@ -1,4 +1,4 @@
-"""Model description: an Interface as modelDescription.xml of FMI 2.0 or 3.0, and read back from it."""
+"""Model description: an Interface written as modelDescription.xml of FMI 2.0 or 3.0, and read from it."""
 
 from __future__ import annotations
 
@@ -24,9 +24,16 @@ _VERSIONS: dict[FmiVersion, Any] = {"2.0": fmi2, "3.0": fmi3}
 
 @dataclass(frozen=True)
 class Description:
-    """A model description: the variables and who the FMU is.
+    """A model description: the variables and the identity of the FMU.
 
-    token: hash of its content, the guid in FMI 2.0's words; sources: names of the C files inside, if it carries some.
+    Attributes:
+        interface: Variables of the FMU.
+        token: Hash of its content: `guid` in FMI 2.0, `instantiationToken` in FMI 3.0.
+        model_identifier: Name of the library.
+        generation_tool: Program that built the FMU, such as "kinfmu 1.0".
+        version: Version of FMI.
+        sources: Names of the C files inside, if any.
+
     """
 
     interface: Interface
@@ -38,9 +45,14 @@ class Description:
 
 
 def write(description: Description, kinds: Mapping[str, Mapping[str, float | bool]]) -> bytes:
-    """modelDescription.xml; kinds: capabilities such as canGetAndSetFMUstate of CoSimulation and of ModelExchange.
+    """Return modelDescription.xml.
 
-    It carries no date: the same content gives the same bytes.
+    It has no date: the same content gives the same bytes.
+
+    Args:
+        description: Model description.
+        kinds: Capabilities such as canGetAndSetFMUstate, by kind of simulation: CoSimulation, ModelExchange.
+
     """
     interface = description.interface
     version = _VERSIONS[description.version]
@@ -50,18 +62,27 @@ def write(description: Description, kinds: Mapping[str, Mapping[str, float | boo
         | {"description": interface.title or interface.name, "generationTool": description.generation_tool}
         | version.ROOT,
     )
-    told = {
+    attributes = {
         kind: {"modelIdentifier": description.model_identifier, **{name: text(flag) for name, flag in flags.items()}}
         for kind, flags in kinds.items()
     }
-    version.write(root, interface, told, description.sources)
+    version.write(root, interface, attributes, description.sources)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
 
 
 def read(data: bytes, where: str) -> Description:
-    """The description in modelDescription.xml of one of our FMUs; `where` names the file in messages."""
-    if data.count(b"<") > MOST_TAGS:  # a tree takes hundred times the memory of its shortest tags
+    """Return the description of an FMU of kinfmu.
+
+    Args:
+        data: modelDescription.xml.
+        where: Name of the file, for messages.
+
+    Raises:
+        FmuError: If the description is damaged, is of another version of FMI, or is not of an FMU of kinfmu.
+
+    """
+    if data.count(b"<") > MOST_TAGS:  # a tree takes a hundred times the memory of its shortest tags
         raise FmuError(f"{where}: modelDescription.xml has more than {MOST_TAGS} tags")
     try:
         root = ET.fromstring(data)  # noqa: S314  # the stdlib parser loads no external entities

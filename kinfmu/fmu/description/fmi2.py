@@ -15,7 +15,7 @@ TYPES = ("Real", "Integer", "Enumeration", "Boolean", "String")
 
 
 def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str]], sources: Sequence[str]) -> None:
-    """Everything below the root."""
+    """Write everything below the root."""
     for kind, attributes in kinds.items():
         element = SubElement(root, kind, attributes)
         if sources:
@@ -45,7 +45,7 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Outputs and InitialUnknowns. An index is the place in the list from 1, and so is a value reference."""
+    """Write Outputs and InitialUnknowns. Indices, like value references, are places in the list, from 1."""
     structure = SubElement(root, "ModelStructure")
     lists: tuple[tuple[str, common.UnknownKind], ...] = (("Outputs", "outputs"), ("InitialUnknowns", "initial"))
     for element, kind in lists:
@@ -55,12 +55,12 @@ def _structure(root: Element, interface: Interface, references: Mapping[str, int
 
 
 def parts(root: Element) -> Element | None:
-    """The annotation that tells our FMUs from others."""
+    """Return the annotation that identifies FMUs of kinfmu, or None."""
     return root.find(f"VendorAnnotations/Tool[@name='{common.TOOL}']/Parts")
 
 
 def variables(root: Element) -> list[dict[str, Any]]:
-    """The fields of each variable."""
+    """Return the fields of each variable."""
     scalars = list(root.iterfind("ModelVariables/ScalarVariable"))
     names = [scalar.get("name", "") for scalar in scalars]
     places = {str(k): name for k, name in enumerate(names, start=1)}

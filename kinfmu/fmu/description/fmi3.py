@@ -22,7 +22,7 @@ _TYPES_BACK = {theirs: ours for ours, theirs in TYPES.items()}
 
 
 def write(root: Element, interface: Interface, kinds: Mapping[str, dict[str, str]], _sources: Sequence[str]) -> None:
-    """Everything below the root. Sources are told in sources/buildDescription.xml."""
+    """Write everything below the root; sources are listed in sources/buildDescription.xml."""
     for kind, attributes in kinds.items():
         SubElement(root, kind, attributes)
     common.units(root, interface)
@@ -47,7 +47,7 @@ def _variable(parent: Element, variable: Variable, references: Mapping[str, int]
 
 
 def _structure(root: Element, interface: Interface, references: Mapping[str, int]) -> None:
-    """Output and InitialUnknown elements, by value references."""
+    """Write Output and InitialUnknown elements, by value references."""
     structure = SubElement(root, "ModelStructure")
     lists: tuple[tuple[str, common.UnknownKind], ...] = (("Output", "outputs"), ("InitialUnknown", "initial"))
     for element, kind in lists:
@@ -56,12 +56,12 @@ def _structure(root: Element, interface: Interface, references: Mapping[str, int
 
 
 def parts(root: Element) -> Element | None:
-    """The annotation that tells our FMUs from others."""
+    """Return the annotation that identifies FMUs of kinfmu, or None."""
     return root.find(f"Annotations/Annotation[@type='{common.TOOL}']/Parts")
 
 
 def variables(root: Element) -> list[dict[str, Any]]:
-    """The fields of each variable."""
+    """Return the fields of each variable."""
     elements = list(root.iterfind("ModelVariables/*"))
     names = {element.get("valueReference", ""): element.get("name", "") for element in elements}
     outputs = common.read_unknowns(root.iterfind("ModelStructure/Output"), "valueReference", names)

@@ -3,11 +3,11 @@
     modelDescription.xml
     documentation/index.html
     binaries/<platform>/<identifier>.so|dll|dylib
-    sources/*.c, *.h                              all that `fmpy compile` and other tools need to build it again
-    sources/buildDescription.xml                  (FMI 3.0) which of them
+    sources/*.c, *.h                              all that `fmpy compile` and other tools need to compile it again
+    sources/buildDescription.xml                  (FMI 3.0) the files to compile
     resources/mechanism.toml
 
-It needs no Python and nothing but the C library, holds no global state and reads no file.
+It needs the C library only, has no global state and reads no file.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 
-OPTIMIZED = ("-O3", "-falign-functions=64", "-falign-loops=32")  # unaligned, a step takes a tenth more at times
-FLAGS = (*OPTIMIZED, "-fvisibility=hidden", "-s")  # only FMI's functions are seen from outside
+OPTIMIZED = ("-O3", "-falign-functions=64", "-falign-loops=32")  # without alignment a step takes up to a tenth longer
+FLAGS = (*OPTIMIZED, "-fvisibility=hidden", "-s")  # only FMI's functions are exported
 _COMMON: dict[str, float | bool] = {"needsExecutionTool": False, "canBeInstantiatedOnlyOncePerProcess": False}
 CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
     "2.0": {
@@ -59,10 +59,22 @@ def archive(
     platforms: str,
     progress: Callable[[int, int], None] | None = None,
 ) -> bytes:
-    """The FMU of a plan as the bytes of its zip archive; the same plan and the same compiler give the same bytes.
+    """Return the FMU of a plan; the same plan and the same compiler give the same bytes.
 
-    version: of kinfmu; platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig; progress:
-    called with (platforms done, platforms in all). CompilerError without a compiler.
+    Args:
+        plan: Plan of the mechanism.
+        drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
+        version: Version of kinfmu.
+        fmi: Version of FMI.
+        platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig.
+        progress: Called with (platforms done, number of platforms).
+
+    Returns:
+        Bytes of the zip archive.
+
+    Raises:
+        CompilerError: If no compiler is found.
+
     """
     variables = interface(plan, drive, has_time=fmi == "3.0")
     unnamed = _contents(plan, variables, version, fmi, "")
@@ -79,7 +91,7 @@ def archive(
 
 
 def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersion, guid: str) -> dict[str, bytes]:
-    """Every file but the binaries, by its path in the FMU."""
+    """Return every file except the binaries, by path in the FMU."""
     code = sources(plan, variables, fmi, guid)
     units = tuple(compiler.units(code))
     about = Description(variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else ())
@@ -111,7 +123,7 @@ def _binary(platform: Platform, variables: Interface, fmi: FmiVersion) -> str:
 def _compiled(
     contents: Mapping[str, bytes], fmi: FmiVersion, identifier: str, platform: Platform, target: str | None
 ) -> bytes:
-    """The library of one platform, from the sources in the FMU."""
+    """Return the library of one platform, compiled from the sources in the FMU."""
     files = {
         path.removeprefix("sources/"): data.decode()
         for path, data in contents.items()

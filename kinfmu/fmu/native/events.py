@@ -1,4 +1,4 @@
-"""events.c: when what drives over time jumps, which model exchange has to tell its host."""
+"""events.c: the times at which the laws of drivers jump, which model exchange announces to its host."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SIGNATURE = "void kf_jumps(const kf_model *model, const double *constants, doub
 
 
 def events(plan: SolvePlan) -> str:
-    """Return the text of events.c: the function, over the constants of the laws and the parameters."""
+    """Return the text of events.c: a function of the constants of the laws and of the parameters."""
     writer = Writer(Names(functions=FUNCTIONS), ())
     body = [f"{line};" for line in writer.statements([node for jump in plan.jumps for node in jump])]
     for k, (at, period) in enumerate(plan.jumps):

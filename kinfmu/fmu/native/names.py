@@ -1,6 +1,6 @@
-"""kf_names.h: names of their own for the functions of one FMU where several are linked into one program.
+"""kf_names.h: unique names for the functions of one FMU, so that several can be linked into one program.
 
-FMI calls its functions by FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX there; every other name follows it.
+FMI puts FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX before its functions; this header does so for every other name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ HEADER = "kf_names.h"
 
 
 def prefixed(sources: Mapping[str, str], version: str) -> dict[str, str]:
-    """Return C files that include kf_names.h first, and the file itself."""
+    """Return the C files, each including kf_names.h first, and kf_names.h."""
     names = sorted({name for text in sources.values() for name in re.findall(r"\bkf_\w+", text)})
     include = f'#include "{HEADER}"\n'
     return {name: include + text for name, text in sources.items()} | {HEADER: _header(names, version)}

@@ -11,7 +11,15 @@ from kinfmu.errors import FmuError
 
 @dataclass(frozen=True)
 class Platform:
-    """name: FMI 3.0's, and the folder there; fmi2: the folder in FMI 2.0; target: zig's name; suffix: of libraries."""
+    """A platform of a native FMU.
+
+    Attributes:
+        name: Name in FMI 3.0, and of its folder.
+        fmi2: Name of the folder in FMI 2.0.
+        target: Name of the target for zig.
+        suffix: Suffix of libraries.
+
+    """
 
     name: str
     fmi2: str
@@ -19,7 +27,7 @@ class Platform:
     suffix: str
 
     def folder(self, version: str) -> str:
-        """Folder of the binaries in an FMU of that version of FMI."""
+        """Return the folder of the binaries in an FMU of that version of FMI."""
         return self.fmi2 if version == "2.0" else self.name
 
 
@@ -35,7 +43,7 @@ _SYSTEMS = {"win32": "windows", "darwin": "darwin", "linux": "linux"}
 
 
 def host() -> Platform:
-    """The platform that this runs on; FmuError if FMI has no name for it here."""
+    """Return the platform of this machine; raise an FmuError if native FMUs do not support it."""
     machine = platform.machine()
     name = f"{_MACHINES.get(machine.lower(), machine)}-{_SYSTEMS.get(sys.platform, sys.platform)}"
     for one in PLATFORMS:

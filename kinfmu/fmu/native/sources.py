@@ -18,7 +18,7 @@ from kinfmu.fmu.native.names import prefixed
 from kinfmu.plan import SolvePlan
 
 RUNTIME = Path(__file__).with_name("runtime")
-NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts that follow those of Real variables
+NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
 HEADERS = {
     "2.0": ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     "3.0": ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -33,8 +33,8 @@ _STEP = (
     "drive.c",
     "instance.c",
     "variables.c",
-)  # what a step goes through
-_HINTS = (  # a step is short: pairs of numbers just written one by one would be waited for, and branches are foreseen
+)  # the functions that a step calls
+_HINTS = (  # in short steps, vector loads of values just stored stall, and branches are predicted well
     "#if defined(__GNUC__) && !defined(__clang__)",
     '#pragma GCC optimize("no-tree-vectorize", "no-tree-slp-vectorize", "no-if-conversion")',
     "#endif",
@@ -43,7 +43,15 @@ _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
 def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> dict[str, str]:
-    """Texts of all C files and headers of the FMU by name, but for those of FMI itself."""
+    """Return all C files and headers of the FMU by name, except the headers of FMI.
+
+    Args:
+        plan: Plan of the mechanism.
+        variables: Variables of the FMU.
+        version: Version of FMI, "2.0" or "3.0".
+        token: Hash of the FMU's content.
+
+    """
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
@@ -53,16 +61,16 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
 
 
 def _step(version: str) -> str:
-    """step.c: files that the compiler shall see as one, so that a step is not a way through many small functions."""
-    lines = ["/* What set, step and get go through, as one unit. Files included here are not compiled on their own. */"]
+    """Return step.c, which joins the files that a step uses, so that the compiler can inline small functions."""
+    lines = ["/* The functions of set, step and get as one unit. Files included here are not compiled separately. */"]
     lines += _HINTS
     lines += [f'#include "{name}"' for name in (*_STEP, f"fmi{version[0]}.c")]
     return "\n".join(lines) + "\n"
 
 
 def headers(version: str) -> dict[str, str]:
-    """The headers of FMI by name, as fmpy carries them. They stay outside of FMUs: importers have their own."""
-    found = find_spec("fmpy")  # not imported: that takes longer than a unit takes to compile
+    """Return the headers of FMI by name, from fmpy. FMUs do not contain them: importers have their own."""
+    found = find_spec("fmpy")  # not imported: the import takes longer than compiling a file
     places = found.submodule_search_locations if found is not None else None
     try:
         return {name: Path(places[0] if places else "", "c-code", name).read_text("utf-8") for name in HEADERS[version]}
@@ -73,7 +81,7 @@ def headers(version: str) -> dict[str, str]:
 
 
 def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> str:
-    """interface.h: how many variables there are of what, and where."""
+    """Return interface.h: numbers and places of the variables."""
     references = variables.value_references()
     names = [part.name for part in variables.parts if part.name not in NOT_REAL]
     real = sum(len(variables.part(name)) for name in names)
@@ -89,7 +97,7 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         f"#define KF_VARIABLES {len(references)}",
         f"#define KF_REALS {real} /* they come first; value references count all variables from 1 */",
         "",
-        "/* Variables that are computed together, and stand together. */",
+        "/* Parts: variables that are computed together and are neighbours. */",
         "enum {",
         *(f"    KF_PART_{name.upper()}," for name in names),
         "    KF_PARTS",
@@ -126,7 +134,7 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
 
 
 def _tables(variables: Interface) -> str:
-    """interface.c: names, starts and limits of the variables."""
+    """Return interface.c: names, start values and limits of the variables."""
     parts = [part for part in variables.parts if part.name not in NOT_REAL]
     real = [variable for part in parts for variable in part.variables]
     (drive,), (rates,) = variables.part("drive"), variables.part("rate_source")
@@ -149,5 +157,5 @@ def _tables(variables: Interface) -> str:
 
 
 def _numbers(counts: Iterable[int]) -> list[int]:
-    """0 as often as the first count says, 1 as often as the second, ..."""
+    """Return as many 0 as the first count, as many 1 as the second, and so on."""
     return [number for number, count in enumerate(counts) for _ in range(count)]
