@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import gallery
 from kinfmu.mechanism.toml_file import parse
+from tests.docs.commands import check_commands
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -23,7 +23,7 @@ def _block(language: str) -> str:
     return found[1]
 
 
-def test_the_ten_lines_of_python_run_and_say_what_they_promise(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_ten_lines_of_python_run_and_their_comments_are_true(capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(_block("python"), "README.md", "exec"), {})  # noqa: S102  our own page
     mobility, position, apart = capsys.readouterr().out.splitlines()
     assert mobility == "1 ['AB']"
@@ -34,7 +34,8 @@ def test_the_ten_lines_of_python_run_and_say_what_they_promise(capsys: pytest.Ca
     assert len([line for line in _block("python").splitlines() if line and not line.startswith("#")]) <= 10
 
 
-def test_the_linkage_of_ones_own_turns_all_the_way() -> None:
+def test_the_ten_lines_of_toml_turn_all_the_way() -> None:
+    assert len(_block("toml").splitlines()) == 10
     report = kinfmu.check(parse(_block("toml"), "README.md"))
     assert report.problem is None
     assert report.mobility == 1
@@ -42,33 +43,47 @@ def test_the_linkage_of_ones_own_turns_all_the_way() -> None:
     assert report.range.low is None
     run = kinfmu.solve(report.mechanism, np.arange(0.0, 6.3, 0.1))
     assert run.good.all()
-    assert "tip.x" in run.outputs
-
-
-def test_every_room_of_the_house_is_on_the_map_and_every_room_on_the_map_exists() -> None:
-    rooms = {path.name for path in (ROOT / "kinfmu").iterdir() if (path / "__init__.py").is_file()}
-    mapped = set(re.findall(r"`kinfmu/(\w+)/", README))
-    assert mapped == rooms
-
-
-def test_every_module_beside_the_rooms_is_on_the_map_and_every_module_on_the_map_exists() -> None:
-    modules = {path.name for path in (ROOT / "kinfmu").glob("*.py")} - {"__init__.py", "__main__.py"}
-    rows = [line for line in README.splitlines() if line.startswith("| `kinfmu/")]
-    assert set(re.findall(r"(\w+\.py)`", " ".join(rows))) == modules
-
-
-def test_the_readme_lists_the_gallery_by_name_and_title() -> None:
-    listed = re.findall(r"^\| \[`(\w+)`\]\(fmus/(\w+)/README\.md\) \| (.+?) \| .+ \|$", README, re.MULTILINE)
-    assert listed == [(name, name, kinfmu.load(name).title) for name in gallery.names()]
+    assert "crank-rocker" in str(report)
 
 
 def test_the_commands_of_the_readme_exist() -> None:
     for script in re.findall(r"scripts/(\w+)", README):
         assert (ROOT / "scripts" / script).is_file()
-    commands = set(re.findall(r"^    kinfmu (\w+)", README, re.MULTILINE))
-    from kinfmu.cli import main
+    check_commands(README)
 
-    assert commands <= set(main.commands)
+
+def test_the_comparison_is_that_of_the_accuracy_page(request: pytest.FixtureRequest) -> None:
+    begin, end = "<!-- comparison -->", "<!-- end: comparison -->"
+    before, rest = README.split(begin)
+    table, after = rest.split(end)
+    if request.config.getoption("--update"):
+        text = f"{before}{begin}\n\n{_comparison()}\n\n{end}{after}"
+        (ROOT / "README.md").write_text(text, encoding="utf-8", newline="\n")
+    else:
+        assert table.strip() == _comparison(), "docs/accuracy.md has changed; pytest tests/test_readme.py --update"
+
+
+def _comparison() -> str:
+    """Return the README's table: two mechanisms and a change point, from the generated tables of docs/accuracy.md."""
+    page = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
+    mechanisms = ("crank_rocker", "jansen_leg")
+    head, *engines = _rows(page.split("<!-- generated: engines -->")[1])
+    chosen = [next(k for k, cell in enumerate(head) if f"`{name}`" in cell) for name in mechanisms]
+    at_head, *singular = _rows(page.split("<!-- generated: singular points -->")[1])
+    at_point = {row[0]: row[at_head.index("at it")] for row in singular}
+    links = [f"[`{name}`](fmus/{name}/README.md)" for name in mechanisms]
+    lines = [f"| | {' | '.join(links)} | errors of q, qd, qdd at a change point |", "|---|---|---|---|"]
+    for row in engines:
+        if row[0] != "generated Python":  # a part of kinfmu, explained on the page
+            cells = [row[0], *(row[k] for k in chosen), at_point.get(row[0], "")]
+            lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _rows(text: str) -> list[list[str]]:
+    """Return the cells of the first Markdown table of a text, line by line, without the ruler."""
+    table = text.strip().split("\n\n")[0].splitlines()
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table if not line.startswith("|---")]
 
 
 def test_the_version_is_typed_once() -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinfmu.cli import main
 from kinfmu.log import write_mcap
+from tests.docs.commands import check_commands
 from tests.log.runs import fourbar
 
 ROOT = Path(__file__).parents[2]
@@ -19,12 +19,7 @@ MOST = 600_000  # [bytes] of a picture; pages load it
 
 
 def test_every_command_and_option_of_the_page_exists() -> None:
-    lines = re.findall(r"^    kinfmu ([^#\n]+)", PAGE, re.MULTILINE)
-    assert len(lines) > 8
-    for line in lines:
-        command, *words = line.split()
-        known = {name for option in main.commands[command].params for name in option.opts}
-        assert {word for word in words if re.match("--?[a-z]", word)} <= known
+    check_commands(PAGE)
 
 
 def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -39,7 +34,9 @@ def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(
-    ("page", "folder"), [("docs/reviewing-a-run.md", "docs"), ("README.md", "")], ids=["page", "readme"]
+    ("page", "folder"),
+    [("docs/reviewing-a-run.md", "docs"), ("docs/gallery.md", "docs"), ("README.md", "")],
+    ids=["page", "gallery", "readme"],
 )
 def test_pictures_are_there_of_a_size_to_load_and_made_by_the_script(page: str, folder: str) -> None:
     found = re.findall(r"!\[[^\]]+\]\(([\w./-]+)\)", (ROOT / page).read_text(encoding="utf-8"))

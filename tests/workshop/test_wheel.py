@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,15 +15,23 @@ from kinfmu import gallery
 CHECKOUT = Path(__file__).parents[2]
 
 
-def test_the_gallery_is_installed_with_the_references_that_bench_measures_by(tmp_path: Path) -> None:
+def test_the_gallery_its_references_and_the_marker_of_types_are_installed(tmp_path: Path) -> None:
     pytest.importorskip("setuptools", reason="comes with pip, mostly")
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
+    data = project["tool"]["setuptools"]["package-data"]["kinfmu"]
     shutil.copytree(CHECKOUT / "fmus", tmp_path / "fmus", ignore=shutil.ignore_patterns("*.fmu", "*.svg"))
     shutil.copy(CHECKOUT / "setup.py", tmp_path)
     (tmp_path / "kinfmu").mkdir()
     (tmp_path / "kinfmu" / "__init__.py").touch()
-    (tmp_path / "setup.cfg").write_text("[metadata]\nname = kinfmu\n[options]\npackages = kinfmu\n", encoding="utf-8")
+    shutil.copy(CHECKOUT / "kinfmu" / "py.typed", tmp_path / "kinfmu")
+    (tmp_path / "setup.cfg").write_text(
+        "[metadata]\nname = kinfmu\n[options]\npackages = kinfmu\n"
+        f"[options.package_data]\nkinfmu = {', '.join(data)}\n",
+        encoding="utf-8",
+    )
     build = [sys.executable, "setup.py", "-q", "build_py", "--build-lib", "built"]
     subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "built" / "kinfmu" / "py.typed").is_file()
     installed = tmp_path / "built" / "kinfmu" / "fmus"
     assert sorted(path.name for path in installed.iterdir()) == gallery.names()
     for folder in installed.iterdir():

@@ -1,0 +1,57 @@
+"""docs/architecture.md, docs/gallery.md and docs/commands.md: what they list is what there is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.cli import main
+from tests.docs.commands import check_commands
+
+ROOT = Path(__file__).parents[2]
+ARCHITECTURE, GALLERY, COMMANDS, README = (
+    (ROOT / name).read_text(encoding="utf-8")
+    for name in ("docs/architecture.md", "docs/gallery.md", "docs/commands.md", "README.md")
+)
+
+
+def test_the_architecture_lists_every_package() -> None:
+    packages = {path.name for path in (ROOT / "kinfmu").iterdir() if (path / "__init__.py").is_file()}
+    assert set(re.findall(r"`kinfmu/(\w+)/", ARCHITECTURE)) == packages
+
+
+def test_the_architecture_lists_every_module_outside_packages() -> None:
+    modules = {path.name for path in (ROOT / "kinfmu").glob("*.py")} - {"__init__.py", "__main__.py"}
+    rows = [line for line in ARCHITECTURE.splitlines() if line.startswith("| `kinfmu/")]
+    assert set(re.findall(r"(\w+\.py)`", " ".join(rows))) == modules
+
+
+def test_the_paths_of_the_architecture_exist() -> None:
+    paths = re.findall(r"`((?:kinfmu|scripts|fmus|tests|docs)/[\w/.]*)[ `]", ARCHITECTURE)
+    assert len(paths) > 30
+    for path in paths:
+        assert (ROOT / path).exists(), path
+
+
+def test_the_gallery_page_lists_every_mechanism_with_its_title() -> None:
+    listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./fmus/(\w+)/README\.md\) \| (.+?) \| .+ \|$", GALLERY, re.MULTILINE)
+    assert listed == [(name, name, kinfmu.load(name).title) for name in gallery.names()]
+    assert f"comes with {len(gallery.names())} mechanisms" in GALLERY
+
+
+def test_the_commands_page_shows_every_command() -> None:
+    check_commands(COMMANDS)
+    assert set(re.findall(r"^    kinfmu (\w+)", COMMANDS, re.MULTILINE)) == set(main.commands)
+
+
+def test_every_link_between_the_pages_leads_to_a_file() -> None:
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for target in re.findall(r"\]\(([\w./-]+)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_the_readme_leads_to_every_page() -> None:
+    pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} - {"docs/accuracy-settings.md"}
+    assert pages <= set(re.findall(r"\((docs/[\w-]+\.md)\)", README))
