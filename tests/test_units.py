@@ -23,7 +23,7 @@ from kinfmu.units import (
 EXACT = {"m": "1", "mm": "0.001", "cm": "0.01", "um": "0.000001", "km": "1000", "in": "0.0254", "ft": "0.3048"}
 
 
-def test_radians_that_look_like_degrees_are_known_by_their_fifteens() -> None:
+def test_multiples_of_15_from_30_look_like_degrees() -> None:
     for angle in (30.0, 45.0, 90.0, -120.0, 360.0, 3600.0):
         assert looks_like_degrees(angle)
     for angle in (0.0, 15.0, 31.0, 4.0 * math.pi, 100.0, 45.5):
@@ -32,7 +32,7 @@ def test_radians_that_look_like_degrees_are_known_by_their_fifteens() -> None:
 
 
 @pytest.mark.parametrize("inside", METRES)
-def test_a_length_is_turned_into_the_files_unit_to_the_last_digit(inside: str) -> None:
+def test_a_length_is_converted_to_the_unit_of_the_file_to_the_last_digit(inside: str) -> None:
     assert METRES.keys() == EXACT.keys()
     for unit, factor in factors(Quantity("length"), inside).items():
         exact = float(Fraction(EXACT[unit]) / Fraction(EXACT[inside]))
@@ -48,7 +48,7 @@ def test_times_may_be_written_in_other_units() -> None:
     assert factors(Quantity("time"), "mm") == {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 
-def test_speeds_may_be_written_per_second_and_per_minute() -> None:
+def test_speeds_are_written_per_second_or_per_minute() -> None:
     speeds = factors(Quantity("angle", 1), "m")
     assert list(speeds) == ["rad/s", "rad/min", "deg/s", "deg/min", "rev/s", "rev/min", "rpm", "Hz"]
     assert speeds["rpm"] == speeds["rev/min"] == 2.0 * math.pi / 60.0
@@ -57,7 +57,7 @@ def test_speeds_may_be_written_per_second_and_per_minute() -> None:
     assert "rpm" not in factors(Quantity("length", 1), "m")
 
 
-def test_accelerations_may_be_written_per_second_squared_only() -> None:
+def test_accelerations_are_written_per_second_squared_only() -> None:
     assert list(factors(Quantity("angle", 2), "m")) == ["rad/s2", "deg/s2", "rev/s2"]
     assert factors(Quantity("length", 2), "mm")["m/s2"] == 1000.0
 

@@ -1,4 +1,4 @@
-"""What every driver promises, over all members of DRIVERS."""
+"""Contract of drivers, tested for all members of DRIVERS."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_velocity_and_acceleration_equations_hold_along_any_motion(
 
 @every_driver
 @given(data=st.data())
-def test_a_driver_holds_when_its_target_is_what_it_measures(cls: type[Driver], data: st.DataObject) -> None:
+def test_the_residual_of_a_driver_is_0_at_its_measured_value(cls: type[Driver], data: st.DataObject) -> None:
     system = data.draw(systems(cls))
     q = data.draw(poses(system))
     measured = system.measure(q)

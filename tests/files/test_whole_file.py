@@ -36,7 +36,7 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     assert target.read_bytes() == b"newer"
 
 
-def test_what_is_no_file_is_written_to_and_not_replaced() -> None:
+def test_a_device_is_written_to_and_not_replaced() -> None:
     end, start = os.pipe()
     try:
         write_whole(f"/dev/fd/{start}", b"text")
@@ -60,7 +60,7 @@ def test_a_folder_that_another_program_locks_does_not_stop_the_writing(
     assert (tmp_path / "file.txt").read_bytes() == b"text"
 
 
-def test_a_long_name_is_no_longer_while_it_is_written(tmp_path: Path) -> None:
+def test_the_temporary_name_of_a_long_name_is_not_longer(tmp_path: Path) -> None:
     path = tmp_path / f"{'n' * 250}.txt"
     write_whole(path, b"text")
     assert path.read_bytes() == b"text"

@@ -1,4 +1,4 @@
-"""What the tests of a mechanism share: each is read and compiled once."""
+"""Fixtures for the gallery's mechanisms: each is read and compiled once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.gallery.reference_file import read
 
 
 class Member:
-    """A mechanism of the gallery and its reference, and what kinfmu makes of it when first asked."""
+    """A mechanism of the gallery, its reference, and kinfmu's results, computed on first use."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name

@@ -1,6 +1,6 @@
-"""Plane geometry on power series in time: what closed forms of linkages are made of.
+"""Plane geometry on power series in time: the building blocks of closed forms of linkages.
 
-Numbers that come in are the decimal numbers they are written as: 0.1 is a tenth, not the double beside it.
+Numbers are the decimal numbers they are written as: 0.1 is a tenth, not the nearest double.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ LEFT, RIGHT = 1, -1  # of the line from the first centre to the second
 
 
 def decimal(value: Quantity) -> Quantity:
-    """A literal as the decimal number it is written as."""
+    """Return a literal as the decimal number it is written as."""
     return mp.mpf(repr(value)) if isinstance(value, float) else value
 
 
 def degrees(value: Quantity) -> Quantity:
-    """An angle in degrees, in radians."""
+    """Convert an angle from degrees to radians."""
     return decimal(value) * mp.pi / 180
 
 
 @dataclass(frozen=True)
 class Vector:
-    """A point of the plane, or the way between two; its coordinates are series or numbers."""
+    """A point of the plane, or the vector between two; its coordinates are series or numbers."""
 
     x: Quantity
     y: Quantity
@@ -72,7 +72,7 @@ def meet(a: Vector, radius_a: Quantity, b: Vector, radius_b: Quantity, side: int
 
 
 def heading(way: Vector, near: Quantity) -> Series:
-    """The angle of a vector, of all its turns the one nearest to `near` [rad]."""
+    """Return the angle of a vector, with the number of turns that brings it nearest to `near` [rad]."""
     angle = atan2(way.y, way.x)
     wanted = near.c[0] if isinstance(near, Series) else near
     return angle + 2 * mp.pi * mp.nint((wanted - angle.c[0]) / (2 * mp.pi))

@@ -52,7 +52,7 @@ def row(name: str, t: float) -> dict[str, str]:
 
 
 def text(name: str) -> str:
-    """The whole file."""
+    """Return the text of the file."""
     rows = [row(name, t) for t in samples(name).times]
     page = io.StringIO()
     writer = csv.DictWriter(page, list(rows[0]), lineterminator="\n")
@@ -62,12 +62,12 @@ def text(name: str) -> str:
 
 
 def path(name: str) -> Path:
-    """Where the file lies."""
+    """Return the path of the file."""
     return FOLDER / name / "reference.csv"
 
 
 def read(name: str) -> list[dict[str, str]]:
-    """The rows of the file, by column."""
+    """Return the rows of the file, by column."""
     with path(name).open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

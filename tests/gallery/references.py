@@ -1,4 +1,4 @@
-"""The gallery's mechanisms once more, by closed forms in 50 digits: no code and no joint of kinfmu has a part in it.
+"""Closed forms of the gallery's mechanisms in 50 digits, independent of kinfmu's joints and code.
 
 Each function takes the driven quantities as power series in time and returns every coordinate that is an output of the
 mechanism, by the names it has there; its dimensions are typed here once more. Rates and accelerations are terms of the
@@ -42,7 +42,7 @@ REFERENCES: dict[str, Reference] = {}
 
 
 def reference(first: int = 0, **laws: Law) -> Callable[[Callable[..., Coordinates]], Callable[..., Coordinates]]:
-    """Enter the function as the reference of the gallery's mechanism of its name."""
+    """Register the function as the reference of the gallery's mechanism of its name."""
 
     def enter(coordinates: Callable[..., Coordinates]) -> Callable[..., Coordinates]:
         REFERENCES[coordinates.__name__] = Reference(laws, coordinates, first)
@@ -249,7 +249,7 @@ def watt_six_bar(u: Series) -> Coordinates:
 
 @reference(output_angle=turning(90, 15))
 def stephenson_six_bar(u: Series) -> Coordinates:
-    """Stephenson III, driven at the output: the crank's angle is what Newton finds, all else are closed forms of it."""
+    """Stephenson III, driven at the output: Newton finds the crank's angle, all else are closed forms of it."""
     b, d = Vector(80, 0), Vector(110, 20)
 
     def chain(crank: Series) -> Coordinates:

@@ -1,4 +1,4 @@
-"""Long chains: blocks that are alike share code, what is not asked for is not solved, and nothing is dense."""
+"""Long chains: identical blocks share code, unused outputs are not solved, and no matrix is dense."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_each_link_of_an_open_chain_follows_from_the_one_before() -> None:
     np.testing.assert_allclose(run["end.ay"], -np.sin(phi).sum(axis=1), rtol=0, atol=1e-12)
 
 
-def test_alike_blocks_share_one_function() -> None:
+def test_identical_blocks_share_one_function() -> None:
     few, many = (emit(compile_plan(fourbar_chain(count))) for count in (80, 81))
     assert few.count("def position") == many.count("def position")
     assert "# 78 units of kind _4" in few
@@ -104,7 +104,7 @@ def test_the_gallery_gives_a_chain_of_any_length() -> None:
         kinfmu.load("fourbar_chain:many")
 
 
-def test_a_large_mechanism_that_does_not_assemble_in_order_is_told_why() -> None:
+def test_a_large_mechanism_that_does_not_assemble_in_order_is_reported_with_the_reason() -> None:
     chain = fourbar_chain(150)
     joints = (*chain.joints, Distance("brace", ("ground.O_0", "bar_150.P"), 150.0))
     with pytest.raises(AssemblyError, match=r"more than 900.*rows to spare: .*brace"):

@@ -24,7 +24,7 @@ def test_a_mechanism_of_the_gallery_has_its_folders_name_a_title_and_a_comment(n
     assert (gallery.folder() / name / "mechanism.toml").read_text(encoding="utf-8").startswith("# ")
 
 
-def test_a_name_that_is_not_there_suggests_one_that_is() -> None:
+def test_an_unknown_name_suggests_a_known_one() -> None:
     with pytest.raises(RequestError) as caught:
         kinfmu.load("forbar")
     assert str(caught.value) == (
@@ -45,7 +45,7 @@ def test_a_mechanism_is_loaded_from_a_file_by_text_or_path(tmp_path: Path) -> No
     assert kinfmu.load(other) == kinfmu.load(str(other)) == mechanism
 
 
-def test_saving_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+def test_saving_to_an_unwritable_path_is_an_error(tmp_path: Path) -> None:
     mechanism = kinfmu.load("fourbar")
     path = tmp_path / "none" / "mine.toml"
     with pytest.raises(MechanismError) as caught:
@@ -60,7 +60,7 @@ def test_a_saved_file_has_the_same_bytes_on_every_system(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("purpose", ["check", "solve", "build"])
-def test_a_name_where_a_mechanism_is_needed_is_told(purpose: str) -> None:
+def test_a_name_in_place_of_a_mechanism_is_refused(purpose: str) -> None:
     door = getattr(kinfmu, purpose)
     with pytest.raises(RequestError) as caught:
         door("fourbar")
@@ -71,7 +71,7 @@ def test_a_name_where_a_mechanism_is_needed_is_told(purpose: str) -> None:
         door({})
 
 
-def test_simulate_says_that_a_mechanism_is_built_first() -> None:
+def test_simulate_reports_that_a_mechanism_is_built_first() -> None:
     with pytest.raises(
         RequestError, match=r"^simulate steps an FMU; build\(mechanism\) makes one of mechanism 'fourbar'$"
     ):

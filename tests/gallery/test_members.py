@@ -1,4 +1,4 @@
-"""Every mechanism of the gallery: its folder is complete, and every way to its motion leads to the reference."""
+"""Every mechanism of the gallery: its folder is complete, and every engine and FMU agrees with the reference."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_every_mechanism_has_a_reference_and_every_reference_a_mechanism() -> No
 
 
 @every_member
-def test_the_folder_tells_what_the_mechanism_is(name: str) -> None:
+def test_the_folder_names_the_mechanism(name: str) -> None:
     page = (gallery.folder() / name / "README.md").read_text(encoding="utf-8")
     assert page.startswith(f"# {gallery.load(name).title}\n\n")
     assert len(page) > 300
@@ -51,7 +51,7 @@ def test_the_reference_holds_samples_of_the_run_and_every_output(name: str, memb
 
 
 @every_member
-def test_a_row_computed_anew_is_the_row_of_the_file(name: str, member: Callable[[str], Member]) -> None:
+def test_a_recomputed_row_equals_the_row_of_the_file(name: str, member: Callable[[str], Member]) -> None:
     drawn = random.Random(name).choice(member(name).reference)  # noqa: S311
     assert row(name, float(drawn["time"])) == drawn
 
@@ -96,9 +96,9 @@ def test_no_link_stretches_and_no_joint_opens_over_its_run(name: str, member: Ca
 
 
 def _largest_disagreement(run: Run, asked: Member) -> float:
-    """The largest |ours - reference| of all columns, each relative to its largest magnitude.
+    """Return the largest |ours - reference| of all columns, each relative to its largest magnitude.
 
-    Where a column is zero all along the largest of its kind stands in, and 1 where all of that kind are.
+    A column of zeros is taken relative to the largest column of its kind, or to 1 if all of that kind are zero.
     """
     np.testing.assert_allclose(run.t, asked.times, rtol=1e-12, atol=1e-12)
     assert run.good.all()
@@ -108,8 +108,8 @@ def _largest_disagreement(run: Run, asked: Member) -> float:
     largest = {name: max(map(abs, column)) for name, column in exact.items()}
 
     def scale(name: str) -> object:
-        alike = (value for other, value in largest.items() if _kind(other) == _kind(name))
-        return largest[name] or max(alike) or 1
+        same_kind = (value for other, value in largest.items() if _kind(other) == _kind(name))
+        return largest[name] or max(same_kind) or 1
 
     return max(
         float(abs(mp.mpf(float(ours)) - value) / scale(name))
@@ -137,7 +137,7 @@ def _inputs(asked: Member, path: Path) -> Path:
 
 
 def _largest_gap(joint: Joint, mechanism: Mechanism, run: Run) -> float:
-    """By how much a joint opens over a run; for pins and bars measured between the joined points themselves."""
+    """Return the largest gap of a joint over a run; for pins and bars the distance of the joined points."""
     if isinstance(joint, Revolute | Distance):
         (a_x, a_y), (b_x, b_y) = (_point(end, mechanism, run) for end in joint.between)
         length = joint.length if isinstance(joint, Distance) else 0.0
@@ -164,5 +164,5 @@ def _placement(mechanism: Mechanism, run: Run, k: int) -> Placement:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """The farthest that a point lies from its body's frame."""
+    """Return the largest distance of a point from the origin of its body's frame."""
     return max(float(np.hypot(*point)) for point in mechanism.body_points.values())

@@ -1,4 +1,4 @@
-"""Cams and couplings at work, against closed forms and 50 digits; what is told about wrong ones."""
+"""Cams and couplings compared with closed forms and 50 digits, and messages about wrong ones."""
 
 from __future__ import annotations
 
@@ -137,8 +137,8 @@ def test_an_oscillating_follower_swings_by_its_lift() -> None:
         assert largest_error(run[f"rocker.{name}"], column) < tolerance
 
 
-def test_a_cam_turns_against_what_holds_it() -> None:
-    """Carrier and cam turned together lift nothing."""
+def test_a_cam_turns_relative_to_its_holder() -> None:
+    """Turning carrier and cam together gives no lift."""
     mechanism = Mechanism(
         "carried",
         (
@@ -211,7 +211,7 @@ def test_an_eccentric_circle_moves_its_follower_like_a_fourbar() -> None:
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
 
 
-def test_a_gap_of_a_roller_is_its_way_to_the_pitch_curve_along_the_radius() -> None:
+def test_the_gap_of_a_roller_is_its_radial_distance_to_the_pitch_curve() -> None:
     joint = CamRoller("roller", ("cam.O", "follower.R"), Polynomial((1.25,)))
     (phi,) = joint.residual(placed({"cam": (0.0, 0.0, 0.4), "follower": (0.9, 1.2, 0.0)}))
     assert joint.gaps((phi,)) == pytest.approx((0.25,))
@@ -234,7 +234,7 @@ def placed(poses: dict[str, tuple[float, float, float]]) -> Any:
     ],
     ids=["coordinate", "position", "distance"],
 )
-def test_a_coupling_leads_any_measure_by_any_law(measure: Any, law: Law, way: Any) -> None:
+def test_a_coupling_relates_any_two_measures_by_any_law(measure: Any, law: Law, way: Any) -> None:
     run = kinfmu.solve(lifted(Coupling("screw", AngleBetween("cam"), measure, law)), cam_angle=u[:40])
     exact = rates([way(Series([angle, 1, 0])) for angle in u[:40]])
     for name, column, tolerance in zip(("y", "vy", "ay"), exact, (1e-13, 1e-13, 1e-12), strict=True):
@@ -258,7 +258,7 @@ def test_a_wheel_rolls_by_a_coupling_of_its_own_coordinate_and_angle() -> None:
 
 
 def test_a_coupling_of_a_coordinate_holds_far_from_the_origin_too() -> None:
-    """It depends on where the world's origin lies, so the plan keeps that origin."""
+    """The joint depends on the world's origin, so the plan keeps that origin."""
     far = Mechanism(
         "far",
         (
@@ -276,7 +276,7 @@ def test_a_coupling_of_a_coordinate_holds_far_from_the_origin_too() -> None:
     assert kinfmu.solve(far, cam_angle=[0.0, 3.0])["follower.y"] == pytest.approx([51.0, 52.5], abs=1e-13)
 
 
-def test_an_indexer_goes_on_turn_after_turn() -> None:
+def test_an_indexer_advances_turn_after_turn() -> None:
     law = MotionSequence((Segment("modified_sine", math.pi, math.pi / 4.0), Segment("dwell", math.pi)), repeat=True)
     index = Coupling("index", AngleBetween("cam"), AngleBetween("rocker", "ground"), law)
     run = kinfmu.solve(swung(index), cam_angle=[-0.1, 0.0, 3.2, 6.2, 12.5])
@@ -284,7 +284,7 @@ def test_an_indexer_goes_on_turn_after_turn() -> None:
     np.testing.assert_allclose(run["rocker.omega"], 0.0, atol=1e-14)
 
 
-def test_a_roller_that_starts_on_the_pole_is_told_and_nothing_fails() -> None:
+def test_a_roller_that_starts_on_the_pole_is_reported() -> None:
     mechanism = lifted(CamRoller("roller", ("cam.O", "follower.R"), Harmonic(0.25, 1.0, 1.25)))
     bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}, (0, 0, 0)))  # type: ignore[dict-item,arg-type]
     at_pole = Mechanism("cam", bodies, mechanism.joints, mechanism.drivers)
@@ -292,7 +292,7 @@ def test_a_roller_that_starts_on_the_pole_is_told_and_nothing_fails() -> None:
         kinfmu.solve(at_pole)
 
 
-def test_a_roller_whose_start_is_left_out_finds_its_way_off_the_pole() -> None:
+def test_a_roller_without_a_start_pose_is_assembled_away_from_the_pole() -> None:
     mechanism = lifted(CamRoller("roller", ("cam.O", "follower.R"), Harmonic(0.25, 1.0, 1.25)))
     bodies = (*mechanism.bodies[:2], Body("follower", {"R": (0, 0)}))  # type: ignore[dict-item]
     run = kinfmu.solve(Mechanism("cam", bodies, mechanism.joints, mechanism.drivers), cam_angle=[0.0, 0.5])
@@ -317,7 +317,7 @@ WRONG: dict[str, tuple[Joint, str]] = {
         CamOscillating("c", ("ground", "cam"), "cam", Cycloidal(1.0, 1.0)),
         "[joints.c] cam = 'cam' must be another body than the follower and what holds it",
     ),
-    "a law that cannot be meant": (
+    "an invalid law": (
         CamOscillating("c", ("ground", "follower"), "cam", SimpleHarmonic(1.0, 0.0)),
         "[joints.c] duration = 0.0 must be positive",
     ),
@@ -341,11 +341,11 @@ WRONG: dict[str, tuple[Joint, str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_cam_or_coupling_is_told(case: str) -> None:
-    joint, told = WRONG[case]
+def test_a_wrong_cam_or_coupling_is_refused(case: str) -> None:
+    joint, expected = WRONG[case]
     with pytest.raises(MechanismError) as caught:
         lifted(joint)
-    assert str(caught.value) == told
+    assert str(caught.value) == expected
 
 
 FILE = """name = "cam"
@@ -365,7 +365,7 @@ def joint_of(table: str) -> Joint:
     return parse(FILE + table).joints[0]
 
 
-def test_laws_of_cams_and_couplings_carry_the_units_of_what_they_lead_over_what_they_follow() -> None:
+def test_laws_of_cams_and_couplings_have_units_of_output_over_input() -> None:
     cam = 'type = "cam_translating"\nbetween = ["ground.O", "follower.R"]\ncam = "cam"\n'
     lead = 'law = "constant_speed"\nstart = "1 cm"\nspeed = "36 mm/rev"'
     joint = CamTranslating("c", ("ground.O", "follower.R"), "cam", ConstantSpeed(10.0, 36.0 / TURN))
@@ -389,7 +389,7 @@ def test_laws_of_cams_and_couplings_carry_the_units_of_what_they_lead_over_what_
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "expected"),
     [
         (
             'type = "coupling"\nlaw = "constant_speed"\noutput = 1',
@@ -430,7 +430,7 @@ def test_laws_of_cams_and_couplings_carry_the_units_of_what_they_lead_over_what_
     ],
     ids=lambda value: "" if "type" in value else value[11:40],
 )
-def test_a_wrong_table_of_a_cam_or_coupling_is_told(table: str, told: str) -> None:
+def test_a_wrong_table_of_a_cam_or_coupling_is_reported(table: str, expected: str) -> None:
     with pytest.raises(MechanismError) as caught:
         joint_of(table)
-    assert str(caught.value) == f"mechanism: {told}"
+    assert str(caught.value) == f"mechanism: {expected}"

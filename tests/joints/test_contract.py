@@ -1,4 +1,4 @@
-"""What every joint promises, over all members of JOINTS."""
+"""Contract of joints, tested for all members of JOINTS."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ ROUNDING = 1e-14
 
 @cache
 def moving(cls: type[Joint]) -> st.SearchStrategy[tuple[str, str]]:
-    """The two bodies that move, as points or as bodies after what the joint lies between."""
+    """Return the two moving bodies, as points or as names, as the joint's `between` needs them."""
     is_body = Reference("body") in get_type_hints(cls, include_extras=True)["between"].__metadata__
     pair = ("left", "right") if is_body else ("left.P", "right.Q")
     return st.sampled_from([pair, pair[::-1]])
 
 
 def closed(data: st.DataObject, cls: type[Joint], **given: st.SearchStrategy[Any]) -> tuple[System, FloatArray]:
-    """A drawn system in a pose where its joint holds."""
+    """Draw a system in a pose where its joint holds."""
     system = data.draw(systems(cls, **given))
     q, gap = close(system, data.draw(poses(system)), NO_DRIVERS)
     assume(gap <= CLOSED)
@@ -94,7 +94,7 @@ def test_the_jacobian_is_the_complex_step_derivative_of_the_residual(cls: type[J
 
 @every_joint
 @given(data=st.data())
-def test_the_jacobian_meets_only_the_bodies_that_the_joint_names(cls: type[Joint], data: st.DataObject) -> None:
+def test_the_jacobian_is_0_for_bodies_that_the_joint_does_not_name(cls: type[Joint], data: st.DataObject) -> None:
     system = data.draw(systems(cls))
     (joint,) = system.mechanism.joints
     jacobian = system.jacobian(data.draw(regular_poses(system)))
@@ -163,7 +163,7 @@ def test_derivatives_on_the_graph_are_the_jacobian(cls: type[Joint], data: st.Da
 def test_moving_both_bodies_together_keeps_a_closed_joint_closed(
     cls: type[Joint], data: st.DataObject, shift_x: float, shift_y: float, turn: float
 ) -> None:
-    """For joints between two bodies; what holds one body alone says where the world is."""
+    """For joints between two bodies; a joint on a single body depends on the world frame."""
     system, q = closed(data, cls, between=moving(cls))
     assume("ground" not in system.mechanism.joints[0].bodies())
     c, s = math.cos(turn), math.sin(turn)
@@ -200,7 +200,7 @@ def test_a_joint_that_is_not_between_two_bodies_says_that_it_is_absolute(cls: ty
 
 @pytest.mark.parametrize("cls", [cls for cls in JOINTS if cls not in SLANTED], ids=lambda cls: cls.type)
 @given(data=st.data(), outwards=st.sampled_from([1.0, -1.0]))
-def test_a_body_displaced_by_d_opens_a_row_by_d_times_its_scale(
+def test_a_body_displaced_by_d_gives_a_residual_of_d_times_the_scale(
     cls: type[Joint], data: st.DataObject, outwards: float
 ) -> None:
     system, q = closed(data, cls)

@@ -1,4 +1,4 @@
-"""The joints and drivers at work, against closed forms."""
+"""Mechanisms with each joint and driver, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_a_translational_joint_makes_a_slider_crank() -> None:
     [SlideDriver("ram", ("ground.slot", "block.S")), CoordinateDriver("ram", "block.S", "x")],
     ids=["slide", "coordinate"],
 )
-def test_driven_at_the_block_the_crank_goes_where_it_would_drive_it(driver: object) -> None:
+def test_driven_at_the_block_the_crank_follows_the_inverse_motion(driver: object) -> None:
     u = np.linspace(0.5, 2.5, 30)
     forwards = kinfmu.solve(crank_and_slider(), crank_angle=u)
     back = kinfmu.solve(
@@ -101,7 +101,7 @@ def test_a_cylinder_lifts_an_arm_by_the_law_of_cosines() -> None:
     assert limits.high == pytest.approx(3.0, abs=1e-10)
 
 
-def test_a_pin_in_a_slot_makes_a_quick_return() -> None:
+def test_a_pin_in_a_slot_gives_a_quick_return_mechanism() -> None:
     lever = Mechanism(
         "quick_return",
         [
@@ -141,7 +141,7 @@ def test_gears_on_a_moving_carrier_make_a_planetary() -> None:
     assert kinfmu.check(gears).mobility == 1
 
 
-def test_a_rack_goes_the_arc_that_its_pinion_rolls() -> None:
+def test_the_travel_of_a_rack_is_the_arc_length_rolled_by_the_pinion() -> None:
     rack = Mechanism(
         "rack",
         [

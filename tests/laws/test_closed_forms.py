@@ -1,4 +1,4 @@
-"""Rises against their textbook formulas with 50 digits: values, derivatives, ends, continuity, peaks."""
+"""Rises compared with their textbook formulas in 50 digits: values, derivatives, ends, continuity, peaks."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def modified_sine(x: Series) -> Series:
 
 
 def modified_trapezoid(x: Series) -> Series:
-    """Norton's five pieces, with their decimal constants as what they are."""
+    """Norton's five pieces, with their decimal constants in closed form."""
     a = 8 * pi / (2 + pi)  # 4.888124
     v = 2 / (2 + pi)  # 0.38898448
     b = a / (16 * pi * pi)  # 0.0309544
@@ -134,7 +134,7 @@ def test_the_second_half_mirrors_the_first(cls: type[Rise], x: float) -> None:
 
 
 @every_rise
-def test_a_rise_stands_still_before_and_after(cls: type[Rise]) -> None:
+def test_a_rise_is_at_rest_before_and_after(cls: type[Rise]) -> None:
     law = cls(rise=-3.0, duration=2.0, start=10.0, begin=1.0)
     for x in (-100.0, 0.0, math.nextafter(1.0, 0.0)):
         assert motion(law, x) == [10.0, 0.0, 0.0]
@@ -144,7 +144,7 @@ def test_a_rise_stands_still_before_and_after(cls: type[Rise]) -> None:
 
 @every_rise
 @pytest.mark.parametrize("x", BREAKS)
-def test_value_velocity_and_where_theory_says_so_acceleration_are_continuous(cls: type[Rise], x: float) -> None:
+def test_value_velocity_and_where_expected_acceleration_are_continuous(cls: type[Rise], x: float) -> None:
     orders = SMOOTH.get(cls, 2) if x in (0.0, 1.0) else 2
     for order in range(orders + 1):
         before, after = curve(cls.shape, order, math.nextafter(x, -1.0)), curve(cls.shape, order, x)
@@ -195,7 +195,7 @@ def test_a_polynomial_is_the_sum_of_its_powers(x: float, c: list[float]) -> None
 
 
 @given(x=st.floats(-3.0, 3.0), start=st.floats(-3.0, 3.0), speed=st.floats(-3.0, 3.0))
-def test_uniform_motion_and_what_is_external_are_lines(x: float, start: float, speed: float) -> None:
+def test_uniform_motion_and_external_laws_are_lines(x: float, start: float, speed: float) -> None:
     assert motion(ConstantSpeed(start, speed), x) == pytest.approx([start + speed * x, speed, 0.0], abs=1e-15)
     assert motion(External(start), x) == [start, 0.0, 0.0]
 

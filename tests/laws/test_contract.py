@@ -1,4 +1,4 @@
-"""What every law promises, over all members of LAWS."""
+"""Contract of laws, tested for all members of LAWS."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_a_traced_law_has_the_bits_of_the_formula_and_its_exact_derivatives(
 
 @every_law
 @given(data=st.data(), x=coordinates)
-def test_a_law_with_its_own_numbers_is_itself(cls: type[Law], data: st.DataObject, x: float) -> None:
+def test_a_law_with_its_own_numbers_is_equal(cls: type[Law], data: st.DataObject, x: float) -> None:
     law = data.draw(laws(cls))
     again = law.with_numbers({path: constant.value for path, constant in law.numbers().items()})
     assert again == law
@@ -102,7 +102,7 @@ def test_a_law_is_the_same_after_writing_and_reading(cls: type[Law], data: st.Da
 
 @pytest.mark.parametrize("cls", [*RISES, MotionSequence], ids=lambda cls: cls.type)
 @given(data=st.data())
-def test_numbers_that_must_be_positive_are_told(cls: type[Law], data: st.DataObject) -> None:
+def test_numbers_that_must_be_positive_are_checked(cls: type[Law], data: st.DataObject) -> None:
     law = data.draw(laws(cls))
     for path, (_, measures) in law.numbers().items():
         wrong = law.with_numbers({**{p: c.value for p, c in law.numbers().items()}, path: 0.0})
@@ -113,7 +113,7 @@ def test_numbers_that_must_be_positive_are_told(cls: type[Law], data: st.DataObj
 
 @st.composite
 def turning(draw: st.DrawFn) -> Law:
-    """Laws that come back after a turn."""
+    """Draw laws that are periodic over a turn."""
     spline = draw(splines("periodic"))
     first, width = spline.points[0][0], spline.points[-1][0] - spline.points[0][0]
     scaled = tuple((first + (x - first) * 2.0 * math.pi / width, u) for x, u in spline.points)
@@ -139,14 +139,14 @@ def turning(draw: st.DrawFn) -> Law:
 
 
 @given(law=turning(), x=coordinates)
-def test_a_law_that_comes_back_after_a_turn_says_so_and_does(law: Law, x: float) -> None:
+def test_a_law_declared_periodic_over_a_turn_is_periodic(law: Law, x: float) -> None:
     assert law.why_not_periodic() == ""
     assert law.at(x + 2.0 * math.pi) == pytest.approx(law.at(x), abs=1e-11)  # x + 2 pi is rounded, and slopes are steep
 
 
 @every_law
 @given(data=st.data())
-def test_a_time_for_which_a_law_has_no_value_is_outside(cls: type[Law], data: st.DataObject) -> None:
+def test_a_time_at_which_a_law_has_no_value_is_outside(cls: type[Law], data: st.DataObject) -> None:
     """Or has numbers, without an error of Python: phases and powers of such times overflow."""
     mechanism = driven(data.draw(laws(cls)))
     run = kinfmu.solve(mechanism, [mechanism.run.start, 1e300, -1e300, 1.7e308], engine="python")

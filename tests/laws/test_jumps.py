@@ -57,7 +57,7 @@ def test_there_is_an_example_of_every_law() -> None:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_laws_jump_where_they_say_and_nowhere_else(name: str) -> None:
+def test_laws_jump_only_at_the_arguments_they_declare(name: str) -> None:
     law = EXAMPLES[name]
     expected = EXPECTED.get(name, [])
     found = jumps(law)

@@ -36,7 +36,7 @@ UP_AND_DOWN = (
 WHOLE = 3.75
 
 
-def test_once_it_goes_through_its_segments_and_stays_where_they_lead() -> None:
+def test_a_single_sequence_runs_its_segments_and_stays_at_the_last_value() -> None:
     law = MotionSequence((*UP_AND_DOWN[:3], Segment("3-4-5", 2.0, -1.5)), start=10.0, begin=1.0)
     assert motion(law, -5.0) == [10.0, 0.0, 0.0]
     assert motion(law, 1.25) == [10.0, 0.0, 0.0]
@@ -50,7 +50,7 @@ def test_once_it_goes_through_its_segments_and_stays_where_they_lead() -> None:
 
 
 @given(x=st.floats(-20.0, 20.0))
-def test_repeated_it_is_periodic_before_its_begin_too(x: float) -> None:
+def test_a_repeated_sequence_is_periodic_before_its_begin_too(x: float) -> None:
     law = MotionSequence(UP_AND_DOWN, begin=1.0, repeat=True)
     once = MotionSequence(UP_AND_DOWN)
     since = (x - 1.0) % WHOLE
@@ -69,7 +69,7 @@ def test_a_break_belongs_to_the_segment_that_follows() -> None:
     assert motion(law, 1.0)[2] == pytest.approx(math.pi**2 / 8.0)
 
 
-def test_its_constants_are_named_by_the_number_of_the_segment() -> None:
+def test_constants_of_a_sequence_are_named_by_the_number_of_the_segment() -> None:
     law = MotionSequence(UP_AND_DOWN)
     names = ["start", "begin", "duration_1", "rise_2", "duration_2", "duration_3", "rise_4", "duration_4"]
     assert list(law.constants()) == names
@@ -109,7 +109,7 @@ TURN = 2.0 * math.pi
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_law_says_why_it_does_not_repeat_after_a_turn(law: Polynomial, why: str) -> None:
+def test_a_law_states_why_it_does_not_repeat_after_a_turn(law: Polynomial, why: str) -> None:
     assert law.why_not_periodic() == why
 
 

@@ -105,7 +105,7 @@ def test_not_a_knot_reproduces_a_cubic_and_natural_a_line() -> None:
 
 
 @pytest.mark.parametrize("ends", ["not_a_knot", "natural"])
-def test_outside_its_table_a_spline_stays_where_it_is_and_its_last_point_belongs_to_it(ends: str) -> None:
+def test_outside_its_table_a_spline_is_constant_and_the_last_point_belongs_to_the_table(ends: str) -> None:
     spline = Spline(((0.0, 1.0), (1.0, 2.0), (2.0, 5.0), (3.0, 4.0)), ends)
     assert motion(spline, -0.5) == [1.0, 0.0, 0.0]
     assert motion(spline, 3.5) == [4.0, 0.0, 0.0]
@@ -115,7 +115,7 @@ def test_outside_its_table_a_spline_stays_where_it_is_and_its_last_point_belongs
     assert motion(spline, math.nextafter(3.0, 4.0))[1] == pytest.approx(rate)  # as 30 * 0.1 would ask for it
 
 
-def test_a_spline_of_a_sine_comes_nearer_by_the_fourth_power() -> None:
+def test_a_spline_of_a_sine_converges_with_order_four() -> None:
     def error(count: int) -> float:
         points = tuple((2.0 * math.pi * k / count, math.sin(2.0 * math.pi * k / count)) for k in range(count))
         spline = Spline((*points, (2.0 * math.pi, 0.0)), "periodic")

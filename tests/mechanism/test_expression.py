@@ -1,4 +1,4 @@
-"""Expressions: Python's own arithmetic is the oracle for values, and what is wrong is told with its place."""
+"""Expressions: Python's own arithmetic is the oracle for values; errors state their place in the text."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ VALUES = {"a": 2.0, "b": -0.75, "long_name_2": 1e3}
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "asin", "acos", "atan2")}
 
 
-def told(text: str, values: dict[str, float] | None = None) -> str:
-    """The one line that is told about an expression."""
+def message_of(text: str, values: dict[str, float] | None = None) -> str:
+    """Return the message about a wrong expression."""
     with pytest.raises(MechanismError) as caught:
         Expression(text).value(VALUES if values is None else values)
     message = str(caught.value)
@@ -32,7 +32,7 @@ def told(text: str, values: dict[str, float] | None = None) -> str:
 
 
 def by_python(text: str) -> float:
-    """The value as Python computes it."""
+    """Return the value as Python computes it."""
     code = compile(ast.parse(text, mode="eval"), "expression", "eval")
     return float(eval(code, {"__builtins__": {}, "pi": math.pi, **FUNCTIONS, **VALUES}))  # noqa: S307  only in the test
 
@@ -67,7 +67,7 @@ def test_an_expression_has_the_value_that_arithmetic_gives(text: str) -> None:
 
 @st.composite
 def expressions(draw: st.DrawFn, depth: int = 3) -> str:
-    """Text of a random expression."""
+    """Draw the text of a random expression."""
     if depth == 0 or draw(st.booleans()):
         return draw(st.sampled_from(["a", "b", "long_name_2", "pi", "0.5", "3", "1e-2"]))
     one, other = draw(expressions(depth=depth - 1)), draw(expressions(depth=depth - 1))
@@ -85,7 +85,7 @@ def test_any_expression_has_the_value_that_arithmetic_gives(text: str) -> None:
     try:
         expected = by_python(text)
     except ZeroDivisionError:
-        assert "division by zero" in told(text)
+        assert "division by zero" in message_of(text)
     else:
         assert Expression(text).value(VALUES) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
@@ -99,7 +99,7 @@ def test_symbols_and_numbers_give_the_same_to_the_bit(text: str) -> None:
         (traced,) = evaluate([node], VALUES)
         direct = expression.value(VALUES)
     except (MechanismError, ZeroDivisionError):
-        return  # both paths are refused where the divisor is a constant zero; told elsewhere
+        return  # both paths are refused where the divisor is a constant zero; tested elsewhere
     assert traced == direct
 
 
@@ -114,7 +114,7 @@ def test_arrays_are_values_too() -> None:
     assert values.tolist() == [3.0, 5.0]
 
 
-def test_numbers_with_units_are_turned_into_those_used_inside() -> None:
+def test_numbers_with_units_are_converted_to_the_units_used_inside() -> None:
     assert Expression("2*a + 5 mm", "m").value({"a": 1.0}) == 2.005
     assert Expression("5mm + 1 cm", "mm").value({}) == 15.0
     assert Expression("sin(30 deg)").value({}) == pytest.approx(0.5, rel=1e-15)
@@ -127,7 +127,7 @@ def test_numbers_with_units_are_turned_into_those_used_inside() -> None:
     assert Expression("10 mm/a", "mm").value({"a": 2.0}) == 5.0
 
 
-def test_names_are_told_once_and_in_order() -> None:
+def test_names_of_an_expression_are_listed_once_and_in_order() -> None:
     assert Expression("b + a*b - pi + sin(c)").names == ("b", "a", "c")
 
 
@@ -185,22 +185,22 @@ MESSAGES = {
 
 
 @pytest.mark.parametrize("text", MESSAGES)
-def test_what_is_wrong_is_told_with_its_place(text: str) -> None:
-    assert told(text).replace('"', "'") == MESSAGES[text]
+def test_an_error_is_reported_with_its_place(text: str) -> None:
+    assert message_of(text).replace('"', "'") == MESSAGES[text]
 
 
 def test_long_and_deep_expressions_are_refused_quickly() -> None:
-    assert told("+".join("a" * LONGEST)).endswith(f"is too long for an expression; {LONGEST} characters at most")
+    assert message_of("+".join("a" * LONGEST)).endswith(f"is too long for an expression; {LONGEST} characters at most")
     deep = "(" * 400 + "a" + ")" * 400
-    assert told(deep).endswith(f"character {DEEPEST + 1}: parentheses more than {DEEPEST} deep")
-    assert told("sin(" * 200).endswith(f"parentheses more than {DEEPEST} deep")
+    assert message_of(deep).endswith(f"character {DEEPEST + 1}: parentheses more than {DEEPEST} deep")
+    assert message_of("sin(" * 200).endswith(f"parentheses more than {DEEPEST} deep")
     assert Expression("(" * DEEPEST + "a" + ")" * DEEPEST).value(VALUES) == 2.0
     assert Expression("-" * (LONGEST - 1) + "a").value(VALUES) == -2.0
     assert Expression("+".join("a" * (LONGEST // 2))).value(VALUES) == LONGEST
 
 
 @given(text=st.text(max_size=20))
-def test_any_text_is_an_expression_or_told_in_one_line(text: str) -> None:
+def test_any_text_is_an_expression_or_a_message_of_one_line(text: str) -> None:
     try:
         Expression(text).value(VALUES)
     except MechanismError as error:
@@ -256,7 +256,7 @@ def test_what_an_expression_measures_follows_from_its_parameters(text: str, quan
         ("sqrt(r) + r", "character 9: '+': length^1/2 and a length do not add up"),
     ],
 )
-def test_quantities_that_do_not_go_together_are_told(text: str, what: str) -> None:
+def test_incompatible_quantities_are_reported(text: str, what: str) -> None:
     with pytest.raises(MechanismError) as caught:
         Expression(text).dimension(DIMENSIONS)
     assert str(caught.value) == f"'{text}', {what}"

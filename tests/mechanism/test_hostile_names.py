@@ -1,4 +1,4 @@
-"""Names that mean something in C, in Python or in generated code: they change nothing but the names."""
+"""Names that have a meaning in C, in Python or in generated code do not change results."""
 
 from __future__ import annotations
 

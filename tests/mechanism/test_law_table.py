@@ -1,4 +1,4 @@
-"""Laws in mechanism files: units, tables from CSV, and what is told about those that cannot be meant."""
+"""Laws in mechanism files: units, tables from CSV, and messages about invalid ones."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def law_of(law: str, folder: str | Path = "") -> Law:
     return arm(law, folder).drivers[0].law
 
 
-def told(law: str, folder: str | Path = "") -> str:
-    """The one line that is told about a law, without file and table."""
+def message_of(law: str, folder: str | Path = "") -> str:
+    """Return the message about a wrong law, without file and table."""
     with pytest.raises(MechanismError) as caught:
         arm(law, folder)
     line = str(caught.value)
@@ -59,7 +59,7 @@ def told(law: str, folder: str | Path = "") -> str:
     return line.removeprefix("arm.toml: [drivers.ram]").strip()
 
 
-def test_numbers_of_a_law_carry_the_units_of_what_it_drives_and_of_time() -> None:
+def test_numbers_of_a_law_have_the_units_of_the_driven_quantity_over_time() -> None:
     assert law_of('law = "3-4-5"\nrise = "1 cm"\nduration = "500 ms"\nbegin = "1 min"') == Polynomial345(
         10.0, 0.5, begin=60.0
     )
@@ -89,21 +89,21 @@ def test_numbers_of_a_law_may_be_expressions_of_parameters() -> None:
     assert 'rise = "2*h", duration = "T"' in text(mechanism)
     higher = mechanism.with_parameters({"h": "2 cm"}).drivers[0].law
     assert higher.at(10.0) == 40.0
-    assert told('law = "cycloidal"\nrise = 1\nduration = "T - 2 s"\n[parameters]\nT = "2 s"') == (
+    assert message_of('law = "cycloidal"\nrise = 1\nduration = "T - 2 s"\n[parameters]\nT = "2 s"') == (
         "duration = 0.0 must be positive (duration = 'T - 2 s', T = 2.0)"
     )
 
 
-def test_a_table_comes_from_a_csv_file_beside_the_mechanism(tmp_path: Path) -> None:
+def test_a_table_is_read_from_a_csv_file_next_to_the_mechanism(tmp_path: Path) -> None:
     (tmp_path / "lift.csv").write_text("# measured\ntime [ms], lift [cm]\n0, 0\n\n500, 1\n1000, 2.5\n1500, 0\n")
     (tmp_path / "arm.toml").write_text(ARM + 'law = "spline"\nfile = "lift.csv"')
     mechanism = read(tmp_path / "arm.toml")
     assert mechanism.drivers[0].law == Spline(((0.0, 0.0), (0.5, 10.0), (1.0, 25.0), (1.5, 0.0)))
-    assert parse(text(mechanism)) == mechanism, "the table stands in the text itself"
+    assert parse(text(mechanism)) == mechanism, "the text itself holds the table"
 
 
 @pytest.mark.parametrize("mark", [",", ";", "\t"])
-def test_columns_are_parted_by_commas_semicolons_or_tabs_and_need_no_header(tmp_path: Path, mark: str) -> None:
+def test_columns_are_separated_by_commas_semicolons_or_tabs_and_need_no_header(tmp_path: Path, mark: str) -> None:
     rows = [(0.0, 0.0), (1.0, 2.0), (2.0, -1e-3), (3.0, 4.0)]
     (tmp_path / "a.csv").write_text("\ufeff" + "".join(f"{x}{mark}{u}\r\n" for x, u in rows), encoding="utf-8")
     assert law_of('law = "spline"\nfile = "a.csv"', tmp_path) == Spline(tuple(rows))
@@ -247,12 +247,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_law_is_told_in_one_line(case: str, tmp_path: Path) -> None:
+def test_a_wrong_law_is_reported_in_one_line(case: str, tmp_path: Path) -> None:
     law, line = WRONG[case]
     if line.endswith(" "):  # the rest is a long list
-        assert told(law, tmp_path).startswith(line)
+        assert message_of(law, tmp_path).startswith(line)
     else:
-        assert told(law, tmp_path) == line
+        assert message_of(law, tmp_path) == line
 
 
 @pytest.mark.parametrize(
@@ -286,18 +286,18 @@ def test_a_wrong_law_is_told_in_one_line(case: str, tmp_path: Path) -> None:
         "too large",
     ],
 )
-def test_what_is_wrong_in_a_csv_file_is_told_with_its_line(tmp_path: Path, content: bytes, line: str) -> None:
+def test_an_error_in_a_csv_file_is_reported_with_its_line(tmp_path: Path, content: bytes, line: str) -> None:
     (tmp_path / "a.csv").write_bytes(content)
-    assert told(f'{SPLINE}file = "a.csv"', tmp_path) == f"file = 'a.csv'{line}"
+    assert message_of(f'{SPLINE}file = "a.csv"', tmp_path) == f"file = 'a.csv'{line}"
 
 
-def test_an_empty_table_and_one_with_a_wrong_unit_are_told(tmp_path: Path) -> None:
+def test_an_empty_table_and_one_with_a_wrong_unit_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("")
     few = "points: 0 points are too few for ends = 'not_a_knot'; at least 4"
-    assert told(f'{SPLINE}file = "a.csv"', tmp_path) == few
+    assert message_of(f'{SPLINE}file = "a.csv"', tmp_path) == few
     (tmp_path / "a.csv").write_text("t [s], lift [deg]\n0, 0\n")
     wrong = "points = '0.0 deg': unit 'deg' must be one of m, mm, cm, um, km, in, ft"
-    assert told(f'{SPLINE}file = "a.csv"', tmp_path) == wrong
+    assert message_of(f'{SPLINE}file = "a.csv"', tmp_path) == wrong
 
 
 def test_laws_made_in_python_are_checked_by_the_mechanism() -> None:

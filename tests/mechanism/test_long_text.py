@@ -1,4 +1,4 @@
-"""Long texts: every pattern takes time in proportion to the text, and words with dots are no keys."""
+"""Long texts: every pattern takes time in proportion to the text, and words with dots are not keys."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ HOLDERS = {
 
 def _numbers(text: str) -> None:
     with pytest.raises(MechanismError):
-        number.written("x", text, Quantity("length"), "m")
+        number.read_number("x", text, Quantity("length"), "m")
 
 
 PATTERNS: dict[str, Callable[[str], object]] = {
@@ -69,7 +69,7 @@ REPEATED = (
 
 @pytest.mark.parametrize("repeated", REPEATED)
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_long_text_is_looked_through_in_less_than_a_second(pattern: str, repeated: str) -> None:
+def test_long_text_is_searched_in_less_than_a_second(pattern: str, repeated: str) -> None:
     for end in ("!", "a", "]"):
         began = time.process_time()
         PATTERNS[pattern]("a" + repeated * (LONG // len(repeated)) + end)
@@ -77,7 +77,7 @@ def test_long_text_is_looked_through_in_less_than_a_second(pattern: str, repeate
 
 
 @pytest.mark.parametrize("holder", HOLDERS)
-def test_words_with_dots_in_comments_and_texts_are_no_keys(holder: str) -> None:
+def test_words_with_dots_in_comments_and_texts_are_not_keys(holder: str) -> None:
     assert parse(f'name = "a"\n{HOLDERS[holder]}{BODY}').name == "a"
 
 
@@ -101,7 +101,7 @@ def test_messages_list_a_hundred_names_at_most() -> None:
         assert str(caught.value).endswith("in all)")
 
 
-def test_keys_of_few_parts_and_numbers_are_left_alone() -> None:
+def test_numbers_and_keys_of_few_parts_are_accepted() -> None:
     points = ", ".join(["[0.5, 0.25]"] * 200)
     text = f'name = "a"\nbodies.bar.points.P = [1.5, 0.5]\n[joints]\nx = {{ type = "nothing", points = [{points}] }}\n'
     with pytest.raises(MechanismError, match="type = 'nothing' is not known"):

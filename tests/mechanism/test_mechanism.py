@@ -21,8 +21,8 @@ GROUND = Body("ground", {"O": Point(0.0, 0.0)})
 BAR = Body("bar", {"P": Point(1.0, 0.0)})
 
 
-def told(*joints: Joint, **changes: Any) -> str:
-    """The one line that is told about a ground and a bar with these joints."""
+def message_of(*joints: Joint, **changes: Any) -> str:
+    """Return the message about a ground and a bar with these joints."""
     with pytest.raises(MechanismError) as caught:
         Mechanism(**{"name": "a", "bodies": (GROUND, BAR), "joints": joints, **changes})
     message = str(caught.value)
@@ -30,7 +30,7 @@ def told(*joints: Joint, **changes: Any) -> str:
     return message
 
 
-def test_the_ground_is_there_without_being_named() -> None:
+def test_the_ground_is_added_when_it_is_missing() -> None:
     assert Mechanism("a", (BAR,)).bodies == (Body("ground"), BAR)
 
 
@@ -58,25 +58,25 @@ def test_lists_of_members_become_tuples() -> None:
     assert mechanism == Mechanism("a", (GROUND, BAR), (Revolute("O", ("ground.O", "bar.P")),))
 
 
-def test_members_of_one_name_are_told() -> None:
+def test_members_with_the_same_name_are_refused() -> None:
     pin = Revolute("O", ("ground.O", "bar.P"))
-    assert told(pin, pin) == "[joints] 'O' is there twice"
-    assert told(bodies=(BAR, BAR)) == "[bodies] 'bar' is there twice"
-    assert told(drivers=(AngleDriver("m", "bar"), AngleDriver("m", "bar"))) == "[drivers] 'm' is there twice"
+    assert message_of(pin, pin) == "[joints] 'O' is there twice"
+    assert message_of(bodies=(BAR, BAR)) == "[bodies] 'bar' is there twice"
+    assert message_of(drivers=(AngleDriver("m", "bar"), AngleDriver("m", "bar"))) == "[drivers] 'm' is there twice"
 
 
 def test_points_of_a_joint_must_be_a_pair_of_names() -> None:
     two = "must be two points, ('body.point', 'body.point')"
-    assert told(Revolute("O", ["ground.O", "bar.P"])) == (  # type: ignore[arg-type]
+    assert message_of(Revolute("O", ["ground.O", "bar.P"])) == (  # type: ignore[arg-type]
         f"[joints.O] between = ['ground.O', 'bar.P'] {two}"
     )
-    assert told(Revolute("O", "ground.O")) == f"[joints.O] between = 'ground.O' {two}"  # type: ignore[arg-type]
-    assert told(Revolute("O", ("ground.O", 5))) == "[joints.O] between = 5 must be text"  # type: ignore[arg-type]
-    assert told(Coordinate("g", None, "x")) == "[joints.g] of = None must be text"  # type: ignore[arg-type]
+    assert message_of(Revolute("O", "ground.O")) == f"[joints.O] between = 'ground.O' {two}"  # type: ignore[arg-type]
+    assert message_of(Revolute("O", ("ground.O", 5))) == "[joints.O] between = 5 must be text"  # type: ignore[arg-type]
+    assert message_of(Coordinate("g", None, "x")) == "[joints.g] of = None must be text"  # type: ignore[arg-type]
 
 
 def test_an_axis_must_be_x_or_y() -> None:
-    assert told(Coordinate("guide", "bar.P", "z")) == "[joints.guide] axis = 'z' must be one of x, y"
+    assert message_of(Coordinate("guide", "bar.P", "z")) == "[joints.guide] axis = 'z' must be one of x, y"
 
 
 @pytest.mark.parametrize(
@@ -90,42 +90,44 @@ def test_an_axis_must_be_x_or_y() -> None:
         (None, "must be a number"),
     ],
 )
-def test_what_is_no_number_is_told_wherever_it_stands(value: Any, why: str) -> None:
+def test_a_value_that_is_not_a_number_is_reported_in_every_place(value: Any, why: str) -> None:
     def starts(message: str, where: str) -> bool:
         return message.startswith(f"{where} = {quoted(value)} {why}")
 
-    assert starts(told(Coordinate("g", "bar.P", "x", value)), "[joints.g] value")
-    assert starts(told(drivers=(AngleDriver("m", "bar", ConstantSpeed(0.0, value)),)), "[drivers.m] speed")
+    assert starts(message_of(Coordinate("g", "bar.P", "x", value)), "[joints.g] value")
+    assert starts(message_of(drivers=(AngleDriver("m", "bar", ConstantSpeed(0.0, value)),)), "[drivers.m] speed")
     if value is not None:  # None leaves a start coordinate to assembly
-        assert starts(told(bodies=(Body("bar", {}, Start(value)),)), "[bodies.bar] start.x")
+        assert starts(message_of(bodies=(Body("bar", {}, Start(value)),)), "[bodies.bar] start.x")
     with pytest.raises(MechanismError) as caught:
         RunSettings(stop=value)
     assert starts(str(caught.value), "[run] stop")
 
 
 @pytest.mark.parametrize("point", [(1.0,), (1.0, 2.0, 3.0), 1.0, "ab", None])
-def test_a_point_that_is_no_pair_of_numbers_is_told(point: Any) -> None:
+def test_a_point_that_is_not_a_pair_of_numbers_is_refused(point: Any) -> None:
     with pytest.raises(MechanismError) as caught:
         Body("bar", {"P": point})
     assert str(caught.value) == f"[bodies.bar] points.P = {quoted(point)} must be two numbers [x, y]"
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, 1e-200])
-def test_a_distance_without_a_positive_length_is_told_by_its_name(length: float) -> None:
-    message = told(Distance("AB", ("ground.O", "bar.P"), length))
+def test_a_distance_without_a_positive_length_is_reported_by_its_name(length: float) -> None:
+    message = message_of(Distance("AB", ("ground.O", "bar.P"), length))
     assert message == f"[joints.AB] length = {length!r} must be a positive number, 1e-30 or more"
 
 
-def test_text_without_a_unit_is_told_where_units_are_known() -> None:
+def test_text_without_a_unit_is_refused_where_units_exist() -> None:
     needed = "'1': text needs a unit, one of"
-    assert told(Coordinate("g", "bar.P", "x", "1")).startswith(f"[joints.g] value = {needed} m, mm")  # type: ignore[arg-type]
-    assert told(run=RunSettings(stop="1")).startswith(f"[run] stop = {needed} s, ms")  # type: ignore[arg-type]
+    assert message_of(Coordinate("g", "bar.P", "x", "1")).startswith(f"[joints.g] value = {needed} m, mm")  # type: ignore[arg-type]
+    assert message_of(run=RunSettings(stop="1")).startswith(f"[run] stop = {needed} s, ms")  # type: ignore[arg-type]
 
 
 def test_a_pair_of_bodies_must_be_two_bodies() -> None:
     two_points = Body("bar", {"P": Point(0.0, 0.0), "Q": Point(1.0, 0.0)})
-    assert told(Revolute("O", ("bar.P", "bar.Q")), bodies=(two_points,)) == "[joints.O] joins body 'bar' to itself"
-    assert told(Coordinate("g", "ground.O", "x")) == "[joints.g] acts on the ground only, which does not move"
+    assert (
+        message_of(Revolute("O", ("bar.P", "bar.Q")), bodies=(two_points,)) == "[joints.O] joins body 'bar' to itself"
+    )
+    assert message_of(Coordinate("g", "ground.O", "x")) == "[joints.g] acts on the ground only, which does not move"
 
 
 def test_values_are_quoted_on_one_line_as_toml_has_them() -> None:

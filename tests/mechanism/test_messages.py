@@ -1,4 +1,4 @@
-"""What is wrong in a mechanism file is told in one line: file, table, key, and what would be valid."""
+"""Messages about wrong mechanism files: one line with file, table, key, and what would be valid."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ FOURBAR = (gallery.folder() / "fourbar" / "mechanism.toml").read_text(encoding="
 
 
 def message(text: str) -> str:
-    """The one line that is told about a mechanism file with this text."""
+    """Return the message, of one line, for a mechanism file with this text."""
     with pytest.raises(MechanismError) as caught:
         parse(text, "arm.toml")
-    told = str(caught.value)
-    assert told.splitlines() == [told]
-    assert told.startswith("arm.toml: ")
-    assert len(told) < 400
-    return told.removeprefix("arm.toml: ")
+    line = str(caught.value)
+    assert line.splitlines() == [line]
+    assert line.startswith("arm.toml: ")
+    assert len(line) < 400
+    return line.removeprefix("arm.toml: ")
 
 
 def changed(old: str, new: str) -> str:
-    """The four-bar's file with one thing changed, in its first place."""
+    """Return the four-bar's file with the first occurrence of `old` replaced."""
     assert old in FOURBAR
     return FOURBAR.replace(old, new, 1)
 
@@ -43,7 +43,7 @@ LAWS = (
 LENGTHS = "m, mm, cm, um, km, in, ft"
 NAME_RULE = "must be letters, digits and underscores, no digit first, at most 100 in all"
 
-# what is changed, into what, and what is told
+# case: text in the file, its replacement, the message
 CHANGES = {
     "a table that is not known": (
         "[joints.O]",
@@ -324,38 +324,38 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("case", CHANGES)
-def test_a_change_is_told_in_one_line_with_table_key_and_what_would_be_valid(case: str) -> None:
-    old, new, told = CHANGES[case]
-    assert message(changed(old, new)) == told
+def test_an_error_is_one_line_with_table_key_and_valid_values(case: str) -> None:
+    old, new, expected = CHANGES[case]
+    assert message(changed(old, new)) == expected
 
 
 def test_coordinates_of_the_outputs_are_checked() -> None:
-    def told(value: str) -> str:
+    def outputs_message(value: str) -> str:
         return message(f"{FOURBAR}\n[outputs]\ncoordinates = {value}\n")
 
-    assert told('"most"') == "[outputs] coordinates = 'most' must be 'moving', 'all' or a list of names"
-    assert told("5") == "[outputs] coordinates = 5 must be 'moving', 'all' or a list of names"
-    assert told("[5]") == "[outputs] coordinates = 5 must be text such as 'crank.phi'"
-    assert told('["crank.x", "crank.x"]') == "[outputs] coordinates names a coordinate twice"
-    assert told('["crank.fi"]').startswith(
+    assert outputs_message('"most"') == "[outputs] coordinates = 'most' must be 'moving', 'all' or a list of names"
+    assert outputs_message("5") == "[outputs] coordinates = 5 must be 'moving', 'all' or a list of names"
+    assert outputs_message("[5]") == "[outputs] coordinates = 5 must be text such as 'crank.phi'"
+    assert outputs_message('["crank.x", "crank.x"]') == "[outputs] coordinates names a coordinate twice"
+    assert outputs_message('["crank.fi"]').startswith(
         "[outputs] coordinates: 'crank.fi' is no coordinate of this mechanism; did you mean 'crank.phi'?; "
         "coordinates: crank.x, crank.y, crank.phi, coupler.x"
     )
 
 
-def test_two_joints_of_one_name_are_told_with_the_line() -> None:
+def test_two_joints_with_the_same_name_are_reported_with_the_line() -> None:
     text = changed("[joints.P]", "[joints.O]")
     line = 1 + [k for k, line in enumerate(text.splitlines()) if line == "[joints.O]"][1]
     assert message(text) == f"not valid TOML: Cannot declare ('joints', 'O') twice (at line {line}, column 10)"
 
 
-def test_a_mechanism_of_the_ground_only_is_told() -> None:
-    told = "[bodies] has only the ground; a mechanism needs a body that can move"
-    assert message('name = "a"') == told
-    assert message('name = "a"\n[bodies.ground]\n') == told
+def test_a_mechanism_of_the_ground_only_is_refused() -> None:
+    expected = "[bodies] has only the ground; a mechanism needs a body that can move"
+    assert message('name = "a"') == expected
+    assert message('name = "a"\n[bodies.ground]\n') == expected
 
 
-def test_a_table_that_is_something_else_is_told() -> None:
+def test_a_value_in_place_of_a_table_is_refused() -> None:
     assert message('name = "a"\njoints = 1') == "joints = 1 must be a table [joints]"
     assert message('name = "a"\nbodies = "crank"') == "bodies = 'crank' must be a table [bodies]"
     assert message('name = "a"\n[[joints]]\nx = 1') == (
@@ -365,29 +365,29 @@ def test_a_table_that_is_something_else_is_told() -> None:
     assert message('name = "a"\n[bodies]\ncrank = 1') == "[bodies] crank = 1 must be a table [bodies.crank]"
 
 
-def test_an_empty_file_is_told_how_to_begin() -> None:
-    told = "name is missing; the first line should be such as name = 'fourbar'"
-    assert message("") == told
-    assert message("# nothing yet\n") == told
+def test_the_message_for_an_empty_file_shows_how_to_begin() -> None:
+    expected = "name is missing; the first line should be such as name = 'fourbar'"
+    assert message("") == expected
+    assert message("# nothing yet\n") == expected
 
 
-def test_what_is_not_toml_is_told_with_its_place() -> None:
+def test_invalid_toml_is_reported_with_its_place() -> None:
     assert message("name = \n") == "not valid TOML: Invalid value (at line 1, column 8)"
     assert message("name").startswith("not valid TOML: Expected '='")
     assert message(FOURBAR.replace("\n", "\r")).startswith("not valid TOML: ")
 
 
-def test_deep_nesting_is_told_and_does_not_overflow() -> None:
+def test_deep_nesting_is_refused_and_does_not_overflow() -> None:
     assert message("a = " + "[" * 100_000) == "not valid TOML: nested too deeply"
     assert message("name" + ".a" * 20 + " = 1").endswith("must be text")
     assert message("\nname" + ".a" * 1_000_000 + " = 1") == "not valid: a key of more than 50 parts (at line 2)"
 
 
-def test_a_number_of_thousands_of_digits_is_told() -> None:
+def test_a_number_of_thousands_of_digits_is_refused() -> None:
     assert message("name = " + "1" * 10_000) == "not valid TOML: a number has too many digits"
 
 
-def test_a_long_value_is_told_shortened() -> None:
+def test_a_long_value_is_shortened_in_the_message() -> None:
     assert re.fullmatch(r"name = 'a{40,}\.\.\.a{40,}' must be letters.*", message(f'name = "{"a" * 100_000}"'))
     assert message("name = [" + "1," * 100_000 + "]") == "name = [1, 1, 1, 1, 1, 1, ...] must be text"
 
@@ -401,20 +401,20 @@ def test_windows_line_ends_and_a_byte_order_mark_are_read(tmp_path: Path) -> Non
 def file_message(path: Path) -> str:
     with pytest.raises(MechanismError) as caught:
         read(path)
-    told = str(caught.value)
-    assert told.splitlines() == [told]
-    assert told.startswith(f"{path}: ")
-    return told.removeprefix(f"{path}: ")
+    line = str(caught.value)
+    assert line.splitlines() == [line]
+    assert line.startswith(f"{path}: ")
+    return line.removeprefix(f"{path}: ")
 
 
-def test_files_that_cannot_be_read_are_told(tmp_path: Path) -> None:
+def test_files_that_cannot_be_read_are_reported(tmp_path: Path) -> None:
     assert file_message(tmp_path / "none.toml") == "cannot be read (No such file or directory)"
     assert file_message(tmp_path) == "cannot be read (Is a directory)"
     assert file_message(tmp_path / ("long" * 1000)) == "cannot be read (File name too long)"
     assert file_message(tmp_path / "nul\0") == "cannot be read (embedded null byte)"
 
 
-def test_files_that_are_no_text_are_told(tmp_path: Path) -> None:
+def test_files_that_are_not_text_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "binary.toml"
     path.write_bytes(b"name = \xff")
     assert file_message(path) == "not a text file (byte 7 is not UTF-8)"
@@ -434,12 +434,12 @@ def test_a_file_too_large_is_not_read_to_its_end(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="this system has no /dev/zero")
-def test_a_device_without_an_end_is_told() -> None:
+def test_a_device_without_an_end_is_refused() -> None:
     assert file_message(Path("/dev/zero")).startswith("too large for a mechanism file")
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="everybody may read everything here")
-def test_a_file_without_permission_is_told(tmp_path: Path) -> None:
+def test_a_file_without_permission_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "locked.toml"
     path.write_text(FOURBAR)
     path.chmod(0)

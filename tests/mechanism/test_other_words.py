@@ -1,4 +1,4 @@
-"""Words of other programs and of drawings are answered with the ones that files take."""
+"""Messages about words of other programs and of drawings suggest the words that files accept."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from tests.analysis.test_design_notes import FOURBAR
         ('length = "mm"', 'length = "inch"', "in"),
     ],
 )
-def test_a_word_of_another_program_has_its_word_here(old: str, new: str, meant: str) -> None:
+def test_a_word_of_another_program_suggests_the_word_of_kinfmu(old: str, new: str, meant: str) -> None:
     with pytest.raises(MechanismError, match=rf"; did you mean '{meant}'\?"):
         parse(FOURBAR.replace(old, new), "fourbar.toml")
 
 
-def test_another_word_is_only_told_where_what_it_means_is_known() -> None:
+def test_another_word_is_suggested_only_where_its_meaning_is_known() -> None:
     assert suggestion("pin", ["crank", "coupler"]) == ""
     assert {suggestion(word, [meant]) for word, meant in OTHER_WORDS.items()} == {
         f"; did you mean '{meant}'?" for meant in OTHER_WORDS.values()

@@ -1,4 +1,4 @@
-"""Parameters: geometry that refers to them by name, in files and in Python, with other values, in other arithmetic."""
+"""Parameters: geometry refers to them by name, in files and in Python, with other values, in other arithmetic."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_file_with_parameters_has_its_numbers() -> None:
     assert mechanism.run == RunSettings(0.0, 10.0, 0.01)
 
 
-def test_parameters_keep_their_order_their_words_and_what_they_measure() -> None:
+def test_parameters_keep_their_order_description_and_quantity() -> None:
     parameters = parse(FOURBAR).parameters
     assert list(parameters) == ["tip", "crank", "ground", "rod", "ratio", "tilt", "turn"]
     assert parameters["ground"] == Parameter(101.6, Quantity("length"), "between the pivots")
@@ -85,7 +85,7 @@ def test_parameters_keep_their_order_their_words_and_what_they_measure() -> None
     assert parameters["turn"].quantity == Quantity("angle", 1)
 
 
-def test_expressions_are_known_by_place() -> None:
+def test_expressions_are_listed_by_path() -> None:
     expressions = parse(FOURBAR).expressions
     assert {place: expression.text for place, expression in expressions.items()} == {
         ("bodies", "ground", "points", "C", 0): "ground",
@@ -108,7 +108,7 @@ def test_a_parameter_keeps_the_unit_of_a_rate_over_a_length() -> None:
     assert parse(text(mechanism)) == mechanism
 
 
-def test_what_is_written_is_read_back_with_its_expressions() -> None:
+def test_a_written_mechanism_is_read_back_with_its_expressions() -> None:
     mechanism = parse(FOURBAR)
     again = parse(text(mechanism))
     assert again == mechanism
@@ -120,7 +120,7 @@ def test_what_is_written_is_read_back_with_its_expressions() -> None:
     assert 'ground = { value = "101.6 mm", description = "between the pivots" }' in text(mechanism)
 
 
-def test_python_says_the_same_as_a_file() -> None:
+def test_python_and_a_file_give_the_same_mechanism() -> None:
     mechanism = Mechanism(
         "fourbar",
         (
@@ -157,7 +157,7 @@ def test_a_number_and_an_expression_of_its_value_are_not_the_same() -> None:
     assert written("110.0") == written("110.0")
 
 
-def test_other_values_are_computed_again() -> None:
+def test_set_values_recompute_the_expressions() -> None:
     mechanism = parse(FOURBAR).with_parameters({"crank": "5 cm", "tilt": 0.25, "rod": "2*crank + 8 mm"})
     assert mechanism == parse(
         FOURBAR.replace("40 mm", "50 mm").replace('"30 deg"', '"0.25 rad"').replace("110.0", '"2*crank + 8 mm"')
@@ -166,7 +166,7 @@ def test_other_values_are_computed_again() -> None:
     assert mechanism.joints[2].length == 108.0  # type: ignore[attr-defined]
 
 
-def test_a_change_of_something_else_keeps_the_expressions() -> None:
+def test_replacing_another_field_keeps_the_expressions() -> None:
     mechanism = parse(FOURBAR)
     other = replace(mechanism, joints=(*mechanism.joints[:2], replace(mechanism.joints[2], length=90.0)), name="other")
     assert ("joints", "rod", "length") not in other.expressions
@@ -175,7 +175,7 @@ def test_a_change_of_something_else_keeps_the_expressions() -> None:
     assert moved.bodies[1].points["P"] == (50.0, 0.0)
 
 
-def test_another_unit_of_length_reads_expressions_anew() -> None:
+def test_another_unit_of_length_parses_expressions_again() -> None:
     mechanism = Mechanism("a", (Body("bar", {"P": ("a + 5 mm", 0)}),), length_unit="mm", parameters={"a": 1.0})
     assert mechanism.bodies[1].points["P"].x == 6.0
     assert replace(mechanism, length_unit="m").bodies[1].points["P"].x == 1.005
@@ -188,7 +188,7 @@ def test_copies_keep_the_expressions() -> None:
     assert again.expression == length.expression
 
 
-def test_the_members_are_there_in_any_arithmetic() -> None:
+def test_the_members_are_available_in_any_arithmetic() -> None:
     mechanism = parse(FOURBAR)
     graph = Graph()
     at = mechanism.at({"crank": graph.symbol("crank"), "tilt": graph.symbol("tilt")})
@@ -221,7 +221,7 @@ def test_a_tilted_guide_may_have_a_symbol_for_its_angle() -> None:
     assert value == pytest.approx(3.0 * math.cos(0.5) - 2.0 * math.sin(0.5), rel=1e-15)
 
 
-def test_the_plans_own_origin_moves_expressions_too() -> None:
+def test_the_origin_of_the_plan_shifts_expressions_too() -> None:
     far = FOURBAR.replace('C = ["ground", 0]', 'C = ["ground + 1000 m", 0]').replace("O = [0, 0], C", "O = [1e6, 0], C")
     far = far.replace('x = "ground"', 'x = "ground + 1000 m"').replace('phi = "2*tilt"', 'x = 1e6, phi = "2*tilt"')
     mechanism = parse(far)
@@ -246,7 +246,7 @@ def test_a_guide_that_holds_a_coordinate_moves_with_the_origin() -> None:
     assert local.with_parameters({"far": 1002.0}).joints[0].value == 3.0  # type: ignore[attr-defined]
 
 
-def test_a_solve_with_parameters_is_that_of_the_numbers() -> None:
+def test_solving_with_parameters_equals_solving_with_their_numbers() -> None:
     mechanism = parse(FOURBAR)
     numbers = parse(
         FOURBAR[: FOURBAR.index("[parameters]")]
@@ -264,8 +264,8 @@ def test_a_solve_with_parameters_is_that_of_the_numbers() -> None:
     assert one["rocker.phi"] == pytest.approx(other["rocker.phi"], abs=1e-13)
 
 
-def told(changes: dict[str, Any] | None = None, joint: Any = None) -> str:
-    """The one line that is told of a bar with these parameters."""
+def message_of(changes: dict[str, Any] | None = None, joint: Any = None) -> str:
+    """Return the message about a bar with these parameters."""
     joints = (joint,) if joint else ()
     bodies = (Body("ground", {"O": (0, 0)}), Body("bar", {"P": ("a", 0)}), Body("arm", {"Q": (0, 0)}))
     with pytest.raises(MechanismError) as caught:
@@ -311,13 +311,13 @@ WORDS = "sin, cos, tan, sqrt, asin, acos, atan2, pi"
         ),
     ],
 )
-def test_parameters_that_cannot_be_meant_are_told(parameters: dict[str, Any], what: str) -> None:
-    assert told(parameters) == what
+def test_invalid_parameters_are_refused(parameters: dict[str, Any], what: str) -> None:
+    assert message_of(parameters) == what
 
 
-def test_a_long_circle_is_told_shortened() -> None:
+def test_a_long_circle_is_shortened_in_the_message() -> None:
     circle = {f"p{k}": f"p{(k + 1) % 1000}" for k in range(1000)}
-    message = told(circle)
+    message = message_of(circle)
     assert message.startswith("[parameters] p")
     assert " -> ... -> p" in message
     assert len(message) < 200
@@ -329,21 +329,21 @@ def test_a_chain_of_thousands_of_parameters_is_computed() -> None:
     assert mechanism.parameters["p2999"].value == 3000.0
 
 
-def test_a_value_that_cannot_be_meant_is_told_with_its_expression() -> None:
+def test_an_invalid_value_is_reported_with_its_expression() -> None:
     rod = Distance("rod", ("ground.O", "bar.P"), "a - 2*b")  # type: ignore[arg-type]
-    assert told({"b": 1.0}, rod) == (
+    assert message_of({"b": 1.0}, rod) == (
         "[joints.rod] length = -1.0 must be a positive number, 1e-30 or more (length = 'a - 2*b', a = 1.0, b = 1.0)"
     )
     pair = Gear("pair", ("bar", "arm"), "a - 1")  # type: ignore[arg-type]
-    assert told({}, pair).startswith("[joints.pair] ratio = 'a - 1' is a length and must be a number")
-    assert told({"b": 1.0}, replace(pair, ratio="b - 1")) == (
+    assert message_of({}, pair).startswith("[joints.pair] ratio = 'a - 1' is a length and must be a number")
+    assert message_of({"b": 1.0}, replace(pair, ratio="b - 1")) == (
         "[joints.pair] ratio = 0.0 must be other than 0 (ratio = 'b - 1', b = 1.0)"
     )
 
 
-def test_a_place_tells_its_unknown_names() -> None:
+def test_the_message_of_an_unknown_name_names_its_place() -> None:
     guide = Coordinate("guide", "bar.P", "x", "2*b")  # type: ignore[arg-type]
-    assert told({}, guide) == "[joints.guide] value = '2*b', character 3: no parameter 'b'; parameters: a"
+    assert message_of({}, guide) == "[joints.guide] value = '2*b', character 3: no parameter 'b'; parameters: a"
 
 
 @pytest.mark.parametrize(
@@ -355,18 +355,18 @@ def test_a_place_tells_its_unknown_names() -> None:
         ("Y axis", 3, "'axis' where one of + - * / ** must stand"),
     ],
 )
-def test_words_in_the_place_of_a_number_are_told_what_is_measured_there(axis: str, character: int, what: str) -> None:
+def test_a_word_in_place_of_a_number_is_refused_with_the_quantity_needed(axis: str, character: int, what: str) -> None:
     slide = Translational("slide", ("ground.O", "bar.P"), axis)  # type: ignore[arg-type]
     needed = "[joints.slide] axis must be an angle, such as '60 deg'"
-    assert told({}, slide) == f"{needed}: '{axis}', character {character}: {what}"
+    assert message_of({}, slide) == f"{needed}: '{axis}', character {character}: {what}"
 
 
-def test_a_name_that_is_an_input_is_told() -> None:
+def test_a_parameter_with_the_name_of_an_input_is_refused() -> None:
     with pytest.raises(MechanismError, match=r"^\[parameters\] m_angle: driver 'm' has an input of this name already$"):
         Mechanism("a", (Body("bar"),), drivers=(AngleDriver("m", "bar"),), parameters={"m_angle": 1.0})
 
 
-def test_other_values_that_cannot_be_meant_are_told() -> None:
+def test_set_values_that_are_invalid_are_refused() -> None:
     mechanism = parse(FOURBAR)
 
     def changed(**values: Any) -> str:
@@ -387,7 +387,7 @@ def test_other_values_that_cannot_be_meant_are_told() -> None:
     assert changed(ratio="10 mm") == "[bodies.rocker] points.Q = '70 mm * ratio' is length^2 and must be a length"
 
 
-def test_constants_of_laws_are_changed_by_their_names_and_what_follows_is_not() -> None:
+def test_constants_of_laws_are_set_by_name_unless_computed() -> None:
     fixed = FOURBAR.replace('start = "2*tilt"', "start = 0.25")
     mechanism = parse(fixed)
     assert [constant.name for constant in mechanism.law_constants] == ["crank.start"]

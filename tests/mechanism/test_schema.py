@@ -1,4 +1,4 @@
-"""The JSON Schema of mechanism files: it is what editors see, and agrees with what the reader takes."""
+"""The JSON Schema of mechanism files agrees with what the reader accepts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from kinfmu.mechanism.toml_text import text
 from tests.mechanism.test_wrong_files import CHANGES, CRANK_ROCKER
 
 SCHEMA = Draft7Validator(schema())
-OF_SHAPE = {  # wrong files whose shape tells it, so that an editor can
+OF_SHAPE = {  # wrong files that the schema alone detects, so that an editor can report them
     "a key that is misspelt",
     "a table that is misspelt",
     "a table that is a list",
@@ -52,11 +52,11 @@ def test_the_committed_schema_is_current(golden: Callable[[str, str], None]) -> 
     golden("../../docs/mechanism.schema.json", schema_text())
 
 
-def test_it_is_a_schema_and_refers_to_what_it_defines() -> None:
+def test_the_schema_is_valid_and_refers_only_to_its_definitions() -> None:
     Draft7Validator.check_schema(schema())
     defined = set(schema()["definitions"])
-    told = set(schema_text().split('"#/definitions/')[1:])
-    assert {one.partition('"')[0] for one in told} <= defined
+    references = set(schema_text().split('"#/definitions/')[1:])
+    assert {one.partition('"')[0] for one in references} <= defined
 
 
 @pytest.mark.parametrize("name", gallery.names())
@@ -76,12 +76,12 @@ def test_wrong_files_do_not_fit_where_their_shape_is_wrong(case: str) -> None:
     assert SCHEMA.is_valid(document) == (case not in OF_SHAPE)
 
 
-def test_every_case_of_shape_is_there() -> None:
+def test_every_case_of_shape_exists() -> None:
     assert set(CHANGES) >= OF_SHAPE
 
 
 def values(cls: type, table: dict[str, Any]) -> dict[str, Any]:
-    """A table with a value that fits for each key that a class must have."""
+    """Add a valid value for each required key of a class to a table."""
     for key in keys_of(cls):
         if key.default is REQUIRED and key.takes != "law":
             table[key.name] = value(key.takes, key.refers.kind if key.refers else "", key.name)
@@ -145,7 +145,7 @@ def test_every_driver_has_its_table_with_every_law_in_the_schema(cls: Any, law: 
     assert not SCHEMA.is_valid(document | {"drivers": {"D": table | {"odd": 1}}})
 
 
-def test_a_table_from_a_file_stands_in_place_of_points() -> None:
+def test_a_table_from_a_file_replaces_the_points() -> None:
     def fits(**more: Any) -> bool:
         driver = {"type": "angle", "of": "rod", "law": "spline", **more}
         return SCHEMA.is_valid({"name": "a", "bodies": BODIES, "drivers": {"D": driver}})
@@ -164,13 +164,13 @@ def test_parameters_may_be_numbers_text_or_tables() -> None:
 
 
 @pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS, *MEASURES], ids=lambda cls: cls.__name__)
-def test_every_key_says_what_it_means(cls: Any) -> None:
+def test_every_key_has_a_meaning(cls: Any) -> None:
     assert summary_of(cls)
     for key in keys_of(cls):
         assert key.meaning, f"the docstring of {cls.__name__} says nothing of '{key.name}: '"
 
 
-def test_a_field_that_no_file_can_hold_is_told() -> None:
+def test_a_field_that_no_file_can_hold_is_an_error() -> None:
     from dataclasses import dataclass
 
     @dataclass
@@ -181,7 +181,7 @@ def test_a_field_that_no_file_can_hold_is_told() -> None:
         keys_of(Odd)
 
 
-def test_the_command_writes_it(tmp_path: Path) -> None:
+def test_the_command_writes_the_schema(tmp_path: Path) -> None:
     path = tmp_path / "mechanism.schema.json"
     result = CliRunner().invoke(main, ["schema", "-o", str(path)])
     assert result.exit_code == 0

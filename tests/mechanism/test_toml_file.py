@@ -1,4 +1,4 @@
-"""Mechanism files: what is written is read back, units are understood, and nothing but a MechanismError escapes."""
+"""Mechanism files: written mechanisms are read back, units are converted, every error is a MechanismError."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ titles = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp", "Cn
 
 @st.composite
 def parameters(draw: st.DrawFn) -> dict[str, Any]:
-    """Parameters in any order: numbers, text with units, and expressions of those drawn before."""
+    """Draw parameters in any order: numbers, text with units, and expressions of those drawn before."""
     found: dict[str, Any] = {}
     for name in draw(st.lists(names.filter(lambda name: name not in expression.WORDS), max_size=4, unique=True)):
         number = draw(st.floats(-1e6, 1e6))
@@ -48,13 +48,13 @@ def parameters(draw: st.DrawFn) -> dict[str, Any]:
 
 
 def _lengths(parameters: dict[str, Any]) -> list[str]:
-    """Names of those that may stand where a length is needed."""
+    """Return the names of the parameters that are valid where a length is needed."""
     return [name for name, value in parameters.items() if "deg" not in str(value)]
 
 
 @st.composite
 def mechanisms(draw: st.DrawFn) -> Mechanism:
-    """Mechanisms of one to three moving bodies in a row, with everything that a file can say."""
+    """Draw mechanisms of one to three moving bodies in a row, with every table that a file can hold."""
     numbered = draw(parameters())
     lengths = st.one_of(numbers, st.sampled_from(["5 mm + 1 m", "sqrt(2)*3 m", *_lengths(numbered)]))
     count = draw(st.integers(1, 3))
@@ -135,7 +135,7 @@ def test_a_title_of_characters_that_do_not_print_or_that_toml_uses_is_kept(title
 
 
 @pytest.mark.parametrize("title", ["\n", "\0", "\x1b[2J", "\u2028", "\ud800", "\uffff", "\x85", "\x7f"])
-def test_a_title_that_is_no_line_of_text_is_refused(title: str) -> None:
+def test_a_title_that_is_not_one_line_of_text_is_refused(title: str) -> None:
     with pytest.raises(MechanismError, match=r"^title = .* must be one line of text without control characters$"):
         replace(parse(FOURBAR), title=title)
 
@@ -153,10 +153,10 @@ def test_numpys_numbers_are_written_as_numbers() -> None:
     assert parse(text(mechanism)) == mechanism
 
 
-def test_units_are_turned_into_those_used_inside() -> None:
-    told = FOURBAR.replace('length = "m"', 'length = "mm"').replace("length = 1\n", 'length = "2.5 cm"\n')
-    told = told.replace("stop = 180", 'stop = "3 min"').replace('phi = "60 deg"', 'phi = "0.5 rev"')
-    mechanism = parse(told.replace('speed = "1 deg/s"', 'speed = "30 rpm"').replace("P = [1, 0]", 'P = ["1 in", 0]'))
+def test_units_are_converted_to_those_used_inside() -> None:
+    changed = FOURBAR.replace('length = "m"', 'length = "mm"').replace("length = 1\n", 'length = "2.5 cm"\n')
+    changed = changed.replace("stop = 180", 'stop = "3 min"').replace('phi = "60 deg"', 'phi = "0.5 rev"')
+    mechanism = parse(changed.replace('speed = "1 deg/s"', 'speed = "30 rpm"').replace("P = [1, 0]", 'P = ["1 in", 0]'))
     assert mechanism.joints[-1].length == 25.0  # type: ignore[attr-defined]
     assert mechanism.bodies[1].points["P"] == (25.4, 0.0)
     assert mechanism.bodies[1].start.phi == math.pi
@@ -170,7 +170,7 @@ def test_numbers_without_units_are_in_the_units_used_inside() -> None:
     assert mechanism.bodies[1].points["P"] == (1.0, 0.0)
 
 
-def test_what_is_not_said_is_the_default() -> None:
+def test_missing_keys_have_their_default() -> None:
     mechanism = parse('name = "a"\n[bodies.bar]\n')
     assert mechanism == Mechanism("a", (Body("ground"), Body("bar")))
     assert mechanism.run == RunSettings(0.0, 1.0, 0.01)
@@ -214,7 +214,7 @@ junk = st.recursive(
 
 
 def written(value: Any) -> str:
-    """Any tree as TOML."""
+    """Return any tree as TOML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{written(str(key))} = {written(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):
@@ -227,21 +227,21 @@ def written(value: Any) -> str:
 
 
 def parsed_or_told(text: str) -> None:
-    """A mechanism, or one line; anything else fails the test."""
+    """Parse to a mechanism, or to a message of one line; anything else fails the test."""
     try:
         mechanism = parse(text, "junk.toml")
     except MechanismError as error:
-        told = str(error)
-        assert told.splitlines() == [told]
-        assert told.isprintable()
-        assert told.startswith("junk.toml: ")
-        assert len(told) < 1000
+        message = str(error)
+        assert message.splitlines() == [message]
+        assert message.isprintable()
+        assert message.startswith("junk.toml: ")
+        assert len(message) < 1000
     else:
         assert isinstance(mechanism, Mechanism)
 
 
 def put(document: dict[str, Any], path: list[str], value: Any) -> None:
-    """Set what lies at a path, making tables on the way."""
+    """Set the value at a path; create missing tables."""
     for key in path[:-1]:
         inner = document.get(key)
         document[key] = inner = inner if isinstance(inner, dict) else {}
@@ -260,7 +260,7 @@ PATHS = all_paths(tomllib.loads(FOURBAR))
 
 @settings(max_examples=300)
 @given(document=st.dictionaries(keys, junk, max_size=5))
-def test_any_tree_of_values_gives_a_mechanism_or_one_line(document: dict[str, Any]) -> None:
+def test_any_tree_of_values_gives_a_mechanism_or_a_message_of_one_line(document: dict[str, Any]) -> None:
     parsed_or_told("\n".join(f"{written(key)} = {written(value)}" for key, value in document.items()))
 
 

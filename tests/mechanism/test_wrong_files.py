@@ -47,7 +47,7 @@ PIN_Q = 'Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }\n'
 DRIVER = 'crank = { type = "angle", of = "crank", law = "constant_speed", start = "60 deg", speed = "1 rad/s" }\n'
 POINT = '["crank", 0]'  # of the crank, by its parameter
 
-# what is changed, into what, and what the one line holds
+# case: text in the file, its replacement, part of the message
 CHANGES = {
     "a body that is missing": (
         '[bodies.rocker]\npoints = { C = [0, 0], Q = [3, 0] }\nstart = { x = 4, phi = "100 deg" }\n',
@@ -197,54 +197,54 @@ FILES = {
 
 
 def content(case: str) -> tuple[bytes, str]:
-    """What the file of a case holds, and what is told of it."""
+    """Return the content of the file of a case, and the expected part of the message."""
     if case in FILES:
         return FILES[case]
-    old, new, told = CHANGES[case]
+    old, new, expected = CHANGES[case]
     assert CRANK_ROCKER.count(old) >= 1
-    return CRANK_ROCKER.replace(old, new, 1).encode(), told
+    return CRANK_ROCKER.replace(old, new, 1).encode(), expected
 
 
-def test_the_file_that_is_changed_is_right(tmp_path: Path) -> None:
+def test_the_unchanged_file_is_right(tmp_path: Path) -> None:
     path = tmp_path / "right.toml"
     path.write_text(CRANK_ROCKER)
     assert CliRunner().invoke(main, ["check", str(path)]).exit_code == 0
 
 
 @pytest.mark.parametrize("case", [*CHANGES, *FILES])
-def test_a_wrong_file_is_told_in_one_line_that_names_the_place(case: str, tmp_path: Path) -> None:
+def test_a_wrong_file_is_reported_in_one_line_that_names_the_place(case: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
-    written, told = content(case)
+    written, expected = content(case)
     path.write_bytes(written)
     result = CliRunner().invoke(main, ["check", str(path)])
     assert isinstance(result.exception, SystemExit)
     assert result.exit_code == 1
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"kinfmu: {path}: ")
-    assert told in line
+    assert expected in line
     assert len(line) < 500 + len(str(path))
 
 
 @pytest.mark.parametrize("command", [["solve", "-o", "run.csv"], ["build"], ["simulate"]])
 @pytest.mark.parametrize("case", ["a body that is missing", "two drivers of one freedom", "lengths that do not close"])
-def test_every_command_tells_it_the_same_way(
+def test_every_command_reports_the_same_line(
     command: list[str], case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written, told = content(case)
+    written, expected = content(case)
     Path("wrong.toml").write_bytes(written)
     result = CliRunner().invoke(main, [command[0], "wrong.toml", *command[1:]])
     assert result.exit_code == 1
     (line,) = result.stderr.splitlines()
     assert line.startswith("kinfmu: wrong.toml: ")
-    assert told in line
+    assert expected in line
     assert [path.name for path in tmp_path.iterdir()] == ["wrong.toml"]
 
 
 @pytest.mark.parametrize("case", ["binary rubbish", "deep nesting", "a division by zero", "no driver"])
-def test_a_process_of_its_own_tells_it_too(case: str, tmp_path: Path) -> None:
+def test_a_separate_process_reports_the_same_line(case: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
-    written, told = content(case)
+    written, expected = content(case)
     path.write_bytes(written)
     done = subprocess.run(
         [sys.executable, "-W", "error", "-m", "kinfmu.cli", "check", str(path)],
@@ -256,7 +256,7 @@ def test_a_process_of_its_own_tells_it_too(case: str, tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert done.stderr.splitlines() == [done.stderr.rstrip("\n")]
-    assert told in done.stderr
+    assert expected in done.stderr
     assert "Traceback" not in done.stdout + done.stderr
 
 
@@ -267,7 +267,7 @@ def test_a_file_that_is_not_there_is_wrong_usage(arguments: list[str]) -> None:
     assert result.stderr.splitlines()[-1].startswith("Error: Invalid value for 'MECH': ")
 
 
-def test_memory_that_does_not_suffice_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_insufficient_memory_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def load(_: str) -> None:
         raise MemoryError
 

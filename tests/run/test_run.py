@@ -84,7 +84,7 @@ def test_a_fixed_coordinate_is_a_column_of_its_constant_that_stands_still(run: R
         ("solver.stat", "solver.status"),
     ],
 )
-def test_a_name_that_is_not_there_suggests_one_that_is(run: Run, name: str, meant: str) -> None:
+def test_an_unknown_name_suggests_a_known_one(run: Run, name: str, meant: str) -> None:
     with pytest.raises(KinfmuError) as caught:
         run[name]
     assert str(caught.value) == f"the run has no column '{name}'; did you mean '{meant}'?"
