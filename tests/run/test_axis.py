@@ -85,7 +85,7 @@ def test_any_values_have_an_axis(values: list[float]) -> None:
     assert axis.name == "crank"
     assert np.isfinite(axis.values).all()
     if max(values) > 1e9:
-        with pytest.raises(LogError, match=r"values of crank \[rad\] beyond 2.15e\+09 cannot be placed"):
+        with pytest.raises(LogError, match=r"^crank \[rad\]: a recording holds values of at most 2147483648$"):
             timeline_of([run])
 
 
@@ -135,7 +135,7 @@ def test_a_recording_counts_parts_of_the_drivers_unit(samples: int, name: str) -
 
 def test_runs_over_different_axes_are_not_compared(sweep: Run) -> None:
     over_time = kinfmu.solve(kinfmu.load("crank_rocker"), [0.0, 1.0])
-    with pytest.raises(LogError, match=r"the runs are over crank \[deg\] and t \[s\]: they can be compared over the"):
+    with pytest.raises(LogError, match=r"crank \[deg\] and t \[s\]; runs over the same axis can be compared"):
         timeline_of([sweep, over_time])
 
 
