@@ -1,6 +1,8 @@
-"""Units: what a number in a mechanism file may carry, and what every variable declares.
+"""Units: what a number in a mechanism file may carry, and what every variable declares. Names of variables.
 
 Lengths stay in the mechanism's own unit all the way through; angles are radians inside, and files may write degrees.
+Variables are named `<body>.x .y .phi`, their rates `.vx .vy .omega`, accelerations `.ax .ay
+.alpha`; points likewise.
 """
 
 from __future__ import annotations
@@ -103,3 +105,23 @@ def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
         for quantity in (Quantity("length"), Quantity("angle"), Quantity("time"), *rates)
         for unit, factor in factors(quantity, length_unit).items()
     }
+
+
+_DERIVATIVES = {"x": ("x", "vx", "ax"), "y": ("y", "vy", "ay"), "phi": ("phi", "omega", "alpha")}
+
+
+def derivative_name(name: str, order: int) -> str:
+    """'coupler.vx' of 'coupler.x' and order 1; order 0 is the name itself."""
+    owner, _, coordinate = name.rpartition(".")
+    return f"{owner}.{_DERIVATIVES[coordinate][order]}"
+
+
+def quantity_of(name: str, order: int = 0, per: str = "time") -> Quantity:
+    """What a coordinate such as 'coupler.x' or 'coupler.phi' measures, or its derivative of the given order."""
+    return Quantity("angle" if name.endswith(".phi") else "length", order, per)
+
+
+def is_coordinate(name: str) -> bool:
+    """Return True for a name such as 'coupler.x'."""
+    owner, _, coordinate = name.rpartition(".")
+    return bool(owner) and coordinate in _DERIVATIVES

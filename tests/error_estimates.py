@@ -21,9 +21,9 @@ import numpy as np
 import kinfmu
 from kinfmu import AngleDriver, ConstantSpeed, Mechanism, SlideDriver
 from kinfmu.drivers import Driver
-from kinfmu.naming import derivative_name
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
+from kinfmu.units import derivative_name
 from tests.gallery import geometry
 from tests.gallery.references import REFERENCES
 from tests.power_series import Series, mp

@@ -22,7 +22,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, PointOnLine, Revolute, Run, SlideDriver, Translational
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from kinfmu.naming import derivative_name
+from kinfmu.units import derivative_name
 from tests.gallery import geometry
 from tests.oracle import mp
 from tests.power_series import Series, sqrt

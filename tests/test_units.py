@@ -7,16 +7,17 @@ from fractions import Fraction
 
 import pytest
 
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.units import (
     METRES,
     Quantity,
+    derivative_name,
     display_units,
     every_unit,
     factors,
     in_turns,
     looks_like_degrees,
     quantity_in,
+    quantity_of,
     unit_of,
 )
 

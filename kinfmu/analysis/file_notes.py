@@ -1,16 +1,24 @@
-"""What in a mechanism file is hardly meant, although nothing forbids it."""
+"""Notes of what in a mechanism file is hardly meant: in its numbers, in the run it asks for, in its start poses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
+from kinfmu.analysis.singular import DriverRange
+from kinfmu.analysis.written import written
 from kinfmu.drivers import AngleDriver, DistanceDriver
+from kinfmu.equations.assembly import start_from_poses, start_values
+from kinfmu.equations.system import System
 from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.members import NumberPath, path_text
+from kinfmu.plan import SolvePlan
+from kinfmu.sweep import solve
 from kinfmu.units import Quantity, looks_like_degrees
 
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a whole turn may be meant
@@ -65,3 +73,44 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
                 f"[joints.{joint.name}] law: {why}; "
                 f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
             )
+
+
+_LARGE = 600  # coordinates of a mechanism whose run with several drivers is left unlooked at
+
+
+def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
+    """One line where the file's run takes its driver past a limit, or several drivers where the mechanism cannot go."""
+    mechanism = plan.mechanism
+    times = np.linspace(mechanism.run.start, mechanism.run.stop, _LOOKS)
+    if len(mechanism.drivers) == 1 and ranges:
+        (driver,) = mechanism.drivers
+        values = [float(driver.law.at(t)) for t in times.tolist()]
+        low, high = (
+            end if limit is None else limit for end, limit in ((-math.inf, ranges[0].low), (math.inf, ranges[0].high))
+        )
+        if min(values) < low or max(values) > high:
+            ends = (values[0], values[-1])
+            way = ends if {min(values), max(values)} == set(ends) else (min(values), max(values))
+            asked = " to ".join(written(u, mechanism.length_unit, driver.quantity.kind) for u in way)
+            yield f"[run] takes {driver.name} from {asked}: beyond the range"
+    elif len(mechanism.drivers) > 1 and len(mechanism.coordinate_names) <= _LARGE:
+        for event in solve(plan, times).events[:1]:
+            yield f"[run] at t = {event.t:.6g} s: {event.text}"
+
+
+def start_notes(system: System) -> Iterator[str]:
+    """Yield one line if the mechanism was assembled at the start of the laws in place of the start poses' values."""
+    values = start_values(system)
+    if not values.is_moved:
+        return
+    given, unit = start_from_poses(system).u, system.mechanism.length_unit
+    changed = [
+        (driver.name, written(there, unit, driver.quantity.kind), written(start, unit, driver.quantity.kind))
+        for driver, there, start in zip(system.mechanism.drivers, given.tolist(), values.u.tolist(), strict=True)
+        if there != start
+    ]
+    yield (
+        f"the start poses give {listed(f'{name} = {there}' for name, there, _ in changed)}; the law starts at "
+        f"{listed(f'{name} = {start}' for name, _, start in changed)}, which cannot be reached from there: "
+        "the mechanism is assembled at the start of the law"
+    )

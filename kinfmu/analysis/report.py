@@ -8,14 +8,12 @@ from typing import Any
 from kinfmu.analysis.assemblies import Assemblies, find_assemblies
 from kinfmu.analysis.design_notes import motion_notes, part_notes
 from kinfmu.analysis.drivers import DriverAdvice, better_told, driver_advice
-from kinfmu.analysis.file_notes import file_notes
+from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import Matrix
 from kinfmu.analysis.named import NamedLoop, find_named
 from kinfmu.analysis.pose_matrices import pose_matrices
-from kinfmu.analysis.run_notes import run_notes
 from kinfmu.analysis.singular import DriverRange, SingularPoint, driver_range
-from kinfmu.analysis.start_notes import start_notes
 from kinfmu.analysis.text import lines
 from kinfmu.analysis.way import follow
 from kinfmu.equations.redundancy import DependentRow, Redundancy, find_redundancy

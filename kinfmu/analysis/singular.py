@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from kinfmu.analysis.limits import parting
+import numpy as np
+
 from kinfmu.analysis.way import Way
+from kinfmu.equations.system import System
+from kinfmu.plan import localized
 from kinfmu.solver.python import Pose
 from kinfmu.solver.python.advance import NO_BLOCK, Limit
 from kinfmu.solver.python.bridge import Bridge
@@ -158,3 +161,25 @@ def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
         value -= period if period - value < 1e-9 else 0.0
         kept.setdefault(round(value * 1e7), replace(point, value=value))
     return sorted(kept.values(), key=lambda point: point.value)
+
+
+_MOVES = 1e-3  # of the largest motion; a body that moves less stands still
+_MOST_COORDINATES = 600  # coordinates; the singular values of more take too long
+
+
+def parting(way: Way, at_limit: dict[str, float]) -> tuple[str, ...]:
+    """Names of the bodies that move in the null direction of Phi_q at a limit pose, in file order.
+
+    at_limit: all coordinates by name. Empty for a mechanism too large to tell.
+    """
+    if len(at_limit) > _MOST_COORDINATES:
+        return ()
+    local, origin = localized(way.plan.mechanism)
+    system = System(local)
+    offset = {"x": origin.x, "y": origin.y, "phi": 0.0}
+    q = np.array([at_limit[name] - offset[name.rpartition(".")[2]] for name in system.coordinates])
+    free = np.linalg.svd(system.scaled_jacobian(q))[2][-1]  # (n,)
+    moves = np.abs(free).reshape(-1, 3).max(axis=1)
+    return tuple(
+        body.name for body, most in zip(local.moving_bodies, moves, strict=True) if most > _MOVES * moves.max()
+    )

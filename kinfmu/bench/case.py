@@ -14,12 +14,12 @@ from kinfmu.codegen.python import load_model
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.system import System
 from kinfmu.mechanism import Mechanism
-from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector
 from kinfmu.sweep import run_times
+from kinfmu.units import derivative_name
 
 STEPS_BETWEEN = 5  # steps of a sweep from one sample of the reference to the next
 

@@ -15,7 +15,7 @@ from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import FmuError
 from kinfmu.fmu.build import build
 from kinfmu.mechanism import Mechanism
-from kinfmu.naming import derivative_name
+from kinfmu.units import derivative_name
 
 STEPS = 720  # in a round, of one degree each: whole turns
 ROUNDS = 60

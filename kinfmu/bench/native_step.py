@@ -18,7 +18,7 @@ from kinfmu.fmu import description
 from kinfmu.fmu.build import build
 from kinfmu.fmu.native.archive import OPTIMIZED
 from kinfmu.mechanism import Mechanism
-from kinfmu.naming import derivative_name
+from kinfmu.units import derivative_name
 
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40

@@ -12,7 +12,7 @@ from kinfmu import gallery
 from kinfmu.cli.files import beside, exists, missing
 from kinfmu.cli.tell import note
 from kinfmu.errors import listed, suggestion
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import ANGLES, Quantity, factors, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from kinfmu.cli.arguments import along, names_in
 from kinfmu.cli.files import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import RequestError, listed
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 
 if TYPE_CHECKING:
     from kinfmu.run import Run

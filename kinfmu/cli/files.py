@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kinfmu.errors import listed, suggestion
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 
 
 class InputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only

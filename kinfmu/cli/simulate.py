@@ -18,7 +18,7 @@ from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, set
 from kinfmu.cli.tell import tell_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError, RequestError
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 
 LOGS = Path("logs")
 

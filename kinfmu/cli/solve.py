@@ -16,7 +16,7 @@ from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
 from kinfmu.cli.tell import note, tell_of, warn
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:

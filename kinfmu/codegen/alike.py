@@ -13,9 +13,9 @@ from itertools import groupby
 from typing import NamedTuple
 
 from kinfmu.equations.graph import Graph, Node, reachable, symbols
-from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
+from kinfmu.units import derivative_name
 
 RateOf = Callable[[str, int], str]  # name of a coordinate's or driver value's derivative of an order
 

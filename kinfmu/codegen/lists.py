@@ -7,13 +7,27 @@ their positions, x1 their rates, x2 their accelerations.
 from __future__ import annotations
 
 from kinfmu.codegen.alike import Run, runs_of
-from kinfmu.codegen.parametric import parametric
 from kinfmu.equations.graph import Node
-from kinfmu.naming import derivative_name
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.trace import parameter_symbol
+from kinfmu.plan.trace import is_parameter, parameter_symbol
+from kinfmu.units import derivative_name
 
 LISTS = ("x", "x1", "x2")  # coordinates, their rates, their accelerations
+
+
+def parametric(plan: SolvePlan) -> tuple[set[Node], list[Node]]:
+    """Operations that depend on parameters alone, and those of them that others are made of, or outputs."""
+    depends: dict[Node, bool] = {}  # on parameters alone
+    for node in plan.nodes:
+        if node.op == "symbol":
+            depends[node] = is_parameter(node)
+        elif node.op != "constant":
+            on = [arg for arg in node.args if arg.op != "constant"]
+            depends[node] = bool(on) and all(depends[arg] for arg in on)
+    alone = {node for node, is_alone in depends.items() if is_alone and node.args}
+    used = [arg for node in plan.nodes if node not in alone for arg in node.args]
+    used += [*plan.fixed_nodes.values(), *(motion.position for motion in plan.outputs_motion)]
+    return alone, list(dict.fromkeys(node for node in used if node in alone))
 
 
 class Lists:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
 from kinfmu.draw.links import links, shortest
 from kinfmu.draw.mark import Mark
@@ -19,10 +18,10 @@ from kinfmu.draw.motion import Cylinder, motion
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
 from kinfmu.draw.slides import rails, slots_and_blocks
-from kinfmu.draw.wheels import racks, wheels
+from kinfmu.draw.wheels import cams, racks, wheels
 from kinfmu.draw.writing import house_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME

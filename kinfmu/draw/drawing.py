@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinfmu.draw.cams import cams
 from kinfmu.draw.ground import supports
 from kinfmu.draw.instant import instant, pose_note
 from kinfmu.draw.links import links, shortest
@@ -16,7 +15,7 @@ from kinfmu.draw.names import place
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
 from kinfmu.draw.slides import rails, slots_and_blocks
-from kinfmu.draw.wheels import MeshName, racks, wheels
+from kinfmu.draw.wheels import MeshName, cams, racks, wheels
 from kinfmu.draw.writing import write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational

@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.draw.chart import SMALL, dress
-from kinfmu.draw.sheet import FONT, GREY, INCH, INK, ink
-from kinfmu.draw.title import TITLE_FONT, TITLE_LINE, title_lines
+from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import Axis, axis_of
 from kinfmu.run.channels import coordinates
 from kinfmu.scene import palette
 from kinfmu.scene.shown import ROUND_OFF, shown_range
-from kinfmu.units import unit_of
+from kinfmu.units import derivative_name, quantity_of, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""Gears and belts as pitch circles, racks with their pinions."""
+"""Gears and belts as pitch circles, racks with their pinions, cams with their rollers."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from kinfmu.draw.names import Name
 from kinfmu.draw.sheet import PAPER, Sheet, box
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
+from kinfmu.scene.cams import CamShape, cam_shapes
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.wheels import WheelShape, gear_pairs, rack_pairs
 
@@ -127,3 +128,34 @@ def racks(shown: Instant) -> list[Mark]:
 
 def _wheel(shown: Instant, wheel: WheelShape, *, filled: bool = True) -> Wheel:
     return Wheel(wheel.centre, wheel.radius, shown.angle(wheel.body), shown.colour(wheel.body), filled)
+
+
+@dataclass(frozen=True, eq=False)
+class Disc(Mark):
+    """A cam in its body's colour, and its roller."""
+
+    shape: CamShape
+    colour: palette.Colour
+
+    def extent(self) -> FloatArray:
+        roller, radius = self.shape.roller, self.shape.radius
+        return np.vstack([self.shape.pitch, roller - radius, roller + radius])
+
+    def draw(self, sheet: Sheet) -> list[Name]:
+        edge = palette.darker(self.colour)
+        light = palette.lighter(palette.lighter(self.colour))
+        shape, grey = self.shape, palette.darker(palette.GROUND)
+        sheet.line(shape.profile, 1.2, edge, closed=True, fill=light, matters=1.0)
+        sheet.line(shape.pitch, 0.7, edge, closed=True, style=DASHES, matters=0.3)
+        sheet.circle(shape.roller, shape.radius, 1.0, grey, fill=PAPER, matters=0.8)
+        return []
+
+
+def cams(shown: Instant) -> list[Mark]:
+    """All cams whose pitch curve is known."""
+    shapes = cam_shapes(shown)
+    return [
+        mark
+        for shape in shapes
+        for mark in (Disc(shape, shown.colour(shape.cam)), MeshName(shape.joint, shape.contact))
+    ]

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed."""
+"""Files that appear whole or not at all: written next to the target under a hidden name, then renamed; suffixes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 from uuid import uuid4
 
 try:
@@ -104,3 +104,8 @@ def _alone_in(folder: Path) -> Iterator[None]:
     finally:
         if descriptor >= 0:
             os.close(descriptor)
+
+
+def suffix_of(path: str | PurePath) -> str:
+    """'.mcap' of 'run.mcap' and of 'RUN.MCAP'; '' if a name has no suffix."""
+    return PurePath(path).suffix.lower()

@@ -8,8 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from kinfmu.errors import CompilerError, FmuError, RequestError, listed, suggestion
-from kinfmu.files.suffix import suffix_of
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files.whole_file import suffix_of, write_whole
 from kinfmu.fmu.description import FmiVersion
 from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.laws import External

@@ -11,9 +11,8 @@ from kinfmu.errors import FmuError
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism, RunSettings
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.solver.python.status import Status
-from kinfmu.units import Quantity, display_units, unit_of
+from kinfmu.units import Quantity, derivative_name, display_units, quantity_of, unit_of
 
 if TYPE_CHECKING:
     from kinfmu.plan import SolvePlan

@@ -41,7 +41,7 @@ CAPABILITIES = {
     "canSerializeFMUstate": True,
     "providesDirectionalDerivative": False,  # as does it for derivatives of any kind
 }
-RUN_TIME = ("slave.py", "layout.py", "fetch.py", "estimated_rates.py", "hold.py")  # of this room
+RUN_TIME = ("slave.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source")
 
@@ -57,9 +57,8 @@ An FMU of the same mechanism that needs none of this is the native one: kinfmu b
 
 _ENTRY = '''"""The slave of the FMU '{name}'."""
 
-from {package}.fmu.hold import hold
 from {package}.fmu.layout import Layout, PartLayout
-from {package}.fmu.slave import MechanismSlave
+from {package}.fmu.slave import MechanismSlave, hold
 from {package}.solver import model
 
 hold(globals())

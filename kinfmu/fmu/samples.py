@@ -16,7 +16,7 @@ from kinfmu.fmu.slaves import Slave
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
-from kinfmu.run.sink import Sink
+from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
 
 PIECE = 1024 * 1024  # [bytes] of a run passed to a sink at once, or fewer after PERIOD

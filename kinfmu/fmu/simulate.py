@@ -6,9 +6,12 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +20,8 @@ from kinfmu.errors import FmuError, MechanismError, RequestError, listed, sugges
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.input_notes import input_notes, undriven
-from kinfmu.fmu.input_table import InputTable, input_table
+from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undriven
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.fmu.interrupt import Interruption
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
@@ -28,7 +29,7 @@ from kinfmu.mechanism import Mechanism, RunSettings, toml_file
 from kinfmu.mechanism.number import read_constant
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.run.channels import kept_samples
-from kinfmu.run.sink import Sink
+from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
 from kinfmu.units import quantity_in
 
@@ -288,3 +289,46 @@ def _step_through(
             if slave.counts()[0] > Status.BRIDGED:  # what the step asked for lies out of reach
                 samples.read(end, slave)
             return
+
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))  # no SIGHUP on Windows
+
+
+class Interruption:
+    """Notes Ctrl-C, SIGTERM and SIGHUP in a `with` block; true once one came.
+
+    A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Ignored signals stay ignored. Outside
+    the main thread, where Python does not deliver signals, nothing is changed.
+    """
+
+    def __init__(self) -> None:
+        self.came: list[int] = []  # signals, in order
+        self._before: dict[int, Any] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self.came)
+
+    def __enter__(self) -> Interruption:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, *ENDING):
+                before = signal.getsignal(number)
+                if number == signal.SIGINT or before not in (signal.SIG_IGN, None):
+                    self._before[number] = before
+                    signal.signal(number, self._note)
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _traceback: TracebackType | None
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        self._before = {}
+
+    def _note(self, number: int, _frame: Any) -> None:
+        self.came.append(number)
+
+    def deliver(self) -> None:
+        """Do now what SIGTERM or SIGHUP do, if one came: end the process, as a rule."""
+        for number in self.came:
+            if number in ENDING:
+                signal.raise_signal(number)

@@ -8,6 +8,7 @@ possible all the same), shows messages only to hosts that instantiate with loggi
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 import sys
@@ -26,8 +27,7 @@ from kinfmu.fmu.estimated_rates import (
     errors_of_estimated_rates,
     estimated_rates,
 )
-from kinfmu.fmu.fetch import NOT_A_NUMBER, Fetch, Row, plan_fetch
-from kinfmu.fmu.layout import UNKNOWN_ERROR, Layout, Places
+from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Places, Row, plan_fetch
 from kinfmu.solver.python import Pose, Status, Stuck, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
@@ -695,3 +695,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
             return {}  # refused when it is set: an exception here would be Fatal for the host
         return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes
+
+
+def hold(namespace: dict[str, Any]) -> None:
+    """Take a reference to a module's namespace for good.
+
+    pythonfmu 0.7 runs the slave's module once an instance and each time releases a reference to its namespace that it
+    does not own: without this, the third instance of a process finds the namespace freed and crashes.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinfmu.errors import FmuError
-from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.toml_file import LARGEST_FILE
+from kinfmu.mechanism.valid import quoted
 
 LARGEST = 2**29  # [bytes] unpacked; the largest FMUs of kinfmu take a tenth of it
 LARGEST_DESCRIPTION = 2**27  # [bytes]; enough for a chain of thousands of links

@@ -6,8 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
-from kinfmu.files.suffix import suffix_of
-from kinfmu.files.whole_file import write_whole
+from kinfmu.files.whole_file import suffix_of, write_whole
 from kinfmu.gallery.chains import CHAINS, chain
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read

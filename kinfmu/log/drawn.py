@@ -13,10 +13,9 @@ from kinfmu.log.cdr import Template
 from kinfmu.log.clock import NANOSECONDS, nanoseconds
 from kinfmu.log.container import McapWriter, Messages
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import Event, Run
 from kinfmu.scene.scene import scene
-from kinfmu.units import METRES
+from kinfmu.units import METRES, derivative_name, quantity_of
 
 SOURCE = "kinfmu"  # who speaks in the log: the run's own events
 STATUS_SOURCE = "kinfmu.status"  # and what follows from the samples

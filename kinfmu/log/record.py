@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import LogError
 from kinfmu.log.record_text import lists_of
-from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import quoted
 from kinfmu.run import Event, Run
 from kinfmu.solver.python.status import Status
 

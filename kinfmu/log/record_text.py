@@ -8,12 +8,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from kinfmu.errors import LogError, listed
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import is_line
-from kinfmu.naming import is_coordinate
+from kinfmu.mechanism.valid import is_line, quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.axis import SAMPLE, TIME
-from kinfmu.units import METRES
+from kinfmu.units import METRES, is_coordinate
 
 MOST_COLUMNS = 500_000  # three times those of the largest mechanism
 LEVELS = ("info", "warning", "error")

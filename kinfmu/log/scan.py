@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kinfmu.errors import LogError, MissingPackageError
 from kinfmu.log.container import MAGIC, MESSAGE, Bytes, Opcode
-from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import quoted
 
 MOST_IN_CHUNK = 2**27  # [bytes] unpacked; twice what a chunk of ours holds
 ALWAYS = 2**20  # [bytes] that every chunk may unpack to, whatever its index says

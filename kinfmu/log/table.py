@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinfmu.errors import LogError, MissingPackageError, listed
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.run import Column, Run

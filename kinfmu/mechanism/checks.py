@@ -13,8 +13,7 @@ from kinfmu.measures import Measure
 from kinfmu.measures.placement import Reference, is_pair
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.members import hints_of, path_text
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_line, check_name
+from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.units import METRES
 
 if TYPE_CHECKING:

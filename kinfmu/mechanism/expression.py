@@ -21,7 +21,7 @@ from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.measures.arithmetic import Value, atan2, cos, sin, sqrt
 from kinfmu.mechanism import dimension
 from kinfmu.mechanism.dimension import Dimension, DimensionError
-from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import quoted
 from kinfmu.units import every_unit
 
 LONGEST = 1000  # characters

@@ -1,18 +1,21 @@
-"""Laws in mechanism files: from the keys of a table to a Law, and back."""
+"""Laws in mechanism files: from the keys of a table to a Law, and back; constants of laws by their names."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.laws import RISES, Law, MotionSequence, Polynomial, Segment, Spline
 from kinfmu.laws.law import number_fields
-from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_tables import text_of
+from kinfmu.mechanism.valid import quoted
+from kinfmu.units import Quantity
 
 _SEGMENT_KEYS = ("law", "rise", "duration")
 
@@ -101,3 +104,34 @@ def law_lines(law: Law, written: Callable[[Any], str]) -> Iterable[str]:
             yield "]"
         else:
             yield f"{key.name} = {written(value)}"
+
+
+class LawConstant(NamedTuple):
+    """A constant of a law of motion, settable under its name `<driver>.<key>`."""
+
+    name: str
+    value: float
+    quantity: Quantity
+    is_positive: bool = False  # other values are refused
+
+
+def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
+    """The constants of all drivers' laws in file order, without those that an expression gives (`computed`)."""
+    for driver in drivers:
+        for key, (value, said) in driver.law.constants().items():
+            if ("drivers", driver.name, "law", key) not in computed:
+                quantity = said.quantity(*driver.law_kinds)
+                yield LawConstant(f"{driver.name}.{key}", float(value), quantity, said.is_positive)
+
+
+def with_law_constants(drivers: Sequence[Driver], values: Mapping[str, float]) -> tuple[Driver, ...]:
+    """The drivers with other values of some of those constants."""
+
+    def changed(driver: Driver) -> Driver:
+        named = {key: f"{driver.name}.{key}" for key in driver.law.constants()}
+        new: dict[tuple[str | int, ...], float] = {
+            (key,): values[name] for key, name in named.items() if name in values
+        }
+        return replace(driver, law=driver.law.with_numbers(new)) if new else driver  # type: ignore[type-var]
+
+    return tuple(map(changed, drivers))

@@ -12,16 +12,15 @@ from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.joints import Joint
 from kinfmu.measures.arithmetic import Value
-from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.mechanism.body import GROUND_NAME, Body, RunSettings
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.law_constant import LawConstant, law_constants, with_law_constants
+from kinfmu.mechanism.law_table import LawConstant, law_constants, with_law_constants
 from kinfmu.mechanism.members import Members, NumberPath
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.parameters import Parameter, parameter_values
-from kinfmu.mechanism.quoted import quoted
 from kinfmu.mechanism.resolve import resolve
-from kinfmu.mechanism.run_settings import RunSettings
+from kinfmu.mechanism.valid import quoted
 from kinfmu.units import Quantity
 
 COORDINATES = ("x", "y", "phi")

@@ -17,7 +17,7 @@ from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.units import Quantity
 
 if TYPE_CHECKING:
-    from kinfmu.mechanism.run_settings import RunSettings
+    from kinfmu.mechanism.body import RunSettings
 
 NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),

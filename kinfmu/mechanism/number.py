@@ -8,8 +8,7 @@ from collections.abc import Collection
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_number, is_number
+from kinfmu.mechanism.valid import check_number, is_number, quoted
 from kinfmu.units import Quantity, every_unit, factors, unit_of
 
 _PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*|\N{DEGREE SIGN})\s*")  # number, word

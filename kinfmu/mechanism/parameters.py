@@ -12,8 +12,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
 from kinfmu.mechanism.number import read_number
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_line, check_name, check_number
+from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
 
 NUMBER = Quantity("number")

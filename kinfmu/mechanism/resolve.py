@@ -11,8 +11,7 @@ from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath, path_text
 from kinfmu.mechanism.number import expression_error, read_number
 from kinfmu.mechanism.parameters import Parameter, dimensions_of, read_parameter, resolve_parameters
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_number
+from kinfmu.mechanism.valid import check_number, quoted
 from kinfmu.units import Quantity
 
 MOST_PARAMETERS = 10_000

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.decimal_number import read_decimal
-from kinfmu.mechanism.quoted import quoted
+from kinfmu.mechanism.valid import quoted
 
 LARGEST_TABLE = 4_000_000  # [bytes]
 
@@ -75,3 +75,16 @@ def _number(where: str, line: int, cell: str, unit: str) -> float | str:
     if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
     return f"{number!r} {unit}" if unit else number
+
+
+_DECIMAL = re.compile(r"\s*+[+-]?+(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+|nan|inf)\s*+")
+
+
+def read_decimal(text: str) -> float:
+    """Return the number of a plain decimal such as '-1.5e3', also of nan and inf.
+
+    Raises a ValueError for other text. Python's `float` takes more: '1_000', digits of other scripts, 'Infinity'.
+    """
+    if not _DECIMAL.fullmatch(text):
+        raise ValueError("not a plain decimal number")
+    return float(text)

@@ -15,13 +15,11 @@ from kinfmu.joints import JOINTS, Joint
 from kinfmu.laws import LAWS, External, Law
 from kinfmu.measures import MEASURES, Measure
 from kinfmu.measures.placement import is_pair
-from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.body import Body, Point, RunSettings, Start
 from kinfmu.mechanism.law_table import law_keys, read_law
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.parameters import Parameter
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.run_settings import RunSettings
 from kinfmu.mechanism.toml_tables import (
     check_keys,
     class_of_type,
@@ -32,7 +30,7 @@ from kinfmu.mechanism.toml_tables import (
     table_of,
     text_of,
 )
-from kinfmu.mechanism.valid import check_name
+from kinfmu.mechanism.valid import check_name, quoted
 from kinfmu.units import METRES, Quantity
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less

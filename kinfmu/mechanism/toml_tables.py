@@ -7,8 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_name
+from kinfmu.mechanism.valid import check_name, quoted
 
 
 def member_keys(cls: type) -> list[str]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import fields
 
 from kinfmu.measures import Measure
+from kinfmu.mechanism.body import RunSettings
 from kinfmu.mechanism.expression import Computed
 from kinfmu.mechanism.law_table import law_lines
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
-from kinfmu.mechanism.run_settings import RunSettings
 from kinfmu.mechanism.toml_tables import member_keys
 from kinfmu.units import unit_of
 

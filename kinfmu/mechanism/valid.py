@@ -1,15 +1,16 @@
-"""What a name, a number and a line of text in a mechanism may be."""
+"""What a name, a number and a line of text in a mechanism may be, and values as messages show them."""
 
 from __future__ import annotations
 
 import math
 import re
+import reprlib
 import unicodedata
+from datetime import date, time
 from numbers import Real
 from typing import Any
 
 from kinfmu.errors import MechanismError
-from kinfmu.mechanism.quoted import quoted
 
 LARGEST_NUMBER = 1e30  # lengths, angles, rates: products of a few of them stay far from overflow
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}\Z")
@@ -54,3 +55,36 @@ def _is_text(character: str) -> bool:
     """False for control characters, line breaks, halves of a character (surrogates) and what is no character at all."""
     is_none = ord(character) & 0xFFFE == 0xFFFE
     return not is_none and unicodedata.category(character) not in ("Cc", "Cs", "Zl", "Zp")
+
+
+LONGEST = 120
+_LARGEST_WHOLE = 10**40  # whole numbers beyond are told by their size; Python refuses to print very long ones
+
+
+class _Quoter(reprlib.Repr):
+    """reprlib with room for a sentence, and the words of TOML."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = 100
+        self.maxlevel = 3
+
+    def repr_bool(self, x: bool, level: int) -> str:  # noqa: ARG002  the signature is reprlib's
+        return "true" if x else "false"
+
+    def repr_date(self, x: date | time, level: int) -> str:  # noqa: ARG002
+        return x.isoformat()
+
+    repr_datetime = repr_time = repr_date
+
+    def repr_int(self, x: int, level: int) -> str:  # noqa: ARG002
+        return repr(x) if abs(x) < _LARGEST_WHOLE else f"a whole number of {x.bit_length()} bits"
+
+
+def quoted(value: object) -> str:
+    """'text' in quotes with its line breaks escaped, numbers and lists as they are; LONGEST characters at most."""
+    told = _QUOTER.repr(float(value) if isinstance(value, float) else value)  # numpy's floats print their type
+    return told if len(told) <= LONGEST else told[: LONGEST - 3] + "..."
+
+
+_QUOTER = _Quoter()

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.equations.system import System
-from kinfmu.naming import derivative_name
 from kinfmu.plan.companions import BlockStructure
 from kinfmu.plan.structure import RowTracer, given_value
 from kinfmu.plan.trace import Tracer
+from kinfmu.units import derivative_name
 
 _DETERMINANT_SAMPLES = 48
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kinfmu.run.run import MOST_SAMPLES, Column, Event, FloatArray, IntArray, Run
-from kinfmu.run.sink import Sink
+from kinfmu.run.run import MOST_SAMPLES, Column, Event, FloatArray, IntArray, Run, Sink
 
 __all__ = ["MOST_SAMPLES", "Column", "Event", "FloatArray", "IntArray", "Run", "Sink"]

@@ -8,9 +8,9 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from kinfmu.errors import RequestError, listed, suggestion
-from kinfmu.naming import derivative_name
 from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
+from kinfmu.units import derivative_name
 
 ALWAYS = ("time", "solver.status")  # without them nobody can tell what a sample is
 DRAWN = "drawn"

@@ -1,4 +1,4 @@
-"""Run: the result of a solve or of a simulation, with named columns, units and a status for every sample."""
+"""Run: the result of a solve or of a simulation, with named columns, units and a status for every sample; sinks."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import KinfmuError, MissingPackageError, suggestion
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
-from kinfmu.units import unit_of
+from kinfmu.units import derivative_name, quantity_of, unit_of
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -292,3 +291,16 @@ def _optional(package: str) -> Any:
         return import_module(package)
     except ImportError:
         raise MissingPackageError(f"a run as a table of {package} needs it: pip install {package}") from None
+
+
+class Sink(Protocol):
+    """Takes a run piece by piece: `begin`, `add` again and again, `end`; nothing is called after an error."""
+
+    def begin(self, run: Run) -> None:
+        """The run before its first sample: names, units, constants, mechanism."""
+
+    def add(self, run: Run) -> None:
+        """The next samples, and the events since the last call."""
+
+    def end(self, run: Run, reason: str) -> None:
+        """The whole run; reason: why it ended early, if none of its events says so."""

@@ -17,8 +17,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.scene.completing import remedy
 from kinfmu.scene.cylinders import CylinderShape, cylinder_shapes
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.outline import outline, points_of
-from kinfmu.scene.pins import pins_of, supported
+from kinfmu.scene.outline import outline, pins_of, points_of, supported
 from kinfmu.scene.placing import poses_of, world
 from kinfmu.scene.strokes import Stroke, strokes
 

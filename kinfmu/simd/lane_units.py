@@ -16,9 +16,9 @@ from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.newton import determinant, opposite_solution, solution, square
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import FUNCTIONS, Node, reachable
-from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
+from kinfmu.units import derivative_name
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LISTED = {"sin": "sine", "cos": "cosine"}  # lists of what comes with the prediction

@@ -22,7 +22,6 @@ from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter
 from kinfmu.simd.lane_units import LISTED, VECTORS, LaneUnit, is_turned, through
-from kinfmu.simd.repeats import repeats
 
 _BRANCHING = ("curve", "atan2", "floor")
 
@@ -209,3 +208,34 @@ class _Lanes(Lists):
         turned = [node for node in reachable(targets) if is_turned(node, self.angles)]
         writer = Writer(self.names, [*self.derived, *self.handed_on.nodes, *turned])
         return [f"{line};" for line in writer.statements(targets)], writer
+
+
+def repeats(plan: SolvePlan) -> bool:
+    """True if a whole turn of any angle changes nothing: all stand in sines and cosines, but where one is another.
+
+    A gear or a coupling of angles tells how often they have turned: such a plan is not taken to repeat.
+    """
+    angles = {name for block in plan.blocks for name in block.coordinates if name.endswith(".phi")}
+    angles |= {driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"}
+
+    def is_turned(node: Node) -> bool:
+        """An angle, and no more than constants added to it."""
+        while node.op in ("+", "-") and node.args[1].constant is not None:
+            node = node.args[0]
+        while node.op == "+" and node.args[0].constant is not None:
+            node = node.args[1]
+        return node.op == "symbol" and node.name in angles
+
+    rows = [node for block in plan.blocks for node in block.residuals]
+    rows += [m[0] for block in plan.blocks for name, m in block.assigned if not (name in angles and is_turned(m[0]))]
+    found: set[Node] = set()
+    stack = list(rows)
+    while stack:
+        node = stack.pop()
+        if node in found or (node.op in ("sin", "cos") and is_turned(node.args[0])):
+            continue
+        if node.op == "symbol" and node.name in angles:
+            return False
+        found.add(node)
+        stack += node.args
+    return True

@@ -15,8 +15,7 @@ from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, sugg
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import is_number
+from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for

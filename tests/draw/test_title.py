@@ -12,8 +12,7 @@ import pytest
 from kinfmu import load
 from kinfmu.draw import figure, plot
 from kinfmu.draw.plots import _sheet
-from kinfmu.draw.sheet import Sheet
-from kinfmu.draw.title import title_lines
+from kinfmu.draw.sheet import Sheet, title_lines
 from kinfmu.run import Run
 from tests.log.runs import fourbar
 

@@ -15,7 +15,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints import Coordinate, Distance, Joint, Revolute
 from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Body, Mechanism, Point, RunSettings, Start
-from kinfmu.mechanism.quoted import LONGEST, quoted
+from kinfmu.mechanism.valid import LONGEST, quoted
 
 GROUND = Body("ground", {"O": Point(0.0, 0.0)})
 BAR = Body("bar", {"P": Point(1.0, 0.0)})

@@ -15,8 +15,8 @@ import kinfmu
 from kinfmu import Run
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError
-from kinfmu.naming import derivative_name
 from kinfmu.plan import compile_plan
+from kinfmu.units import derivative_name
 from tests.stress.branch import INSIDE, OUTSIDE, TURN, Expected, Floats, Interval, Walk, branch_of
 from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError

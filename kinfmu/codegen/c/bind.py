@@ -1,13 +1,13 @@
-"""kf_bind: parameters and what depends on them alone; why they cannot be had, if they cannot."""
+"""kf_bind: parameters and what depends on them alone, or why they have no solution. kf_drive: the drivers at a time."""
 
 from __future__ import annotations
 
 from kinfmu.codegen.c.parts import Parts
-from kinfmu.codegen.c.text import function, string
-from kinfmu.codegen.writer import Writer, identifier
+from kinfmu.codegen.c.text import FUNCTIONS, function, string
+from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.solver.python.continuation import NO_NUMBER
 
-_SIGNATURE = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room)"
+_BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room)"
 _HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
 
 
@@ -34,8 +34,28 @@ def bind(parts: Parts) -> list[str]:
         told = string(f"{name.replace('%', '%%')} = %.15g must be {meant}")
         lines += _refused_unless(_HOLDS[meant].format(number), f"{told}, {number}")
     variables = ("double total = 0.0;", "int k;") if derived else ()
-    return function(_SIGNATURE, [*lines, "return true;"], ("model", "parameters", "why", "room"), variables)
+    return function(_BIND, [*lines, "return true;"], ("model", "parameters", "why", "room"), variables)
 
 
 def _refused_unless(condition: str, told: str) -> list[str]:
     return [f"if (!({condition})) {{", f"    snprintf(why, room, {told});", "    return false;", "}"]
+
+
+_DRIVE = """\
+void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud,
+              double *udd)"""
+
+
+def drive(parts: Parts) -> list[str]:
+    """The function, over the constants of the laws and the parameters."""
+    laws = parts.plan.laws
+    orders = [[getattr(law, order) for law in laws] for order in ("position", "rate", "acceleration")]
+    writer = Writer(Names(curves=parts.curves, functions=FUNCTIONS), ())
+    body = [f"{line};" for line in writer.statements([node for nodes in orders for node in nodes])]
+    for name, nodes in zip(("u", "ud", "udd"), orders, strict=True):
+        body += [f"{name}[{k}] = {writer.expression(node)};" for k, node in enumerate(nodes)]
+    places = {constant.name: f"constants[{k}]" for k, constant in enumerate(parts.plan.law_constants)}
+    places |= {name: f"model->parameters[{k}]" for name, k in parts.parameters.items()}
+    used = {node.name for node in writer.used if node.op == "symbol"}
+    loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]
+    return function(_DRIVE, [*loads, *body], ("time", "model", "constants"))

@@ -5,8 +5,7 @@ The same plan gives the same bytes. What the functions mean is told in solver/c/
 
 from __future__ import annotations
 
-from kinfmu.codegen.c.bind import bind
-from kinfmu.codegen.c.drive import drive
+from kinfmu.codegen.c.bind import bind, drive
 from kinfmu.codegen.c.parts import Parts
 from kinfmu.codegen.c.readers import readers
 from kinfmu.codegen.c.stages import stages

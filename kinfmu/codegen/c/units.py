@@ -27,10 +27,10 @@ from kinfmu.codegen.newton import (
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
-from kinfmu.naming import derivative_name
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
+from kinfmu.units import derivative_name
 
 
 class Units:

@@ -1,12 +1,12 @@
-"""A single driver at speed 1 and acceleration 0: what is constant then is folded before code is written."""
+"""A single driver at speed 1 and acceleration 0, for which constants are folded; formulas that others need."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from kinfmu.codegen.writer import identifier
-from kinfmu.equations.graph import Node, reachable
+from kinfmu.codegen.writer import Writer, identifier
+from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block
 
 _OPERATIONS: dict[str, Callable[..., Node]] = {
@@ -58,3 +58,30 @@ class Alone:
             else:
                 new[node] = node
         return [new[target] for target in targets]
+
+
+class Definitions:
+    """Formulas by the names that they define, in the order of evaluation."""
+
+    def __init__(self, formulas: Mapping[str, Node]) -> None:
+        self._formulas = formulas
+        self._order = {name: k for k, name in enumerate(formulas)}
+
+    def lines(self, writer: Writer, wanted: Iterable[str], done: set[str]) -> list[str]:
+        """Statements for the names that the wanted ones are made of and that are not done yet.
+
+        done: names already written; it grows.
+        """
+        needed: set[str] = set()
+        stack = [name for name in wanted if name in self._formulas]
+        while stack:
+            name = stack.pop()
+            if name not in needed and name not in done:
+                needed.add(name)
+                stack += [symbol.name for symbol in symbols([self._formulas[name]]) if symbol.name in self._formulas]
+        done |= needed
+        lines = []
+        for name in sorted(needed, key=self._order.__getitem__):
+            lines += writer.statements([self._formulas[name]])
+            lines.append(f"{identifier(name)} = {writer.expression(self._formulas[name])}")
+        return lines

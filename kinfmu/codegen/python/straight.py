@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from kinfmu.codegen.lists import parametric
 from kinfmu.codegen.newton import ROUND_OFF
-from kinfmu.codegen.parametric import parametric
-from kinfmu.codegen.python.alone import Alone
+from kinfmu.codegen.python.alone import Alone, Definitions
 from kinfmu.codegen.python.binding import bound
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
@@ -18,13 +18,12 @@ from kinfmu.codegen.python.block_code import (
     tupled,
     unpacking,
 )
-from kinfmu.codegen.python.definitions import Definitions
 from kinfmu.codegen.python.differences import differences
 from kinfmu.codegen.python.header import curve_names, drive, header, places
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
-from kinfmu.naming import derivative_name
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.units import derivative_name
 
 
 def straight(plan: SolvePlan) -> str:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from kinfmu.errors import FmuError, listed
 from kinfmu.fmu.interface import Interface, Variable
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.naming import derivative_name, is_coordinate
-from kinfmu.units import METRES
+from kinfmu.mechanism.valid import quoted
+from kinfmu.units import METRES, derivative_name, is_coordinate
 
 _ALONE = {  # parts with a fixed list of variables
     "residual": ("solver.residual",),

@@ -14,8 +14,7 @@ from kinfmu.fmu.description.checks import check
 from kinfmu.fmu.description.common import number, text
 from kinfmu.fmu.interface import Interface, Part, Variable
 from kinfmu.mechanism import RunSettings
-from kinfmu.mechanism.quoted import quoted
-from kinfmu.mechanism.valid import check_name
+from kinfmu.mechanism.valid import check_name, quoted
 
 FmiVersion = Literal["2.0", "3.0"]
 MOST_TAGS = 2**22

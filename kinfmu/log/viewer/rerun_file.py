@@ -30,11 +30,10 @@ from kinfmu.errors import LogError
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, happenings, label, sentence
-from kinfmu.log.viewer.blocks import APPLICATION, send
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import thinned
-from kinfmu.log.viewer.linkage import log_linkage
+from kinfmu.log.viewer.linkage import APPLICATION, log_linkage, send
 from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run

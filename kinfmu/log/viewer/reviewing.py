@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import TYPE_CHECKING
 
 from kinfmu.errors import LogError, RequestError
-from kinfmu.files.suffix import suffix_of
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
 from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_words, shoot

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.naming import derivative_name, quantity_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
 from kinfmu.scene.shown import shown_range
-from kinfmu.units import Quantity, unit_of
+from kinfmu.units import Quantity, derivative_name, quantity_of, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
