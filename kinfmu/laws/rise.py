@@ -1,7 +1,8 @@
-"""What rises have in common: from one value to another in a given time, at rest before and after."""
+"""Rises: from one value to another in a given time, at rest before and after; their normalized curves."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -63,3 +64,119 @@ def _mirrored(piece: Piece) -> Piece:
     turned = [c if (degree - k) % 2 else 0.0 - c for k, c in enumerate(coefficients)]
     turned[-1] += 1.0
     return 1.0 - o, tuple(turned), a, w, -p
+
+
+@dataclass(frozen=True)
+class SimpleHarmonic(Rise):
+    """A rise along half a cosine; its acceleration jumps at both ends.
+
+        N = (1 - cos pi x) / 2        u = start + rise N
+
+    Peaks: velocity pi / 2, acceleration pi^2 / 2.
+    """
+
+    type: ClassVar[str] = "simple_harmonic"
+    shape: ClassVar[CurveData] = (
+        (0.0, 1.0),
+        (polynomial(0.0, 0.0), (0.5, (0.5,), 0.5, math.pi, 0.0), polynomial(1.0, 1.0)),
+    )
+
+
+@dataclass(frozen=True)
+class Cycloidal(Rise):
+    """A rise whose acceleration is a whole sine.
+
+        N = x - sin(2 pi x) / (2 pi)        u = start + rise N
+
+    Peaks: velocity 2, acceleration 2 pi = 6.283.
+    """
+
+    type: ClassVar[str] = "cycloidal"
+    shape: ClassVar[CurveData] = normalized([(0.0, (0.0, (1.0, 0.0), -0.5 / math.pi, 2.0 * math.pi, 0.0))])
+
+
+_SINE_SLOPE = math.pi / (4.0 + math.pi)
+_SINE_WAVE = 0.25 / (4.0 + math.pi)
+
+
+@dataclass(frozen=True)
+class ModifiedSine(Rise):
+    """A rise whose acceleration is a sine, quicker in the first and last eighth than between them.
+
+        N'' = A sin(4 pi x)                     up to 1/8,   A = 4 pi^2 / (4 + pi)
+        N'' = A sin(4 pi x / 3 + pi / 3)        up to 7/8
+        N'' = A sin(4 pi x)                     up to 1      u = start + rise N
+
+    Peaks: velocity 4 pi / (4 + pi) = 1.760, acceleration A = 5.528.
+    """
+
+    type: ClassVar[str] = "modified_sine"
+    shape: ClassVar[CurveData] = normalized(
+        [
+            (0.0, (0.0, (_SINE_SLOPE, 0.0), -_SINE_WAVE, 4.0 * math.pi, 0.0)),
+            (0.125, (0.5, (_SINE_SLOPE, 0.5), 9.0 * _SINE_WAVE, 4.0 * math.pi / 3.0, 0.0)),
+        ]
+    )
+
+
+_TRAPEZOID_PEAK = 8.0 * math.pi / (2.0 + math.pi)  # A
+_TRAPEZOID_SLOPE = 2.0 / (2.0 + math.pi)  # N' at 1/8
+_TRAPEZOID_WAVE = 0.5 / (math.pi * (2.0 + math.pi))
+_TRAPEZOID_EIGHTH = (math.pi - 2.0) / (4.0 * math.pi * (2.0 + math.pi))  # N at 1/8
+
+
+@dataclass(frozen=True)
+class ModifiedTrapezoid(Rise):
+    """A rise whose acceleration is a trapezoid with its edges rounded by quarters of a sine.
+
+        N'' = A sin(4 pi x)             up to 1/8,   A = 8 pi / (2 + pi)
+        N'' = A                         up to 3/8
+        N'' = A cos(4 pi x - 3 pi / 2)  up to 5/8, then mirrored        u = start + rise N
+
+    Peaks: velocity 2, acceleration A = 4.888.
+    """
+
+    type: ClassVar[str] = "modified_trapezoid"
+    shape: ClassVar[CurveData] = normalized(
+        [
+            (0.0, (0.0, (_TRAPEZOID_SLOPE, 0.0), -_TRAPEZOID_WAVE, 4.0 * math.pi, 0.0)),
+            (0.125, polynomial(0.125, 0.5 * _TRAPEZOID_PEAK, _TRAPEZOID_SLOPE, _TRAPEZOID_EIGHTH)),
+            (0.375, (0.5, (2.0 - _TRAPEZOID_SLOPE, 0.5), _TRAPEZOID_WAVE, 4.0 * math.pi, 0.0)),
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class Polynomial345(Rise):
+    """A rise along the polynomial of powers 3, 4, 5, at rest with no acceleration at both ends.
+
+        N = 10 x^3 - 15 x^4 + 6 x^5        u = start + rise N
+
+    Peaks: velocity 15/8 = 1.875, acceleration 10 / sqrt 3 = 5.774.
+    """
+
+    type: ClassVar[str] = "3-4-5"
+    shape: ClassVar[CurveData] = normalized([(0.0, polynomial(0.0, 6.0, -15.0, 10.0, 0.0, 0.0, 0.0))])
+
+
+@dataclass(frozen=True)
+class Polynomial4567(Rise):
+    """A rise along the polynomial of powers 4 to 7, at rest with neither acceleration nor jerk at both ends.
+
+        N = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7        u = start + rise N
+
+    Peaks: velocity 35/16 = 2.188, acceleration 7.513.
+    """
+
+    type: ClassVar[str] = "4-5-6-7"
+    shape: ClassVar[CurveData] = normalized([(0.0, polynomial(0.0, -20.0, 70.0, -84.0, 35.0, 0.0, 0.0, 0.0, 0.0))])
+
+
+RISES: tuple[type[Rise], ...] = (
+    SimpleHarmonic,
+    Cycloidal,
+    ModifiedSine,
+    ModifiedTrapezoid,
+    Polynomial345,
+    Polynomial4567,
+)

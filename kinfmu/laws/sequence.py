@@ -8,25 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.cycloidal import Cycloidal
 from kinfmu.laws.jumps import Jumps, jumping_breaks
 from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
-from kinfmu.laws.modified_sine import ModifiedSine
-from kinfmu.laws.modified_trapezoid import ModifiedTrapezoid
-from kinfmu.laws.polynomial_345 import Polynomial345
-from kinfmu.laws.polynomial_4567 import Polynomial4567
-from kinfmu.laws.rise import Rise
-from kinfmu.laws.simple_harmonic import SimpleHarmonic
+from kinfmu.laws.rise import RISES
 from kinfmu.measures.arithmetic import Value, curve, split_periods, sqrt
 
-RISES: tuple[type[Rise], ...] = (
-    SimpleHarmonic,
-    Cycloidal,
-    ModifiedSine,
-    ModifiedTrapezoid,
-    Polynomial345,
-    Polynomial4567,
-)
 DWELL = "dwell"
 _SHAPES = {rise.type: rise.shape for rise in RISES}
 _RISE, _DURATION = LawQuantity("led"), LawQuantity("argument", is_positive=True)
