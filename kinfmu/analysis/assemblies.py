@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from kinfmu.analysis.written import degrees, written
 from kinfmu.codegen.python import load_model
-from kinfmu.equations.assembly import CLOSED, SINGULAR, Assembled, assemble, close, start_targets
+from kinfmu.equations.assembly import SINGULAR, Assembled, assemble, start_targets
+from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
 from kinfmu.mechanism import Mechanism, Point, Start

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
-from kinfmu.equations.assembly import motion_samples, null_space, rough_start
+from kinfmu.equations.assembly import rough_start
+from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System

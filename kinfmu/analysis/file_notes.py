@@ -11,7 +11,8 @@ import numpy as np
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.written import written
 from kinfmu.drivers import AngleDriver, DistanceDriver
-from kinfmu.equations.assembly import start_from_poses, start_values
+from kinfmu.equations.assembly import start_values
+from kinfmu.equations.start_poses import start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam

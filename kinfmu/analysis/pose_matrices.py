@@ -11,7 +11,8 @@ import numpy as np
 from kinfmu.analysis.matrices import Matrix, moving_jacobian
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.written import written
-from kinfmu.equations.assembly import assemble, close
+from kinfmu.equations.assembly import assemble
+from kinfmu.equations.closing import close
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import listed

@@ -9,7 +9,8 @@ import numpy as np
 
 from kinfmu.draw.motion import told_value
 from kinfmu.draw.view import clearest, is_clear
-from kinfmu.equations.assembly import CLOSED, assemble, close, rough_start, start_targets
+from kinfmu.equations.assembly import assemble, rough_start, start_targets
+from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
 from kinfmu.errors import FigureError, KinfmuError, listed

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import assemble, comfortable, dependent_rows, motion_samples, rough_start
+from kinfmu.equations.assembly import assemble, comfortable, rough_start
+from kinfmu.equations.closing import dependent_rows, motion_samples
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System, length_of
 from kinfmu.joints import Distance, Revolute

@@ -6,17 +6,8 @@ import math
 
 import numpy as np
 
-from kinfmu.equations.assembly import (
-    SINGULAR,
-    Assembled,
-    assemble,
-    branches,
-    close,
-    closes_beside,
-    margin,
-    rough_start,
-    start_targets,
-)
+from kinfmu.equations.assembly import SINGULAR, Assembled, assemble, closes_beside, rough_start, start_targets
+from kinfmu.equations.closing import branches, close, margin
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed

@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 from kinfmu.drivers import Driver
-from kinfmu.equations.assembly import Assembled, motion_samples, null_space, rough_start, start_targets
+from kinfmu.equations.assembly import Assembled, rough_start, start_targets
+from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy, find_redundancy

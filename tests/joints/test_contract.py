@@ -13,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import kinfmu.joints
-from kinfmu.equations.assembly import CLOSED, close
+from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.graph import evaluate
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.joints import JOINTS, CamRoller, Coupling, Joint

@@ -1,0 +1,74 @@
+"""Start poses: the rough pose and the driver values that a mechanism is assembled from, as the file gives them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.equations.system import FloatArray, System
+
+
+class StartValues(NamedTuple):
+    """Where assembly begins: a rough pose q (n,) and driver values u (d,).
+
+    is_followed: True if the start poses and the laws give different driver values; is_moved: True if those of the laws
+    were taken, because they cannot be reached from those of the start poses.
+    """
+
+    q: FloatArray
+    u: FloatArray
+    is_followed: bool = False
+    is_moved: bool = False
+
+
+def law_targets(system: System) -> FloatArray:
+    """Return the driver values at which the laws start, (d,)."""
+    mechanism = system.mechanism
+    return np.array([driver.law.at(mechanism.run.start) for driver in mechanism.drivers], dtype=float)
+
+
+def start_from_poses(system: System) -> StartValues:
+    """Return the start poses and the driver values in them, angles moved by whole turns to the start of the laws.
+
+    A driver whose value the start poses leave out is at the start of its law.
+    """
+    bodies = system.mechanism.moving_bodies
+    given = [value is not None for body in bodies for value in body.start]
+    q = np.array([value or 0.0 for body in bodies for value in body.start])
+    measured, law = system.measure(q), law_targets(system)
+    targets = law.copy()
+    turns = np.zeros(len(law))
+    for k, driver in enumerate(system.mechanism.drivers):
+        member = system.members[len(system.mechanism.joints) + k]
+        (seen,) = system.gradients(member, q) != 0.0
+        if all(given[column] for column, used in zip(member.columns, seen, strict=True) if used):
+            if driver.quantity.kind == "angle":
+                turns[k] = math.tau * round((law[k] - measured[k]) / math.tau)
+            targets[k] = measured[k] + turns[k]
+    return StartValues(with_angles(system, q, turns), targets, is_followed=not np.array_equal(targets, law))
+
+
+def with_angles(system: System, q: FloatArray, change: FloatArray) -> FloatArray:
+    """Return a rough pose with driven angles changed by `change` (d,); driven lengths are left to assembly."""
+    q = q.copy()
+    for k, driver in enumerate(system.mechanism.drivers):
+        if driver.quantity.kind == "angle" and change[k] != 0.0:
+            member = system.members[len(system.mechanism.joints) + k]
+            (slopes,) = system.gradients(member, q)
+            turned = int(np.abs(slopes).argmax())
+            q[member.columns[turned]] += change[k] / slopes[turned]
+    return q
+
+
+def distance_from_start(system: System, start: StartValues, pose: FloatArray) -> float:
+    """Return how far a pose (n,) is from what the start poses give, in radians (without whole turns) and sizes."""
+    largest = 0.0
+    is_given = (value is not None for body in system.mechanism.moving_bodies for value in body.start)
+    for name, counts, value, q in zip(system.coordinates, is_given, start.q, pose, strict=True):
+        if counts:
+            off = float(q) - float(value)
+            off = math.remainder(off, math.tau) if name.endswith(".phi") else off / system.size
+            largest = max(largest, abs(off))
+    return largest
