@@ -227,10 +227,8 @@ def _assembled_from_random_starts(
             found = Assembled(q, u, margin(system, q)) if gap <= CLOSED else None
         if found is None or found.margin <= comfortable(system):
             continue
-        if nearest is None or distance_from_start(system, start, found.q) < distance_from_start(
-            system, start, nearest.q
-        ):
-            nearest = found
+        poses = [found] if nearest is None else [nearest, found]
+        nearest = min(poses, key=lambda pose: distance_from_start(system, start, pose.q))
         if distance_from_start(system, start, nearest.q) <= NEAR:
             break
     return nearest

@@ -18,7 +18,7 @@ from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.table_file import read_decimal
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Event
-from kinfmu.run.unwrap import is_long, short_way
+from kinfmu.run.unwrap import is_long, unwrap
 from kinfmu.units import Quantity, factors, in_turns, looks_like_degrees, quantity_in
 
 if TYPE_CHECKING:
@@ -89,9 +89,7 @@ def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTa
     angles = [quantities[name] == Quantity("angle") for name in table.names]
     if not any(angles):
         raise RequestError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
-    columns = [
-        short_way(column) if is_angle else column for column, is_angle in zip(table.values.T, angles, strict=True)
-    ]
+    columns = [unwrap(column) if is_angle else column for column, is_angle in zip(table.values.T, angles, strict=True)]
     return replace(table, values=np.column_stack(columns))
 
 

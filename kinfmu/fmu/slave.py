@@ -28,7 +28,7 @@ from kinfmu.fmu.estimated_rates import (
     estimated_rates,
 )
 from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Places, Row, plan_fetch
-from kinfmu.solver.python import Pose, Status, Stuck, with_parameters
+from kinfmu.solver.python import Pose, Status, UnsolvableModel, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
@@ -506,7 +506,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if self._unbound:
                 self._bind()
             pose = self._asked()
-            if not pose.good and not isinstance(self._solver, Stuck):
+            if not pose.good and not isinstance(self._solver, UnsolvableModel):
                 self.log(f"initialization fails: at t = {self._time:g} s: {pose.message}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
             self._report_defect(error)
@@ -519,7 +519,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.anchor
-        if isinstance(self._solver, Stuck):
+        if isinstance(self._solver, UnsolvableModel):
             self.log(self._solver.message, Fmi2Status.error)
 
     def do_step(self, current_time: float, step_size: float) -> bool:

@@ -26,7 +26,7 @@ IntArray = NDArray[np.int64]
 MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
 
 
-class Late:
+class LazyTable:
     """A table of a run that may be given as a function: it is called when the table is first read."""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -99,8 +99,8 @@ class Run:
     status: IntArray
     iterations: IntArray
     residual: FloatArray
-    margin: Late = Late()  # a descriptor, not a default
-    error: Late = Late()
+    margin: LazyTable = LazyTable()  # a descriptor, not a default
+    error: LazyTable = LazyTable()
     watch_names: tuple[str, ...]
     watch: FloatArray
     length_unit: str = "m"

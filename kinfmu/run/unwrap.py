@@ -10,7 +10,7 @@ from kinfmu.solver.python.turns import TURN, turned
 _HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, but for rounding, is taken as it stands
 
 
-def short_way(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same angles, each moved by whole turns so that it lies within half a turn of the one before.
 
         350, 10, 350 deg -> 350, 370, 350 deg

@@ -11,7 +11,7 @@ from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism, Start
 from kinfmu.mechanism.mechanism import COORDINATES
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.solver.python import Solver, Stuck, with_parameters
+from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Pose, failed
 from kinfmu.solver.python.status import Status
 
@@ -88,6 +88,6 @@ def at_law_start(solver: Solver, mechanism: Mechanism) -> Pose:
     start = law_starts(mechanism)
     return (
         failed(solver.anchor, start, Status.OUTSIDE, solver.message)
-        if isinstance(solver, Stuck)
+        if isinstance(solver, UnsolvableModel)
         else solver.solve(solver.anchor, start)
     )

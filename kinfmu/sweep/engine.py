@@ -11,7 +11,7 @@ Driven = tuple[FloatArray, FloatArray, FloatArray]  # (n, d) values, speeds and 
 Tables = tuple[FloatArray, FloatArray, FloatArray]  # (n, m) values, rates and accelerations of the outputs
 
 
-class Swept(NamedTuple):
+class SweepResult(NamedTuple):
     """Arrays as in Run; margin and error as functions that compute them. failures: the first sample of each stretch
     without numbers, and why.
     """
@@ -35,5 +35,5 @@ class Engine(Protocol):
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Driver values, speeds and accelerations at times, by the laws."""
 
-    def sweep(self, driven: Driven, tables: Tables) -> Swept:
+    def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables; what cannot be reached is NaN there."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinfmu.plan import SolvePlan
 from kinfmu.run import FloatArray
-from kinfmu.sweep.engine import Driven, Swept, Tables
+from kinfmu.sweep.engine import Driven, SweepResult, Tables
 from kinfmu.sweep.library import Library
 
 
@@ -36,7 +36,7 @@ class NativeEngine:
         """Driver values, speeds and accelerations at times, by the laws."""
         return self._library.drive(times, constants, self._parameters)
 
-    def sweep(self, driven: Driven, tables: Tables) -> Swept:
+    def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables; what cannot be reached is NaN there."""
         plain = all(
             table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
@@ -46,8 +46,8 @@ class NativeEngine:
         for table, values in zip(tables, filled, strict=True):
             if table is not values:
                 table[:] = values
-        late = _Late(self._library, driven, told.outcomes, self._parameters, self._tolerance)
-        return Swept(
+        late = _LazyDiagnostics(self._library, driven, told.outcomes, self._parameters, self._tolerance)
+        return SweepResult(
             status=told.outcomes[:, 0].astype(np.int64),
             iterations=told.outcomes[:, 1].astype(np.int64),
             residual=told.residual,
@@ -58,7 +58,7 @@ class NativeEngine:
         )
 
 
-class _Late:
+class _LazyDiagnostics:
     """Margins and errors of a sweep, which are computed together when either is first read."""
 
     def __init__(

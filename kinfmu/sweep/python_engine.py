@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector, evaluated
-from kinfmu.sweep.engine import Driven, Swept, Tables
+from kinfmu.sweep.engine import Driven, SweepResult, Tables
 
 _GAP = float("nan")
 
@@ -71,7 +71,7 @@ class PythonEngine:
         driven = driven.reshape(len(times), 3, len(model.DRIVERS))
         return driven[:, 0], driven[:, 1], driven[:, 2]
 
-    def sweep(self, driven: Driven, tables: Tables) -> Swept:
+    def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables; what cannot be reached is NaN there."""
         solver = self._solver
         n, m = tables[0].shape
@@ -100,7 +100,7 @@ class PythonEngine:
         for k, array in enumerate(tables):
             array[:] = whole[:, k]
         diagnostics = np.array(told, dtype=float).reshape(n, 3)
-        return Swept(
+        return SweepResult(
             status=diagnostics[:, 0].astype(np.int64),
             iterations=diagnostics[:, 2].astype(np.int64),
             residual=diagnostics[:, 1],

@@ -19,8 +19,8 @@ from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for
-from kinfmu.run.unwrap import short_way
-from kinfmu.solver.python import Solver, Stuck, with_parameters
+from kinfmu.run.unwrap import unwrap
+from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.continued import anew, at_law_start, bound_values, continued, law_starts
@@ -154,7 +154,7 @@ def _set(
         return compile_plan(followed.mechanism, plan.outputs), (), None, followed.message
     values = bound_values(plan, changed)
     solver = with_parameters(load_module(plan), values, tolerance)
-    if by_law or isinstance(solver, Stuck):
+    if by_law or isinstance(solver, UnsolvableModel):
         start = at_law_start(solver, changed)
         if not start.good:
             return compile_plan(changed, plan.outputs), (), None, anew(start.message)
@@ -194,7 +194,7 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
     angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
     if wrap and not angles:
         raise RequestError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
-    columns |= {name: short_way(columns[name]) for name in angles if wrap}
+    columns |= {name: unwrap(columns[name]) for name in angles if wrap}
     lengths = {len(column) for column in columns.values() if len(column) > 1}
     if len(lengths) > 1:
         sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())

@@ -10,24 +10,24 @@ import pytest
 import kinfmu
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu import build, simulate
-from kinfmu.run.unwrap import short_way
+from kinfmu.run.unwrap import unwrap
 from tests.oracle import largest_error, reference_fourbar
 
 
 def test_no_step_is_more_than_half_a_turn_and_no_digit_is_lost() -> None:
     u = np.concatenate([np.linspace(0.0, 700.0, 901), np.linspace(700.0, -300.0, 777)])  # [rad]
     wrapped = np.remainder(u, 2.0 * np.pi)
-    followed = short_way(wrapped)
+    followed = unwrap(wrapped)
     np.testing.assert_allclose(followed, u, rtol=0, atol=3e-13)
-    assert short_way(followed).tolist() == followed.tolist()
+    assert unwrap(followed).tolist() == followed.tolist()
 
 
 def test_half_a_turn_is_taken_as_it_stands_and_a_little_more_the_other_way() -> None:
     for step in (np.pi, -np.pi, np.pi + 1e-12):
-        assert short_way(np.array([1.0, 1.0 + step]))[1] == 1.0 + step
-    assert short_way(np.radians([0.0, 181.0, 359.0, 10.0])) == pytest.approx(np.radians([0.0, -179.0, -1.0, 10.0]))
-    assert short_way(np.array([700.0])).tolist() == [700.0]
-    assert len(short_way(np.array([]))) == 0
+        assert unwrap(np.array([1.0, 1.0 + step]))[1] == 1.0 + step
+    assert unwrap(np.radians([0.0, 181.0, 359.0, 10.0])) == pytest.approx(np.radians([0.0, -179.0, -1.0, 10.0]))
+    assert unwrap(np.array([700.0])).tolist() == [700.0]
+    assert len(unwrap(np.array([]))) == 0
 
 
 def test_solve_takes_wrapped_angles_as_they_stand_unless_told_to_follow_them() -> None:

@@ -13,7 +13,7 @@ from kinfmu.log.clock import nanoseconds
 from kinfmu.log.verdict import sentence
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
-from kinfmu.log.viewer.decimated import thinned
+from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import log_linkage
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
@@ -53,9 +53,9 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
         nanoseconds(run.t)
     timeline = _in_common(a, b, path)
     difference = _difference(a, b)
-    shown = [timeline.placed(thinned(run)) for run in (a, b)]
+    shown = [timeline.placed(decimated(run)) for run in (a, b)]
     scenes, notes = zip(*(drawable(run) for run in shown), strict=True)
-    apart = timeline.placed(thinned(difference)) if difference else None
+    apart = timeline.placed(decimated(difference)) if difference else None
     differences = groups(apart) if apart else {}
     curves = [groups(run) for run in shown]
     layout = compared(timeline, (shown[0], shown[1]), scenes, curves, differences)

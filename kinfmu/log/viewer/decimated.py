@@ -10,7 +10,7 @@ from kinfmu.run import Run
 MOST_ROWS = 200_000  # of a recording; viewers get slow beyond
 
 
-def thinned(run: Run, most: int | None = None) -> Run:
+def decimated(run: Run, most: int | None = None) -> Run:
     """The run itself if it has at most so many samples (MOST_ROWS if nothing is said), else evenly chosen ones and what
     lies between them that counts.
 

@@ -32,7 +32,7 @@ from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, happenings, label, sentence
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
-from kinfmu.log.viewer.decimated import thinned
+from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, log_linkage, send
 from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
@@ -59,7 +59,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
     """
     nanoseconds(run.t)  # says what is wrong with a time before a file is begun
     timeline = timeline_of([run])
-    shown = timeline.placed(thinned(run))
+    shown = timeline.placed(decimated(run))
     scene, note = drawable(shown)
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]

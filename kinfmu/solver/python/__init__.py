@@ -5,9 +5,9 @@ This package is copied into the Python FMU as it is, beside the generated model.
 
 from __future__ import annotations
 
-from .continuation import Stuck, with_parameters
+from .continuation import UnsolvableModel, with_parameters
 from .pose import Pose
 from .solver import Solver
 from .status import Status
 
-__all__ = ["Pose", "Solver", "Status", "Stuck", "with_parameters"]
+__all__ = ["Pose", "Solver", "Status", "UnsolvableModel", "with_parameters"]

@@ -34,7 +34,7 @@ class Reached(NamedTuple):
     message: str
 
 
-class Stuck(Solver):
+class UnsolvableModel(Solver):
     """Stands for a mechanism whose parameters cannot be had: every pose fails, and says why."""
 
     def __init__(self, model: Model, tolerance: float, anchor: Pose, message: str) -> None:
@@ -46,12 +46,12 @@ class Stuck(Solver):
 
 
 def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Solver:
-    """A Solver for a generated module with these values of its PARAMETERS, or a Stuck that says why there is none."""
+    """A Solver for a generated module with these values of its PARAMETERS, or an UnsolvableModel with the reason."""
     if not module.PARAMETERS:
         return Solver(module, tolerance)
     model, anchor, message = reach(module, values, tolerance)
     if message:
-        return Stuck(model, tolerance, anchor, message)
+        return UnsolvableModel(model, tolerance, anchor, message)
     return Solver(model, tolerance, anchor)
 
 

@@ -11,7 +11,7 @@ import pytest
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer import decimated as thinning
 from kinfmu.log.viewer.comparison import write_comparison
-from kinfmu.log.viewer.decimated import thinned
+from kinfmu.log.viewer.decimated import decimated
 from kinfmu.run import Run
 from tests.log.runs import fourbar, with_gap
 from tests.log.viewer.test_rerun_file import SCALARS, documents, rows
@@ -26,12 +26,12 @@ def long_run() -> Run:
 
 
 def test_a_short_run_is_left_as_it_is(run: Run) -> None:
-    assert thinned(run, 181) is run
-    assert thinned(run) is run
+    assert decimated(run, 181) is run
+    assert decimated(run) is run
 
 
 def test_what_stands_out_is_kept(long_run: Run) -> None:
-    less = thinned(long_run, 100)
+    less = decimated(long_run, 100)
     assert 100 <= len(less) < 150
     kept = np.searchsorted(long_run.t, less.t)
     assert {0, 777, 1233, 1234, 1236, 1237, 2000} <= set(kept.tolist())
