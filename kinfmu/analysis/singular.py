@@ -12,8 +12,8 @@ from kinfmu.analysis.way import Way
 from kinfmu.equations.system import System
 from kinfmu.plan import localized
 from kinfmu.solver.python import Pose
-from kinfmu.solver.python.advance import NO_BLOCK, Limit
 from kinfmu.solver.python.bridge import Bridge
+from kinfmu.solver.python.limit import NO_BLOCK, Limit
 
 
 @dataclass(frozen=True)

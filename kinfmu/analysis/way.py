@@ -10,8 +10,9 @@ from kinfmu.codegen.python import load_model
 from kinfmu.measures import DistanceBetween
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python import Pose, Solver
-from kinfmu.solver.python.advance import NO_BLOCK, Limit, advance
+from kinfmu.solver.python.advance import advance
 from kinfmu.solver.python.bridge import Bridge
+from kinfmu.solver.python.limit import NO_BLOCK, Limit
 
 STEP = 0.1  # [rad, sizes] between looks at the determinants
 MOST_TURNS = 12  # after which a mechanism that has not come back to its start is left: gears of odd ratios
@@ -157,5 +158,9 @@ def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
         pose = arrived
         poses.append(pose)
         known = {bridge.centre for bridge in bridges}
-        bridges += [bridge for bridge in (pose.road.bridges if pose.road else ()) if bridge.centre not in known]
+        bridges += [
+            bridge
+            for bridge in (pose.singularities.bridges if pose.singularities else ())
+            if bridge.centre not in known
+        ]
     return _Leg(poses, bridges)

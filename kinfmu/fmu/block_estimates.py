@@ -45,8 +45,8 @@ class BlockEstimates:
 
     def __init__(self, folder: Path, parameters: Row) -> None:
         package = (folder / ENTRY).read_text().strip().removesuffix("_slave")
-        names = [f"{package}.solver.{name}" for name in ("model", "estimate", "linear", "pose")]
-        model, estimate, linear, pose = (sys.modules[name] for name in names)
+        names = [f"{package}.solver.{name}" for name in ("model", "estimate", "worst_case_step", "linear", "pose")]
+        model, estimate, steps, linear, pose = (sys.modules[name] for name in names)
         sizes = [high - low for low, high in model.BLOCKS]
         if len(sizes) > MOST_BLOCKS or max(sizes, default=0) > MOST_UNKNOWNS or model.TALL:
             raise LookupError(f"blocks of {sizes} unknowns")
@@ -57,7 +57,8 @@ class BlockEstimates:
             self._model, self._arrays = model.bound(parameters), self._arrays.bound(parameters)
         self._estimate, self._evaluated = estimate, pose.evaluated
         condition = _with_arrays(linear, folder).reciprocal_condition
-        others = {"evaluated": _evaluated, "choose": _choose, "reciprocal_condition": condition}
+        step = _with_arrays(steps, folder, {"choose": _choose}).worst_case_step
+        others = {"evaluated": _evaluated, "worst_case_step": step, "reciprocal_condition": condition}
         self._of_arrays = _with_arrays(estimate, folder, others)
         self._check()
 

@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "way.h"
+#include "internal.h"
 
 #define SEGMENTS 16       /* in a turn */
 #define TURN 6.283185307179586
@@ -64,14 +64,14 @@ static void read_bridge(kf_window *window, const kf_bridge *bridge, const kf_spa
 /* Windows of the bridges that a pose has met on its way. */
 static void collect(kf_segments *segments, const kf_solver *solver, const kf_pose *pose)
 {
-    const kf_road *const road = &KF_MAP(solver)->roads[pose->road < 0 ? 0 : pose->road];
+    const kf_singularity_map *const map = &KF_POOL(solver)->maps[pose->map < 0 ? 0 : pose->map];
     int i, k;
-    for (k = 0; pose->road >= 0 && k < road->bridges && segments->window_count < KF_WINDOWS; ++k) {
-        const kf_bridge *const bridge = &KF_MAP(solver)->bridges[road->bridge[k]];
+    for (k = 0; pose->map >= 0 && k < map->bridges && segments->window_count < KF_WINDOWS; ++k) {
+        const kf_bridge *const bridge = &KF_POOL(solver)->bridges[map->bridge[k]];
         for (i = 0; i < segments->window_count && segments->windows[i].centre != bridge->centre; ++i) {
         }
         if (i == segments->window_count) {
-            read_bridge(&segments->windows[i], bridge, &KF_MAP(solver)->spans[bridge->span]);
+            read_bridge(&segments->windows[i], bridge, &KF_POOL(solver)->spans[bridge->span]);
             ++segments->window_count;
         }
     }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "sweeping.h"
-#include "way.h"
+#include "internal.h"
 
 #define SURE 0.05           /* determinant from which samples may be solved here: it leaves nine digits of qdd */
 #define MOST_MOVED 1e-3     /* correction beyond which one does not arrive, nor rotations do */

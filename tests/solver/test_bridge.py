@@ -43,14 +43,14 @@ def test_bridge_is_built_once_and_moved_on_later_turns(
         built.append(args)
         return build(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("kinfmu.solver.python.advance.build", counted)
+    monkeypatch.setattr("kinfmu.solver.python.survey.build", counted)
     pose = fourbar.anchor
     for k in range(40):
         pose = fourbar.solve(pose, (1.0 + 0.5 * math.pi * k,))
         assert pose.good
         assert max(errors(fourbar, pose)) < 1e-9
     assert len(built) == 2
-    assert len(pose.road.bridges) == 2
+    assert len(pose.singularities.bridges) == 2
 
 
 @pytest.mark.parametrize("turns", [1000, -1000])
@@ -85,7 +85,7 @@ def test_dumped_pose_is_restored_to_the_bit_in_and_out_of_windows(fourbar: Solve
 def test_many_loops_that_all_but_cross_at_once_are_each_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """More of them than a road keeps places: each search must be remembered until all are done."""
     searched: list[int] = []
-    monkeypatch.setattr("kinfmu.solver.python.advance.build", lambda *args: searched.append(args[2]))
+    monkeypatch.setattr("kinfmu.solver.python.survey.build", lambda *args: searched.append(args[2]))
     written = fourbar_chain(40)
     longer = [
         replace(body, points={**body.points, "Q": Point(1.0 + 1e-6, 0.0)}) if body.name[:7] == "coupler" else body

@@ -13,7 +13,7 @@ import pytest
 import kinfmu
 from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
-from kinfmu.solver.python.advance import Limit, limit_message
+from kinfmu.solver.python.limit import Limit, limit_message
 from kinfmu.solver.python.message import LOCATED, place
 from tests.solver.c.native import Native
 
@@ -79,7 +79,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Native]:
 def said_by_native(native: Native, limit: float, asked: float) -> str:
     text = ctypes.create_string_buffer(480)
     found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
-    native.c.kf_say_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked), -1)
+    native.c.kf_append_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked), -1)
     return text.value.decode()
 
 

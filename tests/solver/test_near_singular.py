@@ -133,7 +133,7 @@ def test_an_anchor_near_a_change_point_is_bridged_and_stays_what_it_is() -> None
     first = solver.solve(solver.anchor, solver.anchor.u)
     assert first.status == Status.BRIDGED
     assert solver.anchor.status == Status.OK
-    assert solver.anchor.road is None
+    assert solver.anchor.singularities is None
     assert solver.solve(first, first.u) is first
     again = solver.restore(solver.dump(first))
     assert again.z == first.z

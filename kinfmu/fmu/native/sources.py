@@ -28,7 +28,7 @@ _STEP = (
     "model.c",
     "position.c",
     "pose.c",
-    "advance.c",
+    "trusted_step.c",
     "solver.c",
     "drive.c",
     "instance.c",

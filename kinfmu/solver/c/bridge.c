@@ -1,5 +1,5 @@
 /* Bridges: across singular points by interpolation from both sides, proved by closing. See kinfmu/solver/python/bridge.py. */
-#include "way.h"
+#include "internal.h"
 
 #define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would win */
 #define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
@@ -40,7 +40,7 @@ static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
 /* A span whole turns on; `raised` tells the turns of the unknowns. */
 static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
 {
-    const kf_span *const from = &KF_MAP(solver)->spans[span];
+    const kf_span *const from = &KF_POOL(solver)->spans[span];
     int k;
     bridge->span = span;
     bridge->turns = turns;
@@ -54,7 +54,7 @@ static void make(kf_bridge *bridge, const kf_solver *solver, int span, double tu
 /* The pose at a node. */
 static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pose *pose)
 {
-    const double *const z = KF_MAP(solver)->spans[bridge->span].z[node];
+    const double *const z = KF_POOL(solver)->spans[bridge->span].z[node];
     double *const there = solver->scratch.z;
     const double *u;
 #if KF_TRACKS
@@ -72,7 +72,7 @@ static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pos
 /* The farthest node on the target's side that does not lie beyond the target. */
 bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
 {
-    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+    const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
     const int near = target > bridge->centre ? 3 : 2, far = target > bridge->centre ? 4 : 1;
     const bool passed = fabs(target - bridge->centre) >= fabs(bridge->u[far] - bridge->centre);
     return at_node(solver, bridge, passed ? far : near, pose);
@@ -82,8 +82,8 @@ bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
 bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose)
 {
     const kf_model *const model = &solver->model;
-    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
-    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
+    const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     double *const z = solver->scratch.z, *const zd = solver->scratch.zd, *const zdd = solver->scratch.zdd;
     kf_span_read(span, inner_of(solver, bridge), place(bridge, span, u[KF_ALONG(solver)]), z, zd, zdd);
     turn_on(bridge, z, z);
@@ -102,7 +102,7 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
 /* The interpolated pose at the centre, and the largest of the driver value and the unknowns, in radians and sizes. */
 static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *found, double *size)
 {
-    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     double *const z = solver->scratch.z;
 #if KF_TRACKS
     double room[KF_DRIVERS];
@@ -157,8 +157,8 @@ static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
  */
 static double miss(kf_solver *solver, const kf_bridge *bridge)
 {
-    kf_found *const found = &solver->scratch.way[1].found;
-    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
+    kf_found *const found = &solver->scratch.poses[1].found;
+    const bool *const held = KF_POOL(solver)->spans[bridge->span].held;
     double jacobian[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)], largest, left = 0.0;
     const double *rows = kf_row_scales;
     int block, i, k;
@@ -190,9 +190,9 @@ static double miss(kf_solver *solver, const kf_bridge *bridge)
  */
 void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3])
 {
-    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[pose->bridge];
-    const bool *const held = KF_MAP(solver)->spans[bridge->span].held;
-    kf_pose *const before = &solver->scratch.way[1], *const after = &solver->scratch.way[2];
+    const kf_bridge *const bridge = &KF_POOL(solver)->bridges[pose->bridge];
+    const bool *const held = KF_POOL(solver)->spans[bridge->span].held;
+    kf_pose *const before = &solver->scratch.poses[1], *const after = &solver->scratch.poses[2];
     const double e = 2.0 * sqrt(miss(solver, bridge));
     double part = INFINITY, w;
     int k;
@@ -213,8 +213,8 @@ void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, doub
 /* What the wider span says less than the one used, in z and its two derivatives: the error estimate. */
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd)
 {
-    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
-    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
+    const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     kf_span_difference(span, inner_of(solver, bridge), place(bridge, span, u), z, zd, zdd);
 }
 
@@ -225,13 +225,13 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
  */
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
 {
-    const kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
-    const kf_span *const span = &KF_MAP(solver)->spans[bridge->span];
+    const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
+    const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     const double turns = kf_whole_turns(u - span->centre), there = kf_turned(u, -turns);
     const double here = kf_turned(KF_HERE(solver, pose), -turns);
     const int first = here > span->centre ? 3 : 0;
     const int made = kf_spare_bridge(solver);
-    kf_bridge *const other = &KF_MAP(solver)->bridges[made];
+    kf_bridge *const other = &KF_POOL(solver)->bridges[made];
     const kf_pose *arrived;
     int node = first, k;
     if (turns == bridge->turns || !(span->u[0] <= there && there <= span->u[KF_NODES - 1])) {
@@ -240,7 +240,7 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
     for (k = first; k < first + 3; ++k) {
         node = fabs(span->u[k] - here) < fabs(span->u[node] - here) ? k : node;
     }
-    arrived = kf_plainly(solver, pose, kf_turned(span->u[node], turns));
+    arrived = kf_follow_path(solver, pose, kf_turned(span->u[node], turns));
     if (arrived == NULL) {
         return -1;
     }
@@ -253,11 +253,11 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
     }
     make(other, solver, bridge->span, turns);
     for (k = 0; turns != 0.0 && k < KF_NODES; ++k) {
-        if (!at_node(solver, other, k, &solver->scratch.walk[0])) {
+        if (!at_node(solver, other, k, &solver->scratch.follow[0])) {
             return -1;
         }
     }
-    return closes(solver, other, &solver->scratch.walk[0].found) ? made : -1;
+    return closes(solver, other, &solver->scratch.follow[0].found) ? made : -1;
 }
 
 /* Driver value where a determinant vanishes on the secant through its values at a and b. */
@@ -279,7 +279,7 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
     bool whole = false; /* the first estimate may stem from the same two places */
     while (fabs(step) > least) {
         const double here = KF_HERE(solver, pose);
-        kf_pose *const ahead = kf_plainly(solver, pose, here + step);
+        kf_pose *const ahead = kf_follow_path(solver, pose, here + step);
         double of_here, of_ahead, better, left, change;
         if (ahead == NULL) {
             step *= 0.5;
@@ -320,7 +320,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
     static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
     static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
     double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
-    kf_pose *const pose = &solver->scratch.walk[0];
+    kf_pose *const pose = &solver->scratch.follow[0];
     double *const last = determinants[2];
 #if KF_TRACKS
     double room[KF_DRIVERS];
@@ -360,7 +360,7 @@ static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block
     span->centre = centre;
     span->half = half;
     for (node = 0; node < 3; ++node) {
-        pose = kf_plainly(solver, pose, centre - side * distance * half);
+        pose = kf_follow_path(solver, pose, centre - side * distance * half);
         if (pose == NULL) {
             return false;
         }
@@ -394,7 +394,7 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     }
     for (half = KF_HALF_WIDTH * reach; half >= NARROWEST * reach && apart > FINE; half *= 0.5) {
         const int number = kf_spare_span(solver, best);
-        kf_span *const span = &KF_MAP(solver)->spans[number < 0 ? 0 : number];
+        kf_span *const span = &KF_POOL(solver)->spans[number < 0 ? 0 : number];
         if (number >= 0 && span_over(solver, span, pose, block, zero, half) && kf_span_apart(span) < apart) {
             best = number;
             apart = kf_span_apart(span);
@@ -402,13 +402,13 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     }
     if (best >= 0) {
         const int number = kf_spare_bridge(solver);
-        kf_bridge *const bridge = &KF_MAP(solver)->bridges[number];
+        kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
         int k;
         for (k = 0; k < KF_UNKNOWNS; ++k) {
             bridge->raised[k] = 0.0;
         }
         make(bridge, solver, best, 0.0);
-        if (closes(solver, bridge, &solver->scratch.walk[0].found)) {
+        if (closes(solver, bridge, &solver->scratch.follow[0].found)) {
             return number;
         }
     }

@@ -5,7 +5,7 @@
  * The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a
  * way of the drivers. See kinfmu/solver/python/continuation.py.
  */
-#include "way.h"
+#include "internal.h"
 
 #define SHORTEST 1e-7 /* step in s; where steps get shorter the way ends */
 #define MOST_STEPS 10000
@@ -29,20 +29,20 @@ static bool is_trusted(const kf_found *found, const kf_found *trial)
 }
 
 /* "parameters coupler = 9": those that differ from what is written. */
-static void say_parameters(char *message, const double *parameters)
+static void append_parameters(char *message, const double *parameters)
 {
     bool is_first = true;
     int k;
     message[0] = '\0';
-    kf_say(message, "parameters ");
+    kf_append(message, "parameters ");
     for (k = 0; k < KF_PARAMETERS; ++k) {
         if (parameters[k] != kf_parameters_written[k]) {
-            kf_say(message, "%s%s = ", is_first ? "" : ", ", kf_parameter_names[k]);
-            kf_say_number(message, "%.12g", parameters[k]);
+            kf_append(message, "%s%s = ", is_first ? "" : ", ", kf_parameter_names[k]);
+            kf_append_number(message, "%.12g", parameters[k]);
             is_first = false;
         }
     }
-    kf_say(message, ": ");
+    kf_append(message, ": ");
 }
 
 static double length_of(int count, const double *vector)
@@ -89,7 +89,7 @@ static double normal_equations(const kf_model *model, const kf_found *found, int
 /* Smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if none can be had. */
 static double gap_of(kf_solver *solver, const kf_model *model, int block)
 {
-    kf_found *const found = &solver->scratch.walk[0].found;
+    kf_found *const found = &solver->scratch.follow[0].found;
     double normal[KF_ROOM(KF_LARGEST_BLOCK)], damped[KF_ROOM(KF_LARGEST_BLOCK)], right[KF_ROOM(KF_LARGEST_BLOCK)];
     double factors[KF_LU_ROOM(1) + 3 * KF_LARGEST_BLOCK], step[KF_ROOM(KF_LARGEST_BLOCK)];
     double residuals[KF_ROOM(KF_LARGEST_BLOCK)], determinant, damping = 1e-3, left = -1.0, now;
@@ -138,7 +138,7 @@ static double gap_of(kf_solver *solver, const kf_model *model, int block)
 }
 
 /* Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave. */
-static void say_opens(kf_solver *solver, const double *parameters, int block)
+static void append_failure(kf_solver *solver, const double *parameters, int block)
 {
     kf_model *const model = &solver->scratch.ahead;
     const double *const determinants = solver->anchor.found.determinants;
@@ -147,23 +147,23 @@ static void say_opens(kf_solver *solver, const double *parameters, int block)
     double gap;
     int k;
     if (!kf_bind(model, parameters, why, sizeof why)) { /* a length that is not positive */
-        kf_say(solver->message, "%s", why);
+        kf_append(solver->message, "%s", why);
         return;
     }
     for (k = 0; !is_told && k < KF_BLOCKS; ++k) {
         block = block < 0 || fabs(determinants[k]) < fabs(determinants[block]) ? k : block;
     }
     if (block < 0) {
-        kf_say(solver->message, "the mechanism does not close");
+        kf_append(solver->message, "the mechanism does not close");
         return;
     }
     gap = gap_of(solver, model, block);
     if (gap > 1e-9) {
-        kf_say(solver->message, "the mechanism does not close: rows %s stay open by ", kf_block_row_names[block]);
-        kf_say_number(solver->message, "%.4g", gap * KF_SIZE);
-        kf_say(solver->message, " %s", kf_length_unit);
+        kf_append(solver->message, "the mechanism does not close: rows %s stay open by ", kf_block_row_names[block]);
+        kf_append_number(solver->message, "%.4g", gap * KF_SIZE);
+        kf_append(solver->message, " %s", kf_length_unit);
     } else {
-        kf_say(solver->message, "lie behind a singular point, where rows %s are dependent",
+        kf_append(solver->message, "lie behind a singular point, where rows %s are dependent",
                kf_block_row_names[block]);
     }
 }
@@ -172,7 +172,7 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
 {
     const double tolerance = solver->tolerance;
     kf_model *const ahead = &solver->scratch.ahead;
-    kf_pose *const trial = &solver->scratch.way[0];
+    kf_pose *const trial = &solver->scratch.poses[0];
     double *const slope = solver->scratch.zd;
     double p[KF_ROOM(KF_PARAMETERS)], watches[KF_ROOM(KF_WATCHES)], s = 0.0, step = 1.0;
     int turn, k, most = 0, block = -1;
@@ -215,25 +215,25 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
             break;
         }
     }
-    solver->stuck = true;
-    say_parameters(solver->message, parameters);
+    solver->unsolvable = true;
+    append_parameters(solver->message, parameters);
     if (!is_there) {
         if (turn < MOST_STEPS) {
-            say_opens(solver, parameters, block);
+            append_failure(solver, parameters, block);
         } else {
-            kf_say(solver->message, "too far from the parameters as written");
+            kf_append(solver->message, "too far from the parameters as written");
         }
     } else if (!(solver->anchor.found.watch <= solver->tolerance)) {
         kf_watches(&solver->model, &solver->anchor.found, watches);
         for (k = 1; k < KF_WATCHES; ++k) {
             most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
         }
-        kf_say(solver->message, "the redundant row %s is open by about ", kf_watch_names[most]);
-        kf_say_number(solver->message, "%.4g", fabs(watches[most]) * KF_SIZE);
-        kf_say(solver->message, " %s", kf_length_unit);
+        kf_append(solver->message, "the redundant row %s is open by about ", kf_watch_names[most]);
+        kf_append_number(solver->message, "%.4g", fabs(watches[most]) * KF_SIZE);
+        kf_append(solver->message, " %s", kf_length_unit);
     } else {
         solver->message[0] = '\0';
-        solver->stuck = false;
+        solver->unsolvable = false;
     }
-    return !solver->stuck;
+    return !solver->unsolvable;
 }

@@ -7,7 +7,7 @@
  * which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried:
  * position, velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
  */
-#include "way.h"
+#include "internal.h"
 
 #define UNBOUNDED 0.5 /* change of a determinant, as a part of it, within a pose's error: rates are not known then */
 
@@ -27,7 +27,7 @@ static kf_driven drive_of(kf_solver *solver, kf_pose *pose, const double *ud, co
     kf_driven drive;
     drive.ud = one ? KF_SPEEDS(&solver->model) : ud;
     drive.udd = one ? kf_at_rest : udd;
-    drive.held = pose->bridge < 0 ? NULL : KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span].held;
+    drive.held = pose->bridge < 0 ? NULL : KF_POOL(solver)->spans[KF_POOL(solver)->bridges[pose->bridge].span].held;
     if (one) {
         kf_tangent(&solver->model, pose);
     } else {
@@ -55,7 +55,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         given[k] = 0.0;
     }
-    kf_soften(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
+    kf_worst_case_step(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
     KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         source->z[k] = weight * c * all_of[k];
@@ -111,7 +111,7 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
  */
 static bool round_node(kf_solver *solver, const kf_span *span, int place, double *rounding)
 {
-    kf_pose *const node = &solver->scratch.way[1], *const there = &solver->scratch.way[2];
+    kf_pose *const node = &solver->scratch.poses[1], *const there = &solver->scratch.poses[2];
     double *const squares = solver->scratch.zd;
     const double half = span->half;
     int worst[KF_MOST_SOURCES], count, i, k;
@@ -163,7 +163,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
 {
     kf_scratch *const scratch = &solver->scratch;
     kf_source *const source = &scratch->source;
-    const kf_span *const span = &KF_MAP(solver)->spans[KF_MAP(solver)->bridges[pose->bridge].span];
+    const kf_span *const span = &KF_POOL(solver)->spans[KF_POOL(solver)->bridges[pose->bridge].span];
     double *const rounding = scratch->x2; /* of the unknowns */
     const double half = span->half;
     int k;
@@ -198,7 +198,7 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
     bool is_made;
     int block, k = 0;
     kf_enter_track(solver, driver);
-    own = kf_own_pose(solver, pose, driver);
+    own = kf_on_track(solver, pose, driver);
     {
         const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
         is_made = make_source_of_bridge(solver, own, &along);
@@ -264,7 +264,7 @@ static bool is_singular_between(const kf_pose *pose, const kf_pose *there, const
 static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, const kf_driven *drive,
                   double squares[3], bool *lost)
 {
-    kf_pose *const there = &solver->scratch.way[0];
+    kf_pose *const there = &solver->scratch.poses[0];
     double(*const rows)[3][KF_ROOM(KF_OUTPUTS)] = solver->scratch.rows;
     int worst[KF_MOST_SOURCES], i, order;
     double weight, missed[3];
@@ -321,7 +321,7 @@ static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
     for (driver = 0; pose->has_tracks && pose->found.margin < KF_UNDECIDED && driver < KF_DRIVERS; ++driver) {
         kf_pose *own;
         kf_enter_track(solver, driver);
-        own = kf_own_pose(solver, pose, driver);
+        own = kf_on_track(solver, pose, driver);
         if (own->found.margin < KF_UNDECIDED) {
             const kf_driven along = drive_of(solver, own, KF_SPEEDS(&solver->model), kf_at_rest);
             is_there = is_there || is_at_a_crossing(solver, own, &along);

@@ -1,5 +1,5 @@
 /* Two-sided Hermite interpolation from value and two derivatives at several nodes. See kinfmu/solver/python/hermite.py. */
-#include "way.h"
+#include "internal.h"
 
 /* The polynomial of degree 3 n - 1 with given f, f', f'' at n nodes, in Newton's form on repeated nodes:
  *

@@ -1,13 +1,12 @@
-/* Limit: driver values where a way ends, and why. See Limit in kinfmu/solver/python/advance.py. */
-#include "way.h"
+/* Limits: driver values where a path ends, and why. See kinfmu/solver/python/limit.py. */
+#include "internal.h"
 
-
-/* Where the way ends, just beyond a pose that steps cannot leave.
+/* Return where the path ends, just beyond a pose that steps cannot leave.
  *
- * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the way: the secant rule
+ * Near a dead centre the tangent grows without bound, and determinant^2 falls linearly along the path: the secant rule
  * on the last two poses gives its zero. Where branches cross the determinant itself falls linearly.
  */
-void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
+void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
 {
     const double *const determinants = pose->found.determinants;
     double near, far, beyond = 0.0, steepest = 0.0;
@@ -43,7 +42,7 @@ void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const d
     }
 }
 
-/* True if the target lies past the limit on the way that s goes. */
+/* Return whether the target lies past the limit in the direction of s. */
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s)
 {
     double sum = 0.0;
@@ -54,34 +53,34 @@ bool kf_is_beyond(const double *target, const double *limit, const double *direc
     return sum > 0.0;
 }
 
-/* Why a target cannot be reached, in one line. */
-void kf_say_limit(char *message, const kf_limit *limit, const double *target, int driver)
+/* Append why a target cannot be reached, in one line. */
+void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver)
 {
     int k;
     if (limit->block == KF_TOO_FAR) {
-        kf_say_place(message, target, KF_ROUGHLY, driver);
-        kf_say(message, " is too far from ");
-        kf_say_place(message, limit->u, KF_ROUGHLY, driver);
-        kf_say(message, ": more than %d steps on one way", KF_MOST_STEPS);
+        kf_append_place(message, target, KF_ROUGHLY, driver);
+        kf_append(message, " is too far from ");
+        kf_append_place(message, limit->u, KF_ROUGHLY, driver);
+        kf_append(message, ": more than %d steps on one way", KF_MOST_STEPS);
         return;
     }
     if (!kf_differs(target, limit->u, KF_LOCATED)) {
-        kf_say_place(message, target, KF_LOCATED, driver);
-        kf_say(message, " cannot be reached: to these digits it is the limit");
+        kf_append_place(message, target, KF_LOCATED, driver);
+        kf_append(message, " cannot be reached: to these digits it is the limit");
     } else {
-        kf_say_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED, driver);
-        kf_say(message, " cannot be reached: the limit is ");
-        kf_say_place(message, limit->u, KF_LOCATED, driver);
+        kf_append_place(message, target, kf_differs(target, limit->u, KF_ROUGHLY) ? KF_ROUGHLY : KF_LOCATED, driver);
+        kf_append(message, " cannot be reached: the limit is ");
+        kf_append_place(message, limit->u, KF_LOCATED, driver);
     }
-    kf_say(message, limit->crosses ? ", where branches of " : ", where ");
+    kf_append(message, limit->crosses ? ", where branches of " : ", where ");
     if (limit->block == KF_NO_BLOCK) {
-        kf_say(message, "the joints");
+        kf_append(message, "the joints");
     }
     for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
-        kf_say(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
+        kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
     }
-    kf_say(message, limit->crosses ? " cross" : " would part");
+    kf_append(message, limit->crosses ? " cross" : " would part");
     if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
-        kf_say(message, "; the crossing depends on several drivers, so no bridge is built");
+        kf_append(message, "; the crossing depends on several drivers, so no bridge is built");
     }
 }

@@ -1,5 +1,5 @@
 /* Messages: put together piece by piece, cut where they would not fit; numbers as %g of the C locale writes them. */
-#include "way.h"
+#include "internal.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #define KF_MORE 6                   /* digits that such numbers have before the point */
 #define KF_DEGREE 57.29577951308232 /* to a radian */
 
-void kf_say(char *message, const char *format, ...)
+void kf_append(char *message, const char *format, ...)
 {
     const size_t length = strlen(message);
     va_list arguments;
@@ -18,10 +18,10 @@ void kf_say(char *message, const char *format, ...)
 }
 
 /* A number, with a point whatever the locale says. */
-void kf_say_number(char *message, const char *format, double value)
+void kf_append_number(char *message, const char *format, double value)
 {
     char *written = message + strlen(message);
-    kf_say(message, format, value == value ? value : fabs(value)); /* a NaN is printed without its sign */
+    kf_append(message, format, value == value ? value : fabs(value)); /* a NaN is printed without its sign */
     for (; *written != '\0'; ++written) {
         if (*written == ',') {
             *written = '.';
@@ -30,14 +30,14 @@ void kf_say_number(char *message, const char *format, double value)
 }
 
 /* A number to so many decimals, without zeros at its end. */
-static void say_decimals(char *message, int count, double value)
+static void append_decimals(char *message, int count, double value)
 {
     char *const written = message + strlen(message);
     char format[16];
     const bool is_large = !(value > -KF_LARGE && value < KF_LARGE);
     snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df",
              is_large && count > KF_ROUGHLY ? count + KF_MORE : count);
-    kf_say_number(message, format, value);
+    kf_append_number(message, format, value);
     if (!is_large && strchr(written, '.') != NULL) {
         char *end = written + strlen(written);
         while (end[-1] == '0') {
@@ -52,7 +52,7 @@ static void say_decimals(char *message, int count, double value)
 }
 
 /* "crank = 1.047198 rad (60 deg)": driver values, of one driver or of all; angles to so many decimals, lengths to so many digits. */
-void kf_say_place(char *message, const double *u, int digits, int driver)
+void kf_append_place(char *message, const double *u, int digits, int driver)
 {
     char format[16];
     int k;
@@ -61,20 +61,20 @@ void kf_say_place(char *message, const double *u, int digits, int driver)
         if (driver >= 0 && k != driver) {
             continue;
         }
-        kf_say(message, "%s%s = ", k > 0 && driver < 0 ? ", " : "", kf_driver_names[k]);
+        kf_append(message, "%s%s = ", k > 0 && driver < 0 ? ", " : "", kf_driver_names[k]);
         if (kf_driver_is_angle[k]) {
-            say_decimals(message, digits, u[k]);
-            kf_say(message, " rad (");
-            say_decimals(message, digits - 2, u[k] * KF_DEGREE);
-            kf_say(message, " deg)");
+            append_decimals(message, digits, u[k]);
+            kf_append(message, " rad (");
+            append_decimals(message, digits - 2, u[k] * KF_DEGREE);
+            kf_append(message, " deg)");
         } else {
-            kf_say_number(message, format, u[k]);
-            kf_say(message, " %s", kf_length_unit);
+            kf_append_number(message, format, u[k]);
+            kf_append(message, " %s", kf_length_unit);
         }
     }
 }
 
-/* True if kf_say_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
+/* True if kf_append_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
 bool kf_differs(const double *a, const double *b, int digits)
 {
     char format[16];
@@ -83,11 +83,11 @@ bool kf_differs(const double *a, const double *b, int digits)
     for (k = 0; k < KF_DRIVERS; ++k) {
         char first[KF_MESSAGE] = "", second[KF_MESSAGE] = "";
         if (kf_driver_is_angle[k]) { /* in degrees there are fewer digits */
-            say_decimals(first, digits - 2, a[k] * KF_DEGREE);
-            say_decimals(second, digits - 2, b[k] * KF_DEGREE);
+            append_decimals(first, digits - 2, a[k] * KF_DEGREE);
+            append_decimals(second, digits - 2, b[k] * KF_DEGREE);
         } else {
-            kf_say_number(first, format, a[k]);
-            kf_say_number(second, format, b[k]);
+            kf_append_number(first, format, a[k]);
+            kf_append_number(second, format, b[k]);
         }
         if (strcmp(first, second) != 0) {
             return true;

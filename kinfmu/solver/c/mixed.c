@@ -1,7 +1,7 @@
 /* Mixed: blocks that depend on several drivers, where others depend on one. See Solver._followed in
  * kinfmu/solver/python/solver.py.
  */
-#include "way.h"
+#include "internal.h"
 
 #if KF_MIXES
 
@@ -29,7 +29,7 @@ static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
 static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const double *target, kf_pose *there)
 {
     kf_pose *const start = &solver->scratch.share[0], *const trial = &solver->scratch.share[1];
-    double chord[KF_UNKNOWNS], way[KF_DRIVERS];
+    double chord[KF_UNKNOWNS], path[KF_DRIVERS];
     bool is_trusted;
     int k, iterations;
     if (!KF_GOOD(kf_assembled(solver, pose, u, target, pose->found.x, there))) {
@@ -42,11 +42,11 @@ static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const 
         }
     }
     for (k = 0; k < KF_DRIVERS; ++k) {
-        way[k] = u[k] - KF_POSE_U(pose)[k];
+        path[k] = u[k] - KF_POSE_U(pose)[k];
     }
     kf_enter_mixed(solver, there->found.x, chord);
-    is_trusted = kf_trusted_step(solver, share_of(pose, start), way, 1.0, u, trial)
-                 && (trial->found.margin >= KF_REGULAR || kf_keeps_branch(solver, start, trial, way, 1.0));
+    is_trusted = kf_trusted_step(solver, share_of(pose, start), path, 1.0, u, trial)
+                 && (trial->found.margin >= KF_REGULAR || kf_keeps_branch(solver, start, trial, path, 1.0));
     kf_leave_track(solver);
     if (!is_trusted) {
         return false;
@@ -65,14 +65,14 @@ static void mixed_limit(kf_solver *solver, const kf_pose *before, kf_pose *pose,
     kf_pose *const share = solver->scratch.share;
     kf_rates_in_time(&solver->model, pose, direction, NULL);
     kf_enter_mixed(solver, pose->found.x, pose->x1);
-    kf_limited(solver, share_of(before, &share[0]), share_of(pose, &share[1]), direction, limit);
+    kf_limit_beyond(solver, share_of(before, &share[0]), share_of(pose, &share[1]), direction, limit);
     kf_leave_track(solver);
 }
 
 static kf_status ended(kf_solver *solver, const kf_limit *limit, const double *target, kf_pose *pose)
 {
     solver->message[0] = '\0';
-    kf_say_limit(solver->message, limit, target, -1);
+    kf_append_limit(solver->message, limit, target, -1);
     return kf_failed(pose, KF_OUTSIDE);
 }
 
@@ -99,7 +99,7 @@ kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *targe
     int iterations = 0, turn, k;
     bool is_limited = false;
     for (k = 0; k < KF_DRIVERS; ++k) {
-        solver->scratch.origin[k] = start->has_tracks ? start->own[k].road : -1;
+        solver->scratch.origin[k] = start->has_tracks ? start->own[k].map : -1;
     }
     if (start->has_base) {
         pose = solver->scratch.whole;
@@ -108,7 +108,7 @@ kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *targe
         }
     }
     before = regular = pose;
-    distance = kf_course(KF_POSE_U(pose), target, direction);
+    distance = kf_straight_path(KF_POSE_U(pose), target, direction);
     memcpy(limit.u, KF_POSE_U(pose), sizeof limit.u);
     limit.block = KF_TOO_FAR;
     limit.crosses = false;

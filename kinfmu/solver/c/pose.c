@@ -1,17 +1,17 @@
 /* Pose: an assembled pose of a mechanism at given driver values. See kinfmu/solver/python/pose.py. */
-#include "way.h"
+#include "internal.h"
 
 const double kf_alone[KF_DRIVERS] = {1.0};
 const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)] = {0.0};
 
 /* A pose just found: nothing is known of it but its road. */
-inline void kf_fresh(kf_pose *pose, int road, double low, double high)
+inline void kf_fresh(kf_pose *pose, int map, double low, double high)
 {
     pose->low = low;
     pose->high = high;
     pose->status = KF_OK;
     pose->derivatives = 0;
-    pose->road = road;
+    pose->map = map;
     pose->bridge = -1;
     pose->has_base = false;
 #if KF_TRACKS

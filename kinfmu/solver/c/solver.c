@@ -1,5 +1,5 @@
 /* Solver: poses, rates and accelerations of the model. See kinfmu/solver/python/solver.py. */
-#include "way.h"
+#include "internal.h"
 
 #define TOLERANCE 1e-9 /* residual relative to the size above which a sample is not ok */
 
@@ -11,7 +11,7 @@ void kf_solver_start(kf_solver *solver)
 #if KF_TRACKS
     solver->model.track = solver->scratch.ahead.track = 0;
 #endif
-    solver->stuck = false;
+    solver->unsolvable = false;
     for (k = 0; k < KF_INNERS; ++k) {
         solver->scratch.inner[k].half = 0.0; /* nothing was read */
     }
@@ -33,20 +33,20 @@ static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
     char *const message = solver->message;
     double watches[KF_ROOM(KF_WATCHES)];
     int k, most = 0;
-    kf_say_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_TOLD(solver));
+    kf_append_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_NAMED_DRIVER(solver));
     if (!(pose->found.residual <= solver->tolerance)) {
-        kf_say(message, ": residual ");
-        kf_say_number(message, "%.2g", pose->found.residual);
-        kf_say(message, " of the size is left");
+        kf_append(message, ": residual ");
+        kf_append_number(message, "%.2g", pose->found.residual);
+        kf_append(message, " of the size is left");
         return pose->status = KF_NOT_CONVERGED;
     }
     kf_watches(&solver->model, &pose->found, watches);
     for (k = 1; k < KF_WATCHES; ++k) {
         most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
     }
-    kf_say(message, ": the redundant row %s is open by ", kf_watch_names[most]);
-    kf_say_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
-    kf_say(message, " %s", kf_length_unit);
+    kf_append(message, ": the redundant row %s is open by ", kf_watch_names[most]);
+    kf_append_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
+    kf_append(message, " %s", kf_length_unit);
     return pose->status = KF_INCONSISTENT;
 }
 
@@ -60,7 +60,7 @@ static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
         kf_fresh(base, -1, -INFINITY, INFINITY);
         kf_evaluated_as_given(&solver->model, pose->base_u, pose->base_z, &base->found);
     }
-    base->road = pose->road;
+    base->map = pose->map;
     base->low = pose->low;
     base->high = pose->high;
     return base;
@@ -77,7 +77,7 @@ static inline bool is_same(const double *a, const double *b)
 }
 
 /* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
-static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *road)
+static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *map)
 {
     const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)], s = u[KF_ALONG(solver)] - KF_HERE(solver, start);
     if (!(-longest <= s && s <= longest && start->low <= u[KF_ALONG(solver)] && u[KF_ALONG(solver)] <= start->high)
@@ -90,9 +90,9 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
     }
     if (pose->found.margin > KF_NEAR
         && (pose->found.margin >= KF_CLOSE || kf_keeps_branch(solver, start, pose, KF_SPEEDS(&solver->model), s))) {
-        kf_needed(solver, start->road, start->road, start->road);
-        *road = kf_surveyed(solver, start, pose);
-        return *road == pose->road;
+        kf_keep_maps(solver, start->map, start->map, start->map);
+        *map = kf_surveyed(solver, start, pose);
+        return *map == pose->map;
     }
     return false;
 }
@@ -111,14 +111,14 @@ kf_status kf_checked(kf_solver *solver, kf_pose *pose)
 static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
 {
     const kf_pose *found = NULL;
-    if (start->found.margin < KF_REGULAR && start->status == KF_OK && start->road < 0) {
+    if (start->found.margin < KF_REGULAR && start->status == KF_OK && start->map < 0) {
         kf_limit limit;
-        int road = -1;
+        int map = -1;
         if (KF_IS_FOLLOWED) {
-            kf_needed(solver, start->road, start->road, start->road);
-            road = kf_surveyed(solver, start, start);
+            kf_keep_maps(solver, start->map, start->map, start->map);
+            map = kf_surveyed(solver, start, start);
         }
-        found = road < 0 ? NULL : kf_advance(solver, start, road, KF_POSE_U(start), &limit);
+        found = map < 0 ? NULL : kf_advance(solver, start, map, KF_POSE_U(start), &limit);
     }
     *pose = found == NULL ? *start : *found;
     if (pose->status == KF_OK && pose->found.margin < KF_NEAR) {
@@ -138,8 +138,8 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
     kf_pose *found;
     kf_limit limit;
     double sum = 0.0;
-    int road, k;
-    if (solver->stuck) {
+    int map, k;
+    if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
     if (start->has_base && !is_same(u, KF_POSE_U(start))) {
@@ -151,26 +151,26 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
     for (k = 0; k < KF_DRIVERS; ++k) {
         sum += u[k];
     }
-    road = start->road;
-    if (KF_IS_FOLLOWED && is_near(solver, start, u, pose, &road)) { /* most samples */
+    map = start->map;
+    if (KF_IS_FOLLOWED && is_near(solver, start, u, pose, &map)) { /* most samples */
         return KF_OK;
     }
     solver->message[0] = '\0';
     if (!(sum - sum == 0.0)) {
-        kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
-        kf_say(solver->message, " is not a finite number");
+        kf_append_place(solver->message, u, KF_ROUGHLY, KF_NAMED_DRIVER(solver));
+        kf_append(solver->message, " is not a finite number");
         return kf_failed(pose, KF_OUTSIDE);
     }
     for (k = 0; k < KF_DISTANCES; ++k) {
         if (u[kf_distance_drivers[k]] < 0.0) {
-            kf_say_place(solver->message, u, KF_ROUGHLY, KF_TOLD(solver));
-            kf_say(solver->message, ": a distance cannot be negative");
+            kf_append_place(solver->message, u, KF_ROUGHLY, KF_NAMED_DRIVER(solver));
+            kf_append(solver->message, ": a distance cannot be negative");
             return kf_failed(pose, KF_OUTSIDE);
         }
     }
-    found = kf_advance(solver, start, road, u, &limit);
+    found = kf_advance(solver, start, map, u, &limit);
     if (found == NULL) {
-        kf_say_limit(solver->message, &limit, u, KF_TOLD(solver));
+        kf_append_limit(solver->message, &limit, u, KF_NAMED_DRIVER(solver));
         return kf_failed(pose, KF_OUTSIDE);
     }
     *pose = *found;

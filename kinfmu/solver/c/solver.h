@@ -41,17 +41,17 @@ typedef enum {
 /* What a pose of the whole has of one driver's track: where to go on from, and what is known there. */
 typedef struct {
     kf_status status;
-    int road, bridge, base_bridge;
+    int map, bridge, base_bridge;
     bool has_base;
     double base_u, base_z[KF_ROOM(KF_UNKNOWNS)];
-} kf_own;
+} kf_track_pose;
 
 /* A pose that was found. If it is not good, nothing but its status says anything.
  *
  * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
  * high: the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1:
  * nothing; bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on
- * by: the next way starts from its base, the last regular pose before it, to which road, low and high then belong.
+ * by: the next way starts from its base, the last regular pose before it, to which map, low and high then belong.
  */
 typedef struct {
     kf_found found;
@@ -62,11 +62,11 @@ typedef struct {
     double base_z[KF_ROOM(KF_UNKNOWNS)];
     kf_status status;
     int derivatives;
-    int road, bridge, base_bridge;
+    int map, bridge, base_bridge;
     bool has_base;
 #if KF_TRACKS
     bool has_tracks, is_held;
-    kf_own own[KF_DRIVERS];
+    kf_track_pose own[KF_DRIVERS];
     bool held[KF_BLOCKS]; /* blocks that are interpolated, and their derivatives, each over its own driver */
     double own1[KF_UNKNOWNS], own2[KF_UNKNOWNS];
 #endif
@@ -114,34 +114,34 @@ typedef struct {
 typedef struct {
     double low, high;
     int block;
-} kf_searched;
+} kf_interval;
 
 /* What is known of the singular points on the way of a single driver: see kinfmu/solver/python/road.py. */
 #define KF_KEPT 32 /* of each kind, the latest */
 #define KF_IS_FOLLOWED (KF_DRIVERS == 1 || KF_TRACKS) /* along one driver: there are bridges */
-#define KF_SEARCHED (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
+#define KF_INTERVALS (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
 typedef struct {
-    int bridges, stretches;
+    int bridges, intervals;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
-    kf_searched searched[KF_SEARCHED];
-} kf_road;
+    kf_interval searched[KF_INTERVALS];
+} kf_singularity_map;
 
 /* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
  * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
  * not bridged. Blocks of several drivers follow the tracks piece by piece: the roads of the first start are needed too.
  */
-#define KF_ROADS (KF_IS_FOLLOWED ? 4 + KF_MIXES : 1)
+#define KF_MAPS (KF_IS_FOLLOWED ? 4 + KF_MIXES : 1)
 #define KF_BRIDGES (KF_IS_FOLLOWED ? (3 + KF_MIXES) * KF_KEPT + 1 : 1)
 #define KF_SPANS (KF_IS_FOLLOWED ? KF_KEPT + 8 : 1)
 
 /* What is known along one driver. */
 typedef struct {
-    kf_road roads[KF_ROADS];
+    kf_singularity_map maps[KF_MAPS];
     kf_bridge bridges[KF_BRIDGES];
     kf_span spans[KF_SPANS];
-} kf_map;
+} kf_pool;
 
-#define KF_MAPS (KF_TRACKS ? KF_DRIVERS : 1)
+#define KF_POOLS (KF_TRACKS ? KF_DRIVERS : 1)
 
 /* What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held. */
 typedef struct {
@@ -156,7 +156,7 @@ typedef struct {
 /* What does not outlive a call, but for the polynomials read last, which may be of use again. */
 typedef struct {
     kf_inner inner[KF_INNERS];
-    kf_pose base, way[4], walk[2], beside, located;
+    kf_pose base, poses[4], follow[2], beside, located;
 #if KF_TRACKS
     kf_pose track[2];
 #endif
@@ -180,9 +180,9 @@ typedef struct {
     kf_model model;
     double tolerance;
     kf_pose anchor;
-    bool stuck; /* the parameters cannot be had: every pose fails, and the message says why */
+    bool unsolvable; /* the parameters cannot be had: every pose fails, and the message says why */
     char message[KF_MESSAGE];
-    kf_map maps[KF_MAPS];
+    kf_pool pools[KF_POOLS];
     kf_scratch scratch;
 } kf_solver;
 

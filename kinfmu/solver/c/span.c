@@ -1,5 +1,5 @@
 /* Span: what is interpolated across a singular point, from six regular poses around it. See kinfmu/solver/python/span.py. */
-#include "way.h"
+#include "internal.h"
 
 static const double inner_places[4] = {-2.0, -1.0, 1.0, 2.0}; /* of the nodes, in half widths */
 static const double outer_places[4] = {-4.0, -2.0, 2.0, 4.0};

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "sweeping.h"
-#include "way.h"
+#include "internal.h"
 
 kf_sweep *kf_sweep_new(double tolerance)
 {
@@ -139,7 +139,7 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
 /* True for jobs large enough to be worth segments. */
 static bool goes_side_by_side(const kf_sweep *sweep, const kf_job *job)
 {
-    return job->count >= 4 * KF_LANES && !sweep->follower.solver.stuck;
+    return job->count >= 4 * KF_LANES && !sweep->follower.solver.unsolvable;
 }
 
 /* Keep a sample for later; false if memory ran out. */

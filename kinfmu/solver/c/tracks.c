@@ -1,14 +1,14 @@
 /* Tracks: what depends on one driver alone is followed along that driver. See kinfmu/solver/python/tracks.py. */
-#include "way.h"
+#include "internal.h"
 
 #if KF_TRACKS
 
 /* The pose of a track that a pose of the whole was put together from. */
-kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver)
+kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
 {
     kf_pose *const own = &solver->scratch.track[0];
     const double u = KF_POSE_U(whole)[driver];
-    const kf_own *const known = &whole->own[driver];
+    const kf_track_pose *const known = &whole->own[driver];
     double z[KF_UNKNOWNS], room[KF_DRIVERS];
     int block, k = 0;
     if (whole->has_tracks && known->bridge >= 0) {
@@ -24,14 +24,14 @@ kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver)
     }
     if (whole->has_tracks) {
         own->status = known->status;
-        own->road = known->road;
+        own->map = known->map;
         own->has_base = known->has_base;
         own->base_bridge = known->base_bridge;
         if (known->has_base) {
             kf_driven_at(&solver->model, &known->base_u, own->base_u);
             memcpy(own->base_z, known->base_z, sizeof own->base_z);
         }
-        kf_stretch(solver, own->road, own->has_base ? known->base_u : u, &own->low, &own->high);
+        kf_around(solver, own->map, own->has_base ? known->base_u : u, &own->low, &own->high);
     }
     return own;
 }
@@ -39,12 +39,12 @@ kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver)
 /* What a pose of the whole keeps of the pose of a track. */
 static void keep(kf_solver *solver, const kf_pose *own, int driver, kf_pose *whole, double *z)
 {
-    kf_own *const kept = &whole->own[driver];
+    kf_track_pose *const kept = &whole->own[driver];
     const bool *const held =
-        own->bridge < 0 ? NULL : KF_MAP(solver)->spans[KF_MAP(solver)->bridges[own->bridge].span].held;
+        own->bridge < 0 ? NULL : KF_POOL(solver)->spans[KF_POOL(solver)->bridges[own->bridge].span].held;
     int block, k = 0;
     kept->status = own->status;
-    kept->road = own->road;
+    kept->map = own->map;
     kept->bridge = own->bridge;
     kept->has_base = own->has_base;
     kept->base_bridge = own->base_bridge;
@@ -96,15 +96,15 @@ bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pos
     if (start->status != KF_OK || start->has_base || !is_apart(start)) {
         return false;
     }
-    distance = kf_course(KF_POSE_U(start), u, direction);
+    distance = kf_straight_path(KF_POSE_U(start), u, direction);
     if (!(0.0 < distance && distance <= KF_LONGEST_STEP)) {
         return false;
     }
     for (k = 0; start->has_tracks && k < KF_DRIVERS; ++k) {
-        if (start->own[k].road >= 0) {
+        if (start->own[k].map >= 0) {
             double low, high;
             kf_enter_track(solver, k);
-            kf_stretch(solver, start->own[k].road, KF_POSE_U(start)[k], &low, &high);
+            kf_around(solver, start->own[k].map, KF_POSE_U(start)[k], &low, &high);
             kf_leave_track(solver);
             if (!(low <= u[k] && u[k] <= high)) {
                 return false;
@@ -119,7 +119,7 @@ bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pos
     pose->has_tracks = true;
     for (k = 0; k < KF_DRIVERS; ++k) {
         pose->own[k].status = KF_OK;
-        pose->own[k].road = start->has_tracks ? start->own[k].road : -1;
+        pose->own[k].map = start->has_tracks ? start->own[k].map : -1;
         pose->own[k].bridge = -1;
         pose->own[k].has_base = false;
         pose->own[k].base_bridge = -1;
@@ -143,19 +143,19 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
         kf_status one;
         if (!has_track(k)) {
             pose->own[k].status = KF_OK;
-            pose->own[k].road = pose->own[k].bridge = pose->own[k].base_bridge = -1;
+            pose->own[k].map = pose->own[k].bridge = pose->own[k].base_bridge = -1;
             pose->own[k].has_base = false;
             continue;
         }
         kf_enter_track(solver, k);
         solver->tolerance = INFINITY; /* the whole is what counts */
-        one = kf_solve_along(solver, kf_own_pose(solver, start, k), kf_driven_at(&solver->model, &u[k], room), own);
+        one = kf_solve_along(solver, kf_on_track(solver, start, k), kf_driven_at(&solver->model, &u[k], room), own);
         if (!KF_GOOD(one) && u != target) { /* the message is to tell of the target */
             char message[KF_MESSAGE];
             kf_status beyond;
             memcpy(message, solver->message, sizeof message);
             kf_driven_at(&solver->model, &target[k], room);
-            beyond = kf_solve_along(solver, kf_own_pose(solver, start, k), room, own);
+            beyond = kf_solve_along(solver, kf_on_track(solver, start, k), room, own);
             if (KF_GOOD(beyond)) {
                 memcpy(solver->message, message, sizeof message);
             } else {
@@ -176,7 +176,7 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
     pose->low = -INFINITY;
     pose->high = INFINITY;
     pose->derivatives = 0;
-    pose->road = pose->bridge = -1;
+    pose->map = pose->bridge = -1;
     pose->has_base = false;
     pose->has_tracks = true;
     pose->status = status;
@@ -186,7 +186,7 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
         limit.block = KF_NO_BLOCK;
         limit.crosses = false;
         solver->message[0] = '\0';
-        kf_say_limit(solver->message, &limit, target, -1);
+        kf_append_limit(solver->message, &limit, target, -1);
         return kf_failed(pose, KF_OUTSIDE);
     }
     pose->found.iterations = iterations;
@@ -199,7 +199,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     double sum = 0.0;
     int k;
     bool is_same = start->has_tracks;
-    if (solver->stuck) {
+    if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
     for (k = 0; k < KF_DRIVERS; ++k) {
@@ -215,15 +215,15 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     }
     solver->message[0] = '\0';
     if (!(sum - sum == 0.0)) {
-        kf_say_place(solver->message, u, KF_ROUGHLY, -1);
-        kf_say(solver->message, " is not a finite number");
+        kf_append_place(solver->message, u, KF_ROUGHLY, -1);
+        kf_append(solver->message, " is not a finite number");
         return kf_failed(pose, KF_OUTSIDE);
     }
 #if KF_MIXES
     for (k = 0; k < KF_DISTANCES; ++k) {
         if (kf_block_drivers[kf_distance_blocks[k]] == KF_MIXED && u[kf_distance_drivers[k]] < 0.0) {
-            kf_say_place(solver->message, u, KF_ROUGHLY, -1);
-            kf_say(solver->message, ": a distance cannot be negative");
+            kf_append_place(solver->message, u, KF_ROUGHLY, -1);
+            kf_append(solver->message, ": a distance cannot be negative");
             return kf_failed(pose, KF_OUTSIDE);
         }
     }

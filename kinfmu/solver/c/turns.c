@@ -1,5 +1,5 @@
 /* Whole turns: angles moved by multiples of 2 pi without a loss of digits. See kinfmu/solver/python/turns.py. */
-#include "way.h"
+#include "internal.h"
 
 #define TURN 6.283185307179586       /* [rad]; for counting */
 #define HIGH 6.2831853069365025      /* [rad]; 2 pi to 32 bits: its multiples by up to 2^21 turns are exact */

@@ -8,7 +8,6 @@ proves that it is a pose of the mechanism: where lengths miss a change point by 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 from typing import Any
 
@@ -17,6 +16,7 @@ from .linear import unclosed
 from .pose import ALONE, AT_REST, EPS, Found, Model, Pose, Vector, evaluated
 from .span import Span, combined, restored_span
 from .status import Status
+from .trusted_step import follow_path
 from .turns import turned, whole_turns
 
 HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
@@ -28,8 +28,6 @@ STRAIGHT = 0.1  # change of a zero located anew, as a part of what is left to go
 DAMPING = 1e-3  # of J dz = -r at a change point: its singular value is 0, the others are far above
 NOISE = 8.0  # roundings of the residual at the centre; a smaller residual is no miss
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
-
-Walk = Callable[[Pose, float], "Pose | None"]  # from a pose to a driver value, plainly
 
 
 class Bridge:
@@ -160,24 +158,23 @@ class Bridge:
         return self.span.difference(self._place(u))
 
     def dump(self) -> list[Any]:
-        """Plain numbers from which `restored` makes the same bridge."""
+        """Plain numbers from which `restored_bridge` makes the same bridge."""
         return [self.span.dump(), self.turns, list(self.raised)]
 
 
-def restored(model: Model, data: list[Any]) -> Bridge:
+def restored_bridge(model: Model, data: list[Any]) -> Bridge:
     """The bridge that was dumped."""
     span, turns, raised = data
     return Bridge(restored_span(model, span), turns, tuple(raised))
 
 
-def moved(bridge: Bridge, pose: Pose, u: float, walk: Walk) -> Bridge | None:
+def moved(model: Model, bridge: Bridge, pose: Pose, u: float) -> Bridge | None:
     """The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats.
 
     It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
     if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
     """
     span = bridge.span
-    model = span.model
     turns = whole_turns(u - span.centre)
     place = turned(u, -turns)
     if turns == bridge.turns or not span.nodes[0].u[0] <= place <= span.nodes[-1].u[0]:
@@ -185,7 +182,7 @@ def moved(bridge: Bridge, pose: Pose, u: float, walk: Walk) -> Bridge | None:
     here = turned(pose.u[0], -turns)
     side = span.nodes[3:] if here > span.centre else span.nodes[:3]
     node = min(side, key=lambda node: abs(node.u[0] - here))
-    arrived = walk(pose, turned(node.u[0], turns))
+    arrived = follow_path(model, pose, turned(node.u[0], turns))
     if arrived is None:
         return None
     raised = []
@@ -200,7 +197,7 @@ def moved(bridge: Bridge, pose: Pose, u: float, walk: Walk) -> Bridge | None:
     return there if there.closes() else None
 
 
-def build(model: Model, pose: Pose, block: int, zero: float, walk: Walk) -> Bridge | None:
+def build(model: Model, pose: Pose, block: int, zero: float) -> Bridge | None:
     """A bridge over the zero of a block's determinant that a regular pose has before it, or None if none proves itself.
 
     zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
@@ -208,12 +205,12 @@ def build(model: Model, pose: Pose, block: int, zero: float, walk: Walk) -> Brid
     the determinant does not fall to zero straight, the far side cannot be reached.
     """
     reach: float = model.REACH[0]
-    centre = _located(pose, block, zero, walk, reach)
+    centre = _located(model, pose, block, zero)
     if centre is None:
         return None
     half, best, apart = HALF_WIDTH * reach, None, AGREED
     while half >= NARROWEST * reach and apart > FINE:
-        span = _spanned(model, pose, block, centre, half, walk)
+        span = _spanned(model, pose, block, centre, half)
         if span is not None and span.apart() < apart:
             best, apart = span, span.apart()
         half *= 0.5
@@ -223,15 +220,16 @@ def build(model: Model, pose: Pose, block: int, zero: float, walk: Walk) -> Brid
     return bridge if bridge.closes() else None
 
 
-def _located(pose: Pose, block: int, zero: float, walk: Walk, reach: float) -> float | None:
+def _located(model: Model, pose: Pose, block: int, zero: float) -> float | None:
     """Where a block's determinant vanishes, by the secant rule from the near side; None if it does not fall straight.
 
     Towards a dead centre it falls like a square root: the secant's zero stays beyond, by as much as is left to go.
     """
+    reach: float = model.REACH[0]
     step = 0.5 * (zero - pose.u[0])
     whole = False  # the first estimate may stem from the same two places
     while abs(step) > 0.1 * NARROWEST * reach:
-        ahead = walk(pose, pose.u[0] + step)
+        ahead = follow_path(model, pose, pose.u[0] + step)
         if ahead is None:
             step, whole = 0.5 * step, False
             continue
@@ -246,12 +244,12 @@ def _located(pose: Pose, block: int, zero: float, walk: Walk, reach: float) -> f
     return None
 
 
-def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float, walk: Walk) -> Span | None:
+def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float) -> Span | None:
     """A span of one width over the zero of a block's determinant, from the side that the pose is on."""
     side = 1.0 if centre > pose.u[0] else -1.0
     near: list[Pose] = []
     for distance in (4.0, 2.0, 1.0):
-        arrived = walk(near[-1] if near else pose, centre - side * distance * half)
+        arrived = follow_path(model, near[-1] if near else pose, centre - side * distance * half)
         if arrived is None:
             return None
         near.append(arrived)

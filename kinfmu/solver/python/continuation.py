@@ -11,11 +11,11 @@ from __future__ import annotations
 from math import hypot
 from typing import Any, NamedTuple
 
-from .advance import FALL, TRUST
 from .linear import factor, lu_solve
 from .pose import Model, Pose, Vector, evaluated, failed, position
 from .solver import TOLERANCE, Solver
 from .status import Status
+from .trusted_step import FALL, TRUST
 
 _SHORTEST = 1e-7  # step in s; where steps get shorter the way ends
 _MOST_STEPS = 10_000
@@ -46,7 +46,17 @@ class UnsolvableModel(Solver):
 
 
 def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Solver:
-    """A Solver for a generated module with these values of its PARAMETERS, or an UnsolvableModel with the reason."""
+    """Return a Solver of a generated module with parameter values.
+
+    Args:
+        module: Generated module with PARAMETERS.
+        values: One for each of them, in the units of the mechanism.
+        tolerance: Residual relative to the size above which a sample is not ok.
+
+    Returns:
+        The Solver; an UnsolvableModel with the reason if the parameters have no solution.
+
+    """
     if not module.PARAMETERS:
         return Solver(module, tolerance)
     model, anchor, message = reach(module, values, tolerance)

@@ -16,13 +16,13 @@ serves arrays, the values of many poses at once (see kinfmu.fmu.block_estimates)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import copysign, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from .linear import Matrix, factor, lu_solve, qr_factor, qr_solve, reciprocal_condition
+from .linear import reciprocal_condition
 from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Found, Model, Pose, Vector, evaluated, tangent_of
 from .tracks import MIXED, Track, held_blocks, rates_in_time
+from .worst_case_step import worst_case_step
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
 UNBOUNDED = 0.5  # change of a determinant, as a part of it, within a pose's error: rates are not known then
@@ -30,7 +30,7 @@ MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest cou
 NOTHING_KNOWN = inf, inf, inf
 
 
-class Drive(NamedTuple):
+class DriverMotion(NamedTuple):
     """How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given."""
 
     ud: Vector
@@ -38,7 +38,7 @@ class Drive(NamedTuple):
     held: int
 
 
-class Rates(NamedTuple):
+class UnknownRates(NamedTuple):
     """First and second derivative of the unknowns, and the largest of each in radians and sizes."""
 
     first: Vector
@@ -59,8 +59,8 @@ class Source(NamedTuple):
 
 def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[float, float, float]:
     """Estimated errors of q, qd, qdd: the largest among the outputs, in radians and sizes, a second and a second^2."""
-    drive = _drive(pose, ud, udd)
-    rates = _rates(model, pose, drive)
+    driven = _driver_motion(pose, ud, udd)
+    rates = _rates(model, pose, driven)
     first, second, speed, curve = rates
     here = model.motion(pose.values, ud, udd, first, second)
     largest = max([abs(here[k]) for k in model.ANGLES], default=0.0)
@@ -73,14 +73,14 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
     least = EPS * (1.0 + largest + model.OFFSET), ROUNDINGS * EPS * speed, ROUNDINGS * EPS * curve
     squares, lost = [0.0, 0.0, 0.0], False
     try:
-        sources = _sources(model, pose, drive, rates)
+        sources = _sources(model, pose, driven, rates)
         if pose.bridge is not None:
-            sources.append(_of_bridge(model, pose, drive, rates))
+            sources.append(_of_bridge(model, pose, driven, rates))
         sources += [
-            _of_track(model, pose, track, own, drive, rates) for track, own in pose.tracks if own.bridge is not None
+            _of_track(model, pose, track, own, driven, rates) for track, own in pose.tracks if own.bridge is not None
         ]
         for source in sources:
-            there, first, second = _moved(model, pose, drive, rates, source)
+            there, first, second = _moved(model, pose, driven, rates, source)
             q, qd, qdd = _differences(model, model.motion(there[-1], ud, udd, first, second), here)
             lost = lost or _is_singular_between(pose, there)
             squares[0] += q * q
@@ -98,7 +98,7 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
     return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
 
 
-def _bridged(model: Model, pose: Pose, ud: Vector, rates: Rates) -> list[tuple[Pose, float, float]]:
+def _bridged(model: Model, pose: Pose, ud: Vector, rates: UnknownRates) -> list[tuple[Pose, float, float]]:
     """What of a pose is interpolated, with its driver's speed in radians and sizes, and its steepest slope."""
     if pose.bridge is not None:
         return [(pose, abs(ud[0]) / model.REACH[0], rates.speed * model.REACH[0])]
@@ -121,13 +121,14 @@ def _is_singular_between(pose: Pose, there: Found) -> bool:
     return any(abs(b - a) > UNBOUNDED * abs(a) for k, (a, b) in pairs if not held >> k & 1)
 
 
-def _is_at_a_crossing(model: Model, pose: Pose, rates: Rates) -> bool:
+def _is_at_a_crossing(model: Model, pose: Pose, rates: UnknownRates) -> bool:
     """True where branches cross and no bridge holds: whose rates these are is not known.
 
     There the rates stay as they are while the determinant falls; right before a dead centre they are steep.
     """
     if any(
-        _is_at_a_crossing(track, own, _rates(track, own, _drive(own, ALONE, AT_REST))) for track, own in pose.tracks
+        _is_at_a_crossing(track, own, _rates(track, own, _driver_motion(own, ALONE, AT_REST)))
+        for track, own in pose.tracks
     ):
         return True
     one = len(pose.u) == 1 and pose.bridge is None
@@ -147,7 +148,7 @@ def margin_of(model: Model, pose: Pose) -> float:
     return margin
 
 
-def with_drive_errors(
+def with_driver_errors(
     model: Model,
     pose: Pose,
     ud: Vector,
@@ -177,7 +178,7 @@ def _shifted(values: Vector, k: int, more: float) -> Vector:
 
 def _motion(model: Model, pose: Pose, ud: Vector, udd: Vector) -> Vector:
     """Positions, rates and accelerations of the outputs."""
-    rates = _rates(model, pose, _drive(pose, ud, udd))
+    rates = _rates(model, pose, _driver_motion(pose, ud, udd))
     return model.motion(pose.values, ud, udd, rates.first, rates.second)  # type: ignore[no-any-return]
 
 
@@ -201,51 +202,51 @@ def _largest(model: Model, there: Vector, here: Vector) -> float:
     return largest
 
 
-def _drive(pose: Pose, ud: Vector, udd: Vector) -> Drive:
+def _driver_motion(pose: Pose, ud: Vector, udd: Vector) -> DriverMotion:
     held = held_blocks(pose)
-    return Drive(ALONE, AT_REST, held) if len(ud) == 1 else Drive(ud, udd, held)
+    return DriverMotion(ALONE, AT_REST, held) if len(ud) == 1 else DriverMotion(ud, udd, held)
 
 
-def _rates(model: Model, pose: Pose, drive: Drive) -> Rates:
+def _rates(model: Model, pose: Pose, driven: DriverMotion) -> UnknownRates:
     speed = curve = 0.0
-    if len(drive.ud) == 1:
+    if len(driven.ud) == 1:
         first, second = tangent_of(model, pose)
     else:
-        first, second = rates_in_time(model, pose, drive.ud, drive.udd)
+        first, second = rates_in_time(model, pose, driven.ud, driven.udd)
     for rate, bend, scale in zip(first, second, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all
         speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
-    for rate, bend, scale in zip(drive.ud, drive.udd, model.REACH):  # noqa: B905  one a driver, all
+    for rate, bend, scale in zip(driven.ud, driven.udd, model.REACH):  # noqa: B905  one a driver, all
         speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
-    return Rates(first, second, speed, max(curve, speed * speed))
+    return UnknownRates(first, second, speed, max(curve, speed * speed))
 
 
-def _sources(model: Model, pose: Pose, drive: Drive, rates: Rates) -> list[Source]:
+def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> list[Source]:
     """What each block adds, the worst ones if there are many, and the bridge."""
     n = len(model.UNKNOWNS)
     rounding = ROUNDINGS * EPS + pose.residual
     matrices = model.jacobians(pose.values)
     found = []
     for block, matrix in enumerate(matrices):
-        if drive.held >> block & 1:
+        if driven.held >> block & 1:
             continue
         low, high = model.BLOCKS[block]
         scales = model.UNKNOWN_SCALES[low:high]
-        softness = _softest(matrix, model.ROW_SCALES[block], scales)
+        step = worst_case_step(matrix, model.ROW_SCALES[block], scales)
         own = farthest = 0.0
-        for z, soft, scale in zip(pose.z[low:high], softness, scales):  # noqa: B905  one an unknown, all
-            own, farthest = max(own, abs(z) / scale), max(farthest, abs(soft) / scale)
+        for z, a, scale in zip(pose.z[low:high], step, scales):  # noqa: B905  one an unknown, all
+            own, farthest = max(own, abs(z) / scale), max(farthest, abs(a) / scale)
         c = rounding + EPS * own
-        found.append((c * farthest, block, softness, c))
+        found.append((c * farthest, block, step, c))
     count = len(found)
     if count > 2:  # a sum of two is the same in any order
         found.sort(key=lambda one: -one[0])
         found = found[:MOST_SOURCES]
     sources = []
-    still = (0.0,) * len(drive.ud)
-    for _, block, softness, c in found:
+    still = (0.0,) * len(driven.ud)
+    for _, block, step, c in found:
         low, high = model.BLOCKS[block]
-        given = (*((0.0,) * low), *softness, *((0.0,) * (n - high)))
-        all_of = model.velocity(pose.values, still, given, drive.held | 1 << block)
+        given = (*((0.0,) * low), *step, *((0.0,) * (n - high)))
+        all_of = model.velocity(pose.values, still, given, driven.held | 1 << block)
         weight = sqrt(count / len(found))
         of_z, of_rates = weight * c, weight * ROUNDINGS * EPS
         of_first, of_second = of_rates * rates.speed, of_rates * rates.curve
@@ -259,52 +260,7 @@ def _sources(model: Model, pose: Pose, drive: Drive, rates: Rates) -> list[Sourc
     return sources
 
 
-def _softest(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[float]:
-    """J^-1 (s R), signs s chosen so that the unknown that can be moved farthest is."""
-    k = len(scales)
-    if len(rows) == k == 1:
-        return (abs(rows[0] / matrix[0][0]),)
-    if len(rows) == k == 2:
-        return _softest_of_two(matrix, rows, scales)
-    columns = _inverse(matrix, rows)
-    reach = [sum([abs(column[j]) for column in columns]) / scales[j] for j in range(k)]
-    worst = reach.index(max(reach))
-    total = [0.0] * k
-    for column in columns:
-        sign = 1.0 if column[worst] >= 0.0 else -1.0
-        total = [a + sign * b for a, b in zip(total, column)]  # noqa: B905  one an unknown, both
-    return total
-
-
-def _softest_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
-    """The same for 2 x 2, with the inverse written out: its columns (d p, -c p) and (-b q, a q)."""
-    (a, b), (c, d) = matrix
-    det = a * d - b * c
-    p, q = rows[0] / det, rows[1] / det
-    dp, cp, bq, aq = d * p, -c * p, -b * q, a * q
-    gain = (abs(dp) + abs(bq)) / scales[0] - (abs(cp) + abs(aq)) / scales[1]
-    first = copysign(1.0, choose(gain, dp, cp) + 0.0)  # -0.0 + 0.0 = 0.0
-    second = copysign(1.0, choose(gain, bq, aq) + 0.0)
-    return first * dp + second * bq, first * cp + second * aq
-
-
-def choose(number: float, if_positive: float, otherwise: float) -> float:
-    """Return `if_positive` for a number of 0 and more."""
-    return if_positive if number >= 0.0 else otherwise
-
-
-def _inverse(matrix: Matrix, rows: Vector) -> list[Sequence[float]]:
-    """Columns of J^-1, of the least-squares inverse if J is tall, each times the scale of its row."""
-    m = len(rows)
-    units = [[scale if j == i else 0.0 for j in range(m)] for i, scale in enumerate(rows)]
-    if m == len(matrix[0]):
-        factors = factor(matrix)
-        return [lu_solve(factors, unit) for unit in units]
-    tall = qr_factor(matrix)
-    return [qr_solve(tall, unit) for unit in units]
-
-
-def _of_bridge(model: Model, pose: Pose, drive: Drive, rates: Rates) -> Source:
+def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
     """What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by."""
     half = pose.bridge.half
     nodes = [_of_node(model, node, half) for node in pose.bridge.span.nodes[2:4]]
@@ -316,18 +272,18 @@ def _of_bridge(model: Model, pose: Pose, drive: Drive, rates: Rates) -> Source:
     ]
     still = (0.0,)
     none = (0.0,) * len(pose.z)
-    moved = tuple(model.velocity(pose.values, still, given[0], drive.held))
+    moved = tuple(model.velocity(pose.values, still, given[0], driven.held))
     first = tuple([a + b for a, b in zip(rates.first, given[1])])  # noqa: B905
     second = tuple([a + b for a, b in zip(rates.second, given[2])])  # noqa: B905
     return Source(moved, none, none, first, second)
 
 
-def _of_track(model: Model, pose: Pose, track: Track, own: Pose, drive: Drive, rates: Rates) -> Source:
+def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
     """What a bridge of one track adds, in time."""
-    alone = _drive(own, ALONE, AT_REST)
+    alone = _driver_motion(own, ALONE, AT_REST)
     along = _rates(track, own, alone)
     off = _of_bridge(track, own, alone, along)
-    v, a = drive.ud[track.driver], drive.udd[track.driver]
+    v, a = driven.ud[track.driver], driven.udd[track.driver]
     still = (0.0,) * len(rates.first)
     one = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one an unknown, all
     two = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
@@ -345,25 +301,27 @@ def _of_track(model: Model, pose: Pose, track: Track, own: Pose, drive: Drive, r
 
 def _of_node(model: Model, node: Pose, half: float) -> Vector:
     """What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together."""
-    drive = _drive(node, ALONE, AT_REST)
-    rates = _rates(model, node, drive)
+    driven = _driver_motion(node, ALONE, AT_REST)
+    rates = _rates(model, node, driven)
     squares = [0.0] * len(node.z)
-    for source in _sources(model, node, drive, rates):
-        _, first, second = _moved(model, node, drive, rates, source)
+    for source in _sources(model, node, driven, rates):
+        _, first, second = _moved(model, node, driven, rates, source)
         for k, dz in enumerate(source.z):
             one = abs(dz) + half * abs(first[k] - rates.first[k]) + half**2 * abs(second[k] - rates.second[k])
             squares[k] += one * one
     return tuple([sqrt(square) for square in squares])
 
 
-def _moved(model: Model, pose: Pose, drive: Drive, rates: Rates, source: Source) -> tuple[Found, Vector, Vector]:
+def _moved(
+    model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates, source: Source
+) -> tuple[Found, Vector, Vector]:
     """What `position` gives at the pose that a source moves to, and its first and second derivative."""
     z = tuple([a + d for a, d in zip(pose.z, source.z)])  # noqa: B905
     there = evaluated(model, pose.u, z)
     values = there[-1]
-    first = model.velocity(values, drive.ud, source.given_first or rates.first, drive.held)
+    first = model.velocity(values, driven.ud, source.given_first or rates.first, driven.held)
     first = _added(first, rates.first, source.first)
-    second = model.acceleration(values, drive.ud, drive.udd, first, source.given_second or rates.second, drive.held)
+    second = model.acceleration(values, driven.ud, driven.udd, first, source.given_second or rates.second, driven.held)
     return there, first, _added(second, rates.second, source.second)
 
 

@@ -37,7 +37,7 @@ class Pose:
         "message",
         "moved",
         "residual",
-        "road",
+        "singularities",
         "status",
         "tangent",
         "tracks",
@@ -47,7 +47,7 @@ class Pose:
         "z",
     )
 
-    def __init__(self, u: Vector, found: Found, road: Any = None) -> None:
+    def __init__(self, u: Vector, found: Found, singularities: Any = None) -> None:
         self.u = u
         (
             self.z,
@@ -59,7 +59,7 @@ class Pose:
             self.watch,
             self.values,
         ) = found
-        self.road = road  # None: nothing singular is known
+        self.singularities = singularities  # a SingularityMap; with several drivers one for each; None: none known
         self.bridge: Any = None
         self.base: Pose | None = None  # where to go on from, if not from here: see advance
         self.status: int = 0
@@ -111,15 +111,15 @@ def directed(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vecto
 
 def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
     """A pose without numbers: what could not be reached from `start`, and why."""
-    pose = Pose(u, start.found(), start.road)
+    pose = Pose(u, start.found(), start.singularities)
     pose.status = status
     pose.message = message
     return pose
 
 
-def on_road(pose: Pose, road: Any) -> Pose:
+def with_map(pose: Pose, singularities: Any) -> Pose:
     """The same pose with other singular stretches known."""
-    other = Pose(pose.u, pose.found(), road)
+    other = Pose(pose.u, pose.found(), singularities)
     other.tangent = pose.tangent
     return other
 

@@ -5,33 +5,17 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any
 
-from .advance import (
-    BENT,
-    CLOSE,
-    GIVE_UP,
-    LONGEST_STEP,
-    MOST_STEPS,
-    NEAR_SINGULAR,
-    NO_BLOCK,
-    SHORTEST_STEP,
-    TOO_FAR,
-    Limit,
-    advance,
-    course,
-    is_beyond,
-    keeps_branch,
-    limit_beyond,
-    limit_message,
-    surveyed,
-    trusted_step,
-)
-from .estimate import estimated_errors, margin_of, with_drive_errors
+from .advance import CLOSE, GIVE_UP, NEAR_SINGULAR, SHORTEST_STEP, advance
+from .estimate import estimated_errors, margin_of, with_driver_errors
+from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond, limit_message
 from .message import place
-from .pose import ALONE, Model, Pose, Vector, evaluated, failed, on_road, tangent_of
-from .road import laid
+from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
+from .singularity_map import restored_map
 from .span import REGULAR
 from .status import Status
+from .survey import surveyed
 from .tracks import MIXED, Track, on_track, rates_in_time, tracks_of
+from .trusted_step import BENT, LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
@@ -64,31 +48,32 @@ class Solver:
             start = start.base
         if u == start.u:
             return self._again(start)
-        road = start.road
+        singularities = start.singularities
         if self._one:  # most samples: one trusted step, away from all that is singular
             s = u[0] - start.u[0]
-            if -self._longest <= s <= self._longest and (road is None or road.low <= u[0] <= road.high):
+            is_apart = singularities is None or singularities.low <= u[0] <= singularities.high
+            if is_apart and -self._longest <= s <= self._longest:
                 near = trusted_step(self.model, start, ALONE, s, u)
                 if near is not None and near.watch <= self.tolerance >= near.residual:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
                     if margin > NEAR_SINGULAR and (margin >= CLOSE or keeps_branch(self.model, start, near, ALONE, s)):
-                        road = surveyed(self.model, start, near)
-                        if road is start.road:  # nothing new there
+                        singularities = surveyed(self.model, start, near)
+                        if singularities is start.singularities:  # nothing new there
                             return near
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
         if any(u[driver] < 0.0 for driver, *_ in self.model.DISTANCES):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
-        pose = advance(self.model, start, u, road)
+        pose = advance(self.model, start, u, singularities)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
         return self._checked(pose)
 
     def _by_tracks(self, start: Pose, u: Vector) -> Pose:
         """The pose put together from those of the tracks, each followed along its own driver."""
-        if u == start.u and (start.tracks or start.road):
+        if u == start.u and (start.tracks or start.singularities):
             return start
         near = self._near(start, u)  # most samples: one trusted step of all drivers
         if near is not None:
@@ -121,8 +106,8 @@ class Solver:
         except (ArithmeticError, ValueError):  # a coordinate that is given outright has no value there
             return failed(start, target, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), target))
         pose.tracks = tuple(parts)
-        roads = {track.driver: own.road for track, own in parts}
-        pose.road = tuple([roads.get(k) for k in range(len(u))])
+        maps = {track.driver: own.singularities for track, own in parts}
+        pose.singularities = tuple([maps.get(k) for k in range(len(u))])
         pose.iterations = sum([own.iterations for _, own in parts])
         statuses = [own.status for _, own in parts]
         if Status.NEAR_SINGULAR in statuses:
@@ -142,7 +127,7 @@ class Solver:
             pose = self._assembled(start, start.base.u, start.base.u, start.base.z)
             if not pose.good:
                 return failed(start, target, Status(pose.status), pose.message)
-        direction, distance = course(model, pose.u, target)
+        direction, distance = straight_path(model, pose.u, target)
         if distance > MOST_STEPS * LONGEST_STEP:
             return failed(start, target, Status.OUTSIDE, limit_message(model, Limit(pose.u, TOO_FAR), target))
         before, regular, limit = pose, pose, None
@@ -190,40 +175,40 @@ class Solver:
         model, chord = self.model, tuple([b - a for a, b in zip(pose.z, there.z, strict=True)])
         if max([abs(a) / scale for a, scale in zip(chord, model.UNKNOWN_SCALES, strict=True)]) > BENT:
             return None
-        mixed = self._mixed.beside(there.z, chord)
-        way = tuple([b - a for a, b in zip(pose.u, u, strict=True)])
+        mixed = self._mixed.with_rest(there.z, chord)
+        path = tuple([b - a for a, b in zip(pose.u, u, strict=True)])
         start = on_track(mixed, pose)
-        trial = trusted_step(mixed, start, way, 1.0, u)
-        if trial is None or (trial.margin < REGULAR and not keeps_branch(mixed, start, trial, way, 1.0)):
+        trial = trusted_step(mixed, start, path, 1.0, u)
+        if trial is None or (trial.margin < REGULAR and not keeps_branch(mixed, start, trial, path, 1.0)):
             return None
-        tracks, road, status, iterations = there.tracks, there.road, there.status, there.iterations
-        there = Pose(u, evaluated(model, u, mixed.put(trial.z, there.z)), road)
+        tracks, singularities, status, iterations = there.tracks, there.singularities, there.status, there.iterations
+        there = Pose(u, evaluated(model, u, mixed.put(trial.z, there.z)), singularities)
         there.tracks, there.status, there.iterations = tracks, status, iterations + trial.iterations
         return there
 
     def _mixed_limit(self, before: Pose, pose: Pose, direction: Vector) -> Limit:
         """Where the way of the blocks that depend on several drivers ends, just beyond a pose."""
         slopes, _ = rates_in_time(self.model, pose, direction, (0.0,) * len(direction))
-        mixed = self._mixed.beside(pose.z, slopes)
+        mixed = self._mixed.with_rest(pose.z, slopes)
         return limit_beyond(mixed, on_track(mixed, before), on_track(mixed, pose), direction)
 
     def _near(self, start: Pose, u: Vector) -> Pose | None:
         """The pose one trusted step away, if it and the step are far from all that is singular on a track."""
         if start.status or start.base is not None or not self._is_apart(start):
             return None
-        direction, distance = course(self.model, start.u, u)
+        direction, distance = straight_path(self.model, start.u, u)
         if not 0.0 < distance <= LONGEST_STEP:
             return None
-        if start.road is not None:
-            for road, value in zip(start.road, u, strict=True):
-                if road is not None and not road.low <= value <= road.high:
+        if start.singularities is not None:
+            for singularities, value in zip(start.singularities, u, strict=True):
+                if singularities is not None and not singularities.low <= value <= singularities.high:
                     return None
         near = trusted_step(self.model, start, direction, distance, u)
         if near is None or not self._is_apart(near) or not near.watch <= self.tolerance >= near.residual:
             return None
         if near.margin < REGULAR and not keeps_branch(self.model, start, near, direction, distance):
             return None
-        near.road = start.road or (None,) * len(u)
+        near.singularities = start.singularities or (None,) * len(u)
         return near
 
     def _is_apart(self, pose: Pose) -> bool:
@@ -237,17 +222,17 @@ class Solver:
     def _again(self, start: Pose) -> Pose:
         """The pose at the driver values of `start`: `start` itself, unless nothing has judged it yet, as the anchor."""
         pose = start
-        if start.margin < REGULAR and start.status == Status.OK and start.road is None:
-            road = surveyed(self.model, start, start) if self._one else None
-            found = start if road is None else advance(self.model, start, start.u, road)
+        if start.margin < REGULAR and start.status == Status.OK and start.singularities is None:
+            singularities = surveyed(self.model, start, start) if self._one else None
+            found = start if singularities is None else advance(self.model, start, start.u, singularities)
             if not isinstance(found, Limit):
                 pose = found
             if pose is start and pose.margin < NEAR_SINGULAR:
-                pose = on_road(start, None)
+                pose = with_map(start, None)
                 pose.status = Status.NEAR_SINGULAR
         if pose.residual <= self.tolerance and pose.watch <= self.tolerance:
             return pose
-        return self._checked(on_road(pose, pose.road))
+        return self._checked(with_map(pose, pose.singularities))
 
     def _checked(self, pose: Pose) -> Pose:
         """The pose, rejected if its rows do not close or the rows set aside as redundant do not hold."""
@@ -324,31 +309,31 @@ class Solver:
         themselves; None if they are exact.
         """
         errors = estimated_errors(self.model, pose, ud, udd)
-        return errors if off is None else with_drive_errors(self.model, pose, ud, udd, off, errors)
+        return errors if off is None else with_driver_errors(self.model, pose, ud, udd, off, errors)
 
     def dump(self, pose: Pose) -> list[Any]:
         """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
         if self._tracks:
-            roads = None if pose.road is None else [None if road is None else road.dump() for road in pose.road]
+            maps = pose.singularities and [None if one is None else one.dump() for one in pose.singularities]
             parts = [self._tracks[track.driver].dump(own) for track, own in pose.tracks]
             base = None if pose.base is None else [list(pose.base.u), list(pose.base.z)]
-            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, roads, parts, base]
-        road = None if pose.road is None else pose.road.dump()
-        standing = -1 if pose.bridge is None else pose.road.bridges.index(pose.bridge)
+            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, maps, parts, base]
+        known = None if pose.singularities is None else pose.singularities.dump()
+        number = -1 if pose.bridge is None else pose.singularities.bridges.index(pose.bridge)
         base = None if pose.base is None else self.dump(pose.base)
-        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, road, standing, base]
+        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, known, number, base]
 
     def restore(self, data: list[Any]) -> Pose:
         """The pose that was dumped."""
         if self._tracks:
             return self._restored(*data)
-        u, z, iterations, status, message, dumped, standing, base = data
-        road = None if dumped is None else laid(self.model, dumped)
-        if road is not None and standing >= 0:
-            pose: Pose = road.bridges[standing].pose(tuple(u))
+        u, z, iterations, status, message, known, number, base = data
+        singularities = None if known is None else restored_map(self.model, known)
+        if singularities is not None and number >= 0:
+            pose: Pose = singularities.bridges[number].pose(tuple(u))
         else:
             pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
-        pose.road = None if road is None else road.around(pose.u[0])
+        pose.singularities = None if singularities is None else singularities.around(pose.u[0])
         pose.iterations, pose.status, pose.message = iterations, status, message
         pose.base = None if base is None else self.restore(base)
         return pose
@@ -360,7 +345,7 @@ class Solver:
         iterations: int,
         status: int,
         message: str,
-        roads: Any,
+        maps: Any,
         parts: list[Any],
         base: list[list[float]] | None,
     ) -> Pose:
@@ -373,12 +358,12 @@ class Solver:
         solvers = [solver for solver in self._tracks if solver is not None]
         if parts:
             pose.tracks = tuple([(s.model, s.restore(own)) for s, own in zip(solvers, parts, strict=True)])
-        if roads is not None:
+        if maps is not None:
             models = [None if solver is None else solver.model for solver in self._tracks]
-            pose.road = tuple(
+            pose.singularities = tuple(
                 [
-                    None if data is None else laid(model, data).around(value)
-                    for model, data, value in zip(models, roads, u, strict=True)
+                    None if data is None else restored_map(model, data).around(value)
+                    for model, data, value in zip(models, maps, u, strict=True)
                 ]
             )
         return pose

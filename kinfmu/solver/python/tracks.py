@@ -62,7 +62,7 @@ class Track:
             ends.append(ends[-1] + high - low)
         self.BLOCKS = tuple(pairwise(ends))
 
-    def beside(self, z: Vector, slopes: Vector) -> Track:
+    def with_rest(self, z: Vector, slopes: Vector) -> Track:
         """The same blocks while the rest of the model is at other unknowns, and moves.
 
         slopes: derivatives of the unknowns of the rest along the way that the drivers go; their second derivatives are
@@ -174,8 +174,8 @@ def on_track(track: Track, pose: Pose) -> Pose:
         margin = min([abs(determinant) for determinant in determinants])
         return Pose(pose.u, (track.of(pose.z), determinants, margin, pose.residual, 0, 0.0, 0.0, pose.values))
     u = (pose.u[track.driver],)
-    road = None if pose.road is None else pose.road[track.driver]
-    return Pose(u, evaluated(track, u, track.of(pose.z)), None if road is None else road.around(u[0]))
+    singularities = None if pose.singularities is None else pose.singularities[track.driver]
+    return Pose(u, evaluated(track, u, track.of(pose.z)), None if singularities is None else singularities.around(u[0]))
 
 
 def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:

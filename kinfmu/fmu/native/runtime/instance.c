@@ -65,21 +65,21 @@ static KF_RARE kf_answer bind(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
     s->unbound = false;
-    s->stuck = !kf_solver_bind(&s->solver, KF_REAL(s, KF_PART_PARAMETERS));
+    s->unsolvable = !kf_solver_bind(&s->solver, KF_REAL(s, KF_PART_PARAMETERS));
     s->committed = s->asked = 0;
     s->poses[0] = s->solver.anchor;
     s->committed_status = KF_OK;
     memcpy(s->committed_u, KF_POSE_U(&s->poses[0]), sizeof s->committed_u);
     s->samples = 0;
     kf_forget(s);
-    return s->stuck ? kf_answered(instance, KF_ERROR, "%s", s->solver.message) : KF_DONE;
+    return s->unsolvable ? kf_answered(instance, KF_ERROR, "%s", s->solver.message) : KF_DONE;
 }
 
 /* The pose at driver values u from the committed one, in poses[asked]. */
 static void solve(kf_state *s, const double *u)
 {
     s->solver.tolerance = *KF_REAL(s, KF_PART_TOLERANCE);
-    if (!s->stuck && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
+    if (!s->unsolvable && memcmp(u, s->committed_u, sizeof s->committed_u) == 0) {
         s->asked = s->committed;
         s->status = s->committed_status;
     } else {
@@ -373,7 +373,7 @@ kf_answer kf_exit_initialization(kf_instance *instance)
     if (s->unbound) {
         bind(instance);
     }
-    if (s->stuck) {
+    if (s->unsolvable) {
         return kf_answered(instance, KF_ERROR, "initialization fails: %s", s->solver.message);
     }
     if (!KF_GOOD(kf_ask(instance))) {

@@ -56,7 +56,7 @@ typedef struct {
     bool model_exchange, driven_by_time;
     int rates; /* the parameter: KF_RATES_AUTO, _ESTIMATED or _WIRED */
     bool unbound; /* parameters were set and not yet bound */
-    bool stuck;   /* they cannot be had */
+    bool unsolvable; /* they cannot be had */
     double time;  /* the communication point, or the point that a failed step asked for */
     bool touched; /* something was set since the last commit */
     bool ahead;   /* what is asked for is the end of a step that failed, not what was set */

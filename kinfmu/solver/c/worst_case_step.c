@@ -1,5 +1,7 @@
-/* How far blocks may be moved by what their rows are known to. See kinfmu/solver/python/estimate.py. */
-#include "way.h"
+/* Worst-case steps: how far rounding of its rows may move the unknowns of a block. See
+ * kinfmu/solver/python/worst_case_step.py.
+ */
+#include "internal.h"
 
 /* The largest of `most` and the sizes of values over their scales. */
 double kf_larger(double most, int count, const double *values, const double *scales)
@@ -20,7 +22,7 @@ int kf_first_of(int block)
 /* J^-1 (s R) of a block, signs s chosen so that the unknown that can be moved farthest is; false if J is singular.
  * rows: R, the scales of its rows.
  */
-bool kf_soften(const kf_model *model, const kf_found *found, int block, const double *rows, double *softness)
+bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step)
 {
     double matrix[KF_ROOM(KF_LARGEST_BLOCK)], columns[KF_ROOM(KF_LARGEST_BLOCK)], unit[KF_ROOM(KF_LARGEST_BLOCK)];
     double factors[2 * KF_ROOM(KF_LARGEST_BLOCK) + KF_LU_ROOM(1)], determinant, farthest = -1.0;
@@ -60,12 +62,12 @@ bool kf_soften(const kf_model *model, const kf_found *found, int block, const do
             farthest = reach;
             worst = j;
         }
-        softness[j] = 0.0;
+        step[j] = 0.0;
     }
     for (i = 0; i < m; ++i) {
         const double sign = columns[i * k + worst] >= 0.0 ? 1.0 : -1.0;
         for (j = 0; j < k; ++j) {
-            softness[j] += sign * columns[i * k + j];
+            step[j] += sign * columns[i * k + j];
         }
     }
     return true;
@@ -84,7 +86,7 @@ double kf_known_to(const kf_found *found, int block)
  */
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight)
 {
-    double softness[KF_ROOM(KF_LARGEST_BLOCK)], farthest[KF_MOST_SOURCES];
+    double step[KF_ROOM(KF_LARGEST_BLOCK)], farthest[KF_MOST_SOURCES];
     const double *rows = kf_row_scales;
     int block, all = 0, count = 0;
     for (block = 0; block < KF_BLOCKS; rows += kf_block_rows[block++]) {
@@ -94,10 +96,10 @@ int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *he
         if ((held != NULL && held[block]) || kf_is_outside(model, block)) {
             continue;
         }
-        if (!kf_soften(model, found, block, rows, softness)) {
+        if (!kf_worst_case_step(model, found, block, rows, step)) {
             return -1;
         }
-        moved = kf_known_to(found, block) * kf_larger(0.0, k, softness, kf_unknown_scales + first);
+        moved = kf_known_to(found, block) * kf_larger(0.0, k, step, kf_unknown_scales + first);
         ++all;
         for (place = count; place > 0 && moved > farthest[place - 1]; --place) {
             if (place < KF_MOST_SOURCES) {

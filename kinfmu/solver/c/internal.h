@@ -1,6 +1,6 @@
-/* What the files of the solver know of each other; nothing here is for others. */
-#ifndef KF_WAY_H
-#define KF_WAY_H
+/* Declarations that the files of the solver share; no other file needs them, except those of kinfmu/simd. */
+#ifndef KF_INTERNAL_H
+#define KF_INTERNAL_H
 
 #include "solver.h"
 
@@ -11,7 +11,7 @@
 #define KF_EPS DBL_EPSILON
 #define KF_REGULAR 0.19      /* determinant from which a block is solved as elsewhere: see span.py */
 #define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see bridge.py */
-#define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see advance.py, as all that follows */
+#define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see trusted_step.py, advance.py and limit.py, as all that follows */
 #define KF_TRUST 10.0
 #define KF_FALL 0.3
 #define KF_NEAR 0.0125       /* determinant below which a pose is near-singular */
@@ -49,15 +49,15 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 #define KF_AT(model, value, room) (value)
 #endif
 #define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
-#define KF_TOLD(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages name; -1: all */
+#define KF_NAMED_DRIVER(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages name; -1: all */
 #define KF_ALONG(solver) KF_ALONG_OF(&(solver)->model)
 #define KF_HERE(solver, pose) (KF_POSE_U(pose)[KF_ALONG(solver)])
-#define KF_MAP(solver) (&(solver)->maps[KF_ALONG(solver)])
+#define KF_POOL(solver) (&(solver)->pools[KF_ALONG(solver)])
 
 /* pose.c */
 extern const double kf_alone[KF_DRIVERS]; /* the direction of a single driver: derivatives are with respect to it */
 extern const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)];
-void kf_fresh(kf_pose *pose, int road, double low, double high);
+void kf_fresh(kf_pose *pose, int map, double low, double high);
 bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found);
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
 void kf_tangent(const kf_model *model, kf_pose *pose);
@@ -92,36 +92,38 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
 int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
 bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero);
 
-/* road.c */
-void kf_stretch(const kf_solver *solver, int road, double u, double *low, double *high);
-bool kf_knows(const kf_solver *solver, int road, double u, int block);
-int kf_with_bridge(kf_solver *solver, int road, int bridge);
-int kf_with_searched(kf_solver *solver, int road, kf_searched stretch);
-int kf_next_bridge(const kf_solver *solver, int road, double here, double target);
+/* singularity_map.c */
+void kf_around(const kf_solver *solver, int map, double u, double *low, double *high);
+bool kf_knows(const kf_solver *solver, int map, double u, int block);
+int kf_with_bridge(kf_solver *solver, int map, int bridge);
+int kf_with_interval(kf_solver *solver, int map, kf_interval interval);
+int kf_next_bridge(const kf_solver *solver, int map, double here, double target);
 int kf_spare_bridge(const kf_solver *solver);
 int kf_spare_span(const kf_solver *solver, int other);
-void kf_needed(kf_solver *solver, int start, int pose, int regular);
+void kf_keep_maps(kf_solver *solver, int start, int pose, int regular);
 
 /* limit.c */
 typedef struct {
     double u[KF_DRIVERS];
     int block;
-    bool crosses; /* the motion does not turn back there, but another branch crosses it, and no bridge holds */
+    bool crosses; /* another branch crosses there and no bridge holds: the motion does not turn back */
 } kf_limit;
 enum { KF_NO_BLOCK = -1, KF_TOO_FAR = -2 };
-void kf_limited(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
+void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit);
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
-void kf_say_limit(char *message, const kf_limit *limit, const double *target, int driver);
+void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
 
 /* advance.c */
-KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int road, const double *target, kf_limit *limit);
+KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const double *target, kf_limit *limit);
+
+/* trusted_step.c */
 bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
                      kf_pose *trial);
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s);
-kf_pose *kf_plainly(kf_solver *solver, kf_pose *start, double u);
+kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u);
 
-/* Direction and length of a straight way of several drivers, measured by the driver that has most to go. */
-static inline double kf_course(const double *start, const double *target, double *direction)
+/* Return direction and length of a straight path of several drivers, measured by the one with most to go. */
+static inline double kf_straight_path(const double *start, const double *target, double *direction)
 {
     double length = 0.0;
     int k;
@@ -139,7 +141,7 @@ KF_RARE int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial);
 
 /* tracks.c */
 #if KF_TRACKS
-kf_pose *kf_own_pose(kf_solver *solver, const kf_pose *whole, int driver);
+kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver);
 kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *z,
                        kf_pose *pose);
 bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
@@ -151,10 +153,10 @@ const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double 
 KF_RARE kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
 #endif
 
-/* softness.c */
+/* worst_case_step.c */
 #define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
 #define KF_MOST_SOURCES 3 /* of a mechanism with more blocks those that move farthest count for all */
-bool kf_soften(const kf_model *model, const kf_found *found, int block, const double *rows, double *softness);
+bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step);
 double kf_known_to(const kf_found *found, int block);
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight);
 double kf_larger(double most, int count, const double *values, const double *scales);
@@ -171,9 +173,9 @@ void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud,
 
 /* message.c */
 enum { KF_ROUGHLY = 6, KF_LOCATED = 10 }; /* digits; limits are located to 1e-10 rad */
-void kf_say(char *message, const char *format, ...);
-void kf_say_number(char *message, const char *format, double value);
-void kf_say_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
+void kf_append(char *message, const char *format, ...);
+void kf_append_number(char *message, const char *format, double value);
+void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
 bool kf_differs(const double *a, const double *b, int digits);
 
 #endif

@@ -1,0 +1,138 @@
+/* Trusted steps: predict, correct, and accept only what stays on the branch. See kinfmu/solver/python/trusted_step.py. */
+#include "internal.h"
+
+#define UNDOUBTED 1e-5      /* [rad, sizes]; a prediction that was corrected by less did not land by accident */
+#define SMOOTH 0.5          /* largest jump of the tangent in a step, as a part of it: a larger one is another branch */
+#define MOST_FOLLOWED 10000 /* steps between a pose and a node; a few, as a rule */
+#define ROUGHEST 5e-4       /* of the longest step; a path that needs shorter ones is not followed */
+
+/* Return whether the columns of a block's J change their orientation from a pose to another, det(J^T J') <= 0.
+ *
+ * The determinant of a block of more rows than unknowns has no sign by which a crossing in between could be seen.
+ */
+static bool turns_over(const kf_model *model, const kf_pose *pose, const kf_pose *trial)
+{
+    double here[KF_ROOM(KF_LARGEST_BLOCK)], there[KF_ROOM(KF_LARGEST_BLOCK)];
+    int block, first = 0;
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        const int rows = kf_block_rows[block], columns = kf_block_ends[block] - first;
+        if (rows > columns && !kf_is_outside(model, block)) {
+            kf_jacobian(model, &pose->found, block, here);
+            kf_jacobian(model, &trial->found, block, there);
+            if (kf_orientation(rows, columns, here, there) <= 0.0) {
+                return true;
+            }
+        }
+        first = kf_block_ends[block];
+    }
+    return false;
+}
+
+/* Take one step of predict and correct; return false if it cannot be trusted to stay on the branch. */
+inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *direction, double s, const double *u,
+                     kf_pose *trial)
+{
+    const kf_model *const model = &solver->model;
+    const double *x1 = pose->x1, *x2 = pose->x2;
+    double needed;
+    int k;
+    if (KF_IS_ONE(solver)) {
+        if (pose->derivatives < 2) {
+            kf_tangent(model, pose);
+        }
+    } else {
+        x1 = solver->scratch.x1;
+        x2 = solver->scratch.x2;
+        KF_VELOCITY(model, &pose->found, direction, NULL, NULL, solver->scratch.x1);
+        KF_ACCELERATION(model, &pose->found, kf_at_rest, x1, NULL, NULL, solver->scratch.x2);
+    }
+    if (kf_position(model, u, pose->found.x, x1, x2, s, NULL, &trial->found) >= 0) { /* singular, or diverged */
+        return false;
+    }
+    needed = KF_TRUST * trial->found.moved;
+    if (needed > trial->found.margin || needed > pose->found.margin || trial->found.margin == 0.0) {
+        return false;
+    }
+    for (k = 0; k < KF_BLOCKS; ++k) {
+        const double before = pose->found.determinants[k], after = trial->found.determinants[k];
+        if (before > 0.0 ? after < KF_FALL * before : after > KF_FALL * before) {
+            return false;
+        }
+    }
+    if (KF_TALL && turns_over(model, pose, trial)) {
+        return false;
+    }
+    for (k = 0; trial->found.moved > UNDOUBTED && k < KF_UNKNOWNS; ++k) {
+        if (fabs(x2[k]) * s * s > 2.0 * KF_BENT * kf_unknown_scales[k]) {
+            return false;
+        }
+    }
+    kf_fresh(trial, pose->map, pose->low, pose->high);
+    return true;
+}
+
+/* Return false if the tangent of a path jumps in a step along it, as it does from one branch to a crossing one.
+ *
+ * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
+ * their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either
+ * that both branches are the same in doubles, no step leads on.
+ */
+bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
+{
+    const kf_model *const model = &solver->model;
+    const double *x1 = pose->x1, *x2 = pose->x2, *const there = trial->x1;
+    double largest = 0.0, jump = 0.0;
+    int block, k = 0;
+    if (pose->found.margin < KF_UNDECIDED && trial->found.margin > pose->found.margin) {
+        return false;
+    }
+    if (KF_IS_ONE(solver)) {
+        kf_tangent(model, pose);
+        kf_tangent(model, trial);
+    } else {
+        x1 = solver->scratch.x1; /* of the step from the pose to the trial */
+        x2 = solver->scratch.x2;
+        KF_VELOCITY(model, &trial->found, direction, NULL, NULL, trial->x1);
+    }
+    for (block = 0; block < KF_BLOCKS; ++block) {
+        for (; k < kf_block_ends[block]; ++k) {
+            if (!kf_is_outside(model, block)) {
+                largest = fmax(largest, fabs(there[k]) / kf_unknown_scales[k]);
+                jump = fmax(jump, fabs(there[k] - (x1[k] + s * x2[k])) / kf_unknown_scales[k]);
+            }
+        }
+    }
+    return jump <= SMOOTH * largest;
+}
+
+/* Return the pose at a value of the only driver, followed by trusted steps without bridges, or NULL. It lasts until the
+ * next call, which may start from it.
+ */
+kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
+{
+    const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)];
+    kf_pose *const found = solver->scratch.follow, *pose = start;
+    double step = longest;
+#if KF_TRACKS
+    double room[KF_DRIVERS];
+#endif
+    int k;
+    for (k = 0; k < MOST_FOLLOWED; ++k) {
+        const double here = KF_HERE(solver, pose), distance = u - here;
+        const bool whole = -step <= distance && distance <= step;
+        const double s = whole ? distance : distance > 0.0 ? step : -step, there = whole ? u : here + s;
+        kf_pose *const trial = pose == &found[0] ? &found[1] : &found[0];
+        if (here == u) {
+            return pose;
+        }
+        if (kf_trusted_step(solver, pose, KF_SPEEDS(&solver->model), s, KF_AT(&solver->model, &there, room), trial)) {
+            pose = trial;
+            continue;
+        }
+        step = 0.5 * fabs(s);
+        if (step < ROUGHEST * longest) {
+            return NULL;
+        }
+    }
+    return NULL;
+}
