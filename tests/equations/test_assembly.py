@@ -194,6 +194,12 @@ def test_rough_starts_near_change_points_are_assembled(seed: int) -> None:
     assert assembled.margin > 1e-6
 
 
+@pytest.mark.parametrize("seed", [577, 1690, 1926])
+def test_a_start_between_limits_close_to_each_other_is_reached(seed: int) -> None:
+    """Bars too long by 1e-11: within 1e-5 rad no pose closes, and the law starts a little beyond."""
+    assert trial(seed, STARTS_ANYWHERE).judged().faults == []
+
+
 @pytest.mark.parametrize("miss", [1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3])
 @pytest.mark.parametrize(("bars", "angle"), [((2, 1, 2, 1), 0.0), ((4, 1, 3, 2), math.pi), ((3, 3, 2, 2), 0.0)])
 def test_a_start_that_misses_a_change_point_is_assembled_or_said_to_be_ambiguous(
