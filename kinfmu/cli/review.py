@@ -42,6 +42,6 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
         return on_axis(at or "", "--at", timeline.label, timeline.unit)
 
     place = None if at is None else moment
-    recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, tell=note)
+    recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)
     made = [str(path) for path in (recording, screenshot) if path is not None]
     click.echo(f"made {listed(made)}")

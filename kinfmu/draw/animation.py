@@ -19,7 +19,7 @@ from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
 from kinfmu.draw.slides import rails, slots_and_blocks
 from kinfmu.draw.wheels import cams, racks, wheels
-from kinfmu.draw.writing import house_style, write_bytes
+from kinfmu.draw.writing import figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.measures.placement import body_of
@@ -74,7 +74,7 @@ def animate(run: Run, path: str | Path) -> None:
         raise FigureError(f"{path}: '{path.suffix}' is no moving picture that can be drawn; known: .gif")
     mechanism, poses = _placed(run, path)
     film = _film(run, poses, path)
-    with house_style(path):
+    with figure_style(path):
         images = list(_images(run, mechanism, poses, film))
     write_bytes(path, _gif(images, film))
 

@@ -27,7 +27,7 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
     paths = paths if isinstance(paths, tuple) else (paths,)
     for path in paths:
         check_suffix(path)
-    with house_style(paths[0]):
+    with figure_style(paths[0]):
         figure = draw()
         images = [_image(figure, suffix_of(path)) for path in paths]
     for path, image in zip(paths, images, strict=True):
@@ -35,7 +35,7 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
 
 
 @contextmanager
-def house_style(path: Path) -> Iterator[None]:
+def figure_style(path: Path) -> Iterator[None]:
     """A picture of ours, whatever the user's own settings are; MissingPackageError about `path` without matplotlib."""
     try:
         import matplotlib as mpl

@@ -1,4 +1,4 @@
-"""What a run leaves: MCAP as the durable record, Rerun as the picture, tables for everything else.
+"""Files of runs: MCAP as the permanent record, Rerun recordings for viewing, tables for other programs.
 
 The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not on import.
 """
@@ -30,11 +30,11 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """A public function, from the module that holds it."""
+    """Return a public function from the module that defines it."""
     if name not in _HOME:
         raise AttributeError(f"module 'kinfmu.log' has no attribute '{name}'")
     found = getattr(import_module(f"kinfmu.log.{_HOME[name]}"), name)
-    globals()[name] = found  # from now on without this detour
+    globals()[name] = found  # the next access does not come here
     return found
 
 

@@ -1,4 +1,4 @@
-"""The container MCAP, written: whole chunks of equal messages, built by numpy, with indexes and checksums.
+"""Writer of the MCAP container: chunks of messages of one layout, built by numpy, with indexes and checksums.
 
     magic, header | schemas, channels, metadata, attachments, chunks each with its message index | data end
     | summary: schemas, channels, statistics, indexes of chunks, attachments, metadata; their places | footer, magic
@@ -32,7 +32,7 @@ LEVEL = -1  # of zstd: 1 takes a quarter more time for 2 % of the size, 3 twice 
 MOST_PENDING = 4  # chunks that are being compressed
 MESSAGE = np.dtype(
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
-)  # what stands before the payload of a message
+)  # the head of a message, before its payload
 _INDEX = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
@@ -57,7 +57,7 @@ class Opcode(IntEnum):
 
 
 class Messages(NamedTuple):
-    """Messages of one length: their place among those of the chunk (n,), log times (n,) [ns], and what fills payloads.
+    """Messages of one length: their places in the chunk (n,), log times (n,) [ns] and payloads.
 
     fill(payloads): writes the payloads (n, length).
     """
@@ -69,7 +69,7 @@ class Messages(NamedTuple):
 
 
 class _Chunk(NamedTuple):
-    """A chunk on its way into the file: what it holds, and what its compression gives: bytes and checksum."""
+    """A chunk that is being compressed; packed: its compressed bytes and checksum."""
 
     channel: int
     times: NDArray[np.uint64]
@@ -79,10 +79,10 @@ class _Chunk(NamedTuple):
 
 
 class McapWriter:
-    """Writes one MCAP file; every failure of the file is an OSError.
+    """Writer of one MCAP file; every failure of the file is an OSError.
 
-    file: without a buffer, so that a killed process loses nothing of it. at_once: every chunk is in the file when
-    `write` returns; else chunks are compressed beside the caller.
+    file: without a buffer, so that no data are lost when the process is killed. at_once: every chunk is in the file
+    when `write` returns; default: other threads compress the chunks.
     """
 
     def __init__(self, file: RawIOBase, *, profile: str, library: str, at_once: bool = False) -> None:
@@ -106,12 +106,12 @@ class McapWriter:
         self._pool = None if at_once else ThreadPoolExecutor(min(2, os.cpu_count() or 1))
         self._put(MAGIC + _record(Opcode.HEADER, _text(profile) + _text(library)))
 
-    def go_on_in(self, file: RawIOBase) -> None:
-        """Write on at the end of this file, which is the same under another name."""
+    def continue_in(self, file: RawIOBase) -> None:
+        """Continue at the end of `file`, which is the same file opened under another name."""
         self._file = file
 
     def channel(self, topic: str, encoding: str, schema: str, definition: str, metadata: Mapping[str, str]) -> int:
-        """Id of a new channel, whose messages are of a schema (ros2msg) by name and definition."""
+        """Add a channel and return its id; schema, definition: name and text of the message type (ros2msg)."""
         if schema not in self._schemas:
             body = struct.pack("<H", len(self._schemas) + 1) + _text(schema) + _text("ros2msg") + _text(definition)
             self._schemas[schema] = _record(Opcode.SCHEMA, body)
@@ -125,14 +125,14 @@ class McapWriter:
         return channel
 
     def metadata(self, name: str, table: Mapping[str, str]) -> None:
-        """A table of texts by name."""
+        """Write a metadata record: texts by key."""
         record = _record(Opcode.METADATA, _text(name) + _table(table))
         place = struct.pack("<QQ", self._at_end(), len(record))
         self._indexes[Opcode.METADATA_INDEX].append(_record(Opcode.METADATA_INDEX, place + _text(name)))
         self._put(record)
 
     def attachment(self, name: str, media_type: str, data: bytes) -> None:
-        """A file inside the file."""
+        """Write an attachment, a file inside the file."""
         about = _text(name) + _text(media_type)
         body = struct.pack("<QQ", 0, 0) + about + struct.pack("<Q", len(data)) + data
         record = _record(Opcode.ATTACHMENT, body + struct.pack("<I", zlib.crc32(body)))
@@ -141,7 +141,7 @@ class McapWriter:
         self._put(record)
 
     def write(self, channel: int, *kinds: Messages) -> None:
-        """One chunk of messages; several kinds of them are merged by their places."""
+        """Write one chunk of messages; messages of several lengths are merged by their places."""
         kinds = tuple(kind for kind in kinds if len(kind.places))
         if not kinds:
             return
@@ -174,7 +174,7 @@ class McapWriter:
             self._put_chunk(self._pending.popleft())
 
     def _block(self, channel: int, kind: Messages, ranks: NDArray[np.int64]) -> Bytes:
-        """Messages (n, bytes) of one kind, which stand at `ranks` in the chunk."""
+        """Return messages of one length, (n, bytes), which have the positions `ranks` in the chunk."""
         block = np.empty((len(ranks), MESSAGE.itemsize + kind.length), np.uint8)
         heads = block[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0]
         heads["opcode"] = Opcode.MESSAGE
@@ -186,8 +186,8 @@ class McapWriter:
         return block
 
     def finish(self) -> None:
-        """Write the summary; the file is whole then."""
-        self._put(_record(Opcode.DATA_END, struct.pack("<I", 0)))  # 0: no checksum of everything, chunks have theirs
+        """Write the summary, which completes the file."""
+        self._put(_record(Opcode.DATA_END, struct.pack("<I", 0)))  # 0: no checksum; each chunk has its own
         groups = {
             Opcode.SCHEMA: list(self._schemas.values()),
             Opcode.CHANNEL: self._channels,
@@ -207,7 +207,7 @@ class McapWriter:
         self.close()
 
     def close(self) -> None:
-        """Give up what is not in the file yet."""
+        """Discard what is not in the file yet."""
         self._pending.clear()
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
@@ -217,7 +217,7 @@ class McapWriter:
         self._write_all(data)
 
     def _at_end(self) -> int:
-        """The place behind all chunks."""
+        """Write all pending chunks and return the length of the file."""
         while self._pending:
             self._put_chunk(self._pending.popleft())
         return self.length

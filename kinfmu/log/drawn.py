@@ -1,4 +1,4 @@
-"""The topics of ROS 2 that viewers draw by themselves: joint states, transforms, the robot description, the log."""
+"""ROS 2 topics that viewers draw without set-up: joint states, transforms, robot description, log."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from kinfmu.run import Event, Run
 from kinfmu.scene.scene import scene
 from kinfmu.units import METRES, derivative_name, quantity_of
 
-SOURCE = "kinfmu"  # who speaks in the log: the run's own events
-STATUS_SOURCE = "kinfmu.status"  # and what follows from the samples
+SOURCE = "kinfmu"  # of log messages that are events of the run
+STATUS_SOURCE = "kinfmu.status"  # of log messages that follow from the samples
 LOG_TOPIC = "/log"
 
 
 class JointTopic:
-    """Positions and speeds, or accelerations, of outputs; an empty message where a gap begins ends the curve."""
+    """Positions and speeds, or accelerations, of outputs; an empty message ends the curve where a gap begins."""
 
     def __init__(self, writer: McapWriter, run: Run, topic: str, columns: Sequence[int], orders: Sequence[int]) -> None:
         names = tuple(run.outputs[k] for k in columns)
@@ -39,7 +39,7 @@ class JointTopic:
         self._channel = writer.channel(topic, "cdr", "sensor_msgs/msg/JointState", ros2.JOINT_STATE, {"units": units})
 
     def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
-        """The next samples."""
+        """Write the next samples; stamps (n,) [ns]."""
         good = run.good
         rows = np.flatnonzero(good)
         gaps = np.flatnonzero(~good & np.append(self._was_good, good[:-1]))
@@ -56,7 +56,7 @@ class JointTopic:
 
 
 class LinkTopic:
-    """Poses of all links where every one of them is known, and what they look like, once."""
+    """Poses of all links at samples where all of them are known, and once the robot description."""
 
     def __init__(self, writer: McapWriter, run: Run, mechanism: Mechanism) -> None:
         self._writer, self._mechanism = writer, mechanism
@@ -66,7 +66,7 @@ class LinkTopic:
         self._channel = -1
 
     def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
-        """The next samples."""
+        """Write the next samples; stamps (n,) [ns]."""
         if self._template is None:
             self._describe(run, stamps)
         if self._template is None:
@@ -77,7 +77,7 @@ class LinkTopic:
             nothing = np.zeros_like(x)
             place = [metres * x, metres * y, nothing]
             numbers.append(np.column_stack([*place, nothing, nothing, np.sin(phi / 2), np.cos(phi / 2)]))
-        with np.errstate(over="ignore", invalid="ignore"):  # numbers of others may be as large as they get
+        with np.errstate(over="ignore", invalid="ignore"):  # a foreign record may hold any numbers
             rows = np.flatnonzero(run.good & np.isfinite(sum(table.sum(axis=1) for table in numbers)))
         at = stamps[rows]
         if len(rows) < len(run):
@@ -87,7 +87,7 @@ class LinkTopic:
         )
 
     def _describe(self, run: Run, stamps: NDArray[np.int64]) -> None:
-        """The robot description, of the size that the mechanism has in its first pose."""
+        """Write the robot description, drawn to the size of the mechanism in its first pose."""
         first = int(np.argmax(run.good))
         shown = scene(run.part(slice(first, first + 1)), self._mechanism)
         frames = urdf.frames(run.part(slice(0, 0)), self._mechanism)
@@ -104,24 +104,25 @@ class LinkTopic:
 
 
 class LogTopic:
-    """What happened."""
+    """The topic of events and changes of status."""
 
     def __init__(self, writer: McapWriter, zero: int) -> None:
         self._writer, self._zero = writer, zero
         self._channel = writer.channel(LOG_TOPIC, "cdr", "rcl_interfaces/msg/Log", ros2.LOG, {})
 
     def add(self, entries: Sequence[tuple[str, Event]]) -> None:
-        """Events by time, each with who tells of it."""
-        alike: dict[tuple[str, str, str], list[int]] = {}
+        """Write events in order of time, each with its source."""
+        repeated: dict[tuple[str, str, str], list[int]] = {}
         for place, (source, event) in enumerate(entries):
-            alike.setdefault((source, event.level, event.text), []).append(place)
+            repeated.setdefault((source, event.level, event.text), []).append(place)
         times = np.array([max(event.t, float(self._zero)) for _, event in entries])
         stamps = nanoseconds(times) - self._zero * NANOSECONDS
-        self._writer.write(self._channel, *(_entries(*key, np.array(places), stamps) for key, places in alike.items()))
+        messages = (_entries(*key, np.array(places), stamps) for key, places in repeated.items())
+        self._writer.write(self._channel, *messages)
 
 
 def _entries(source: str, level: str, text: str, places: NDArray[np.int64], stamps: NDArray[np.int64]) -> Messages:
-    """Messages of the log that say the same."""
+    """Return log messages of the same source, level and text."""
     number = ros2.LOG_LEVELS.get(level, ros2.LOG_LEVELS["info"])
     template = Template().stamp().uint8(number).string(source).string(text).string("").string("").uint32(0)
     at = stamps[places]
@@ -129,7 +130,7 @@ def _entries(source: str, level: str, text: str, places: NDArray[np.int64], stam
 
 
 def event_in(message: bytes, t: float) -> Event | None:
-    """The run's own event in a message of the log, at time t [s]; None for what follows from the samples."""
+    """Return the event in a log message at time t [s]; None if the message follows from the samples."""
     level = next((name for name, number in ros2.LOG_LEVELS.items() if number == message[12]), "info")
     at, texts = 16, []
     for _ in range(2):
@@ -140,7 +141,7 @@ def event_in(message: bytes, t: float) -> Event | None:
 
 
 def joint_topics(writer: McapWriter, run: Run) -> list[JointTopic]:
-    """/joint_states and /joint_accelerations of the columns that are kept."""
+    """Return the topics /joint_states and /joint_accelerations of the columns that are kept."""
     kept = [
         [k for k, name in enumerate(run.outputs) if derivative_name(name, order) not in run.absent]
         for order in range(3)

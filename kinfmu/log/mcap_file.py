@@ -1,4 +1,4 @@
-"""MCAP: the durable record of a run, which viewers of ROS 2 draw with no set-up.
+"""MCAP: the permanent record of a run, which ROS 2 viewers draw without set-up.
 
     /sample               kinfmu_msgs/msg/Sample                 the full record, in the mechanism's own units
     /joint_states         sensor_msgs/msg/JointState             positions and speeds [m, rad, s]
@@ -7,10 +7,10 @@
     /tf                   tf2_msgs/msg/TFMessage                 where they are [m]
     /log                  rcl_interfaces/msg/Log                 changes of status and events
 
-Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full record keeps every sample as it is, so
-`read` gives back the same run, bit for bit. The mechanism file and the FMU's model description are attachments.
+Samples without numbers (status 3 to 5) are a gap in the drawn topics; the full record keeps every sample unchanged, so
+`read` returns the same run, bit for bit. The mechanism file and the FMU's model description are attachments.
 Metadata: kinfmu.record (names, units, constants), kinfmu.info (of the run: token, parameters), kinfmu.about (versions,
-what the times mean), and at the end kinfmu.end (number of samples, events, verdict, why a run ended early).
+meaning of the times), and at the end kinfmu.end (number of samples, events, verdict, why a run ended early).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_drawn, select
 
-ROWS = 4096  # samples in a chunk of a run that is there as a whole; more take memory, fewer time
+ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
 SAMPLE_TOPIC = "/sample"
 MECHANISM_FILE = "mechanism.toml"
@@ -48,16 +48,22 @@ CHECKSUM = "checksum"  # of metadata and attachments; chunks have their own
 
 
 def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = None, rate: float | None = None) -> None:
-    """Write `run` to one MCAP file (chunks of zstd), log times in nanoseconds of simulation time.
+    """Write `run` to one MCAP file (zstd chunks); log times are nanoseconds of simulation time.
 
-    channels: what to keep of every sample, all if None, such as ["q", "drawn"] or ["-error"]; ["-drawn"]: the record
-    alone, less than half as large. rate: samples to keep in a second of the run. Both as kinfmu.run.channels tells.
+    Args:
+        run: The run.
+        path: The file; an older one is replaced when the new one is complete.
+        channels: What to keep of every sample, such as ["q", "drawn"] or ["-error"]; see kinfmu.run.channels. Default:
+            everything. ["-drawn"] keeps the record alone, less than half as large.
+        rate: Samples to keep per second of the run. Default: all.
 
-    Raises a LogError for a file that cannot be written, which leaves an older one as it was, and for times that a log
-    cannot hold; a RequestError for channels and rates that cannot be meant.
+    Raises:
+        LogError: The file cannot be written, or a time is outside the range of a log.
+        RequestError: Invalid channels or rate.
+
     """
     run = select(run, channels, rate)
-    nanoseconds(run.t)  # says what is wrong with a time before a file is begun
+    nanoseconds(run.t)  # reports invalid times before a file is made
     with replacing(path) as temporary, FileIO(temporary, "w") as file:
         content = Content(file, run, zero_of(run.t), drawn=is_drawn(channels))
         try:
@@ -71,10 +77,10 @@ def write_mcap(run: Run, path: str | Path, *, channels: Sequence[str] | None = N
 
 
 class Content:
-    """What an MCAP file holds, while it is being written.
+    """The content of an MCAP file that is being written.
 
-    run: as it is when it begins, with or without samples; zero: where log times are counted from [s]; at_once: what is
-    added is in the file at once.
+    run: the run at its beginning, with or without samples; zero: origin of log times [s]; at_once: True if samples are
+    in the file when `add` returns.
     """
 
     def __init__(self, file: FileIO, run: Run, zero: int, *, drawn: bool = True, at_once: bool = False) -> None:
@@ -110,7 +116,7 @@ class Content:
         return self._writer.length
 
     def add(self, run: Run) -> None:
-        """The next samples."""
+        """Write the next samples."""
         stamps = nanoseconds(run.t) - self._zero * NANOSECONDS
         if not len(run):
             return
@@ -120,24 +126,24 @@ class Content:
             topic.add(run, stamps)
 
     def log(self, changes: Iterable[Event], events: Iterable[Event]) -> None:
-        """Changes of status and the run's own events."""
+        """Write changes of status and the run's own events."""
         entries = [(STATUS_SOURCE, event) for event in changes] + [(SOURCE, event) for event in events]
         if self._log:
             self._log.add(sorted(entries, key=lambda entry: entry[1].t))
 
     def end(self, run: Run, outcome: str = "") -> None:
-        """Say how the run went, and finish the file. outcome: why it ended early, as far as no event says so."""
+        """Write the verdict and finish the file; outcome: why the run ended early, if no event states that."""
         failures = [event.text for event in run.events if event.level == "error"]
         texts = ending(run) | {"verdict": sentence(run), "outcome": outcome or (failures or ["completed"])[0]}
         self._writer.metadata(END, texts | {CHECKSUM: checksum(texts)})
         self._writer.finish()
 
-    def go_on_in(self, file: FileIO) -> None:
-        """Write on at the end of this file, which is the same under another name."""
-        self._writer.go_on_in(file)
+    def continue_in(self, file: FileIO) -> None:
+        """Continue at the end of `file`, which is the same file opened under another name."""
+        self._writer.continue_in(file)
 
     def close(self) -> None:
-        """Give up what is not in the file yet."""
+        """Discard what is not in the file yet."""
         self._writer.close()
 
 
@@ -156,7 +162,7 @@ class _SampleTopic:
         self._channel = writer.channel(SAMPLE_TOPIC, "cdr", "kinfmu_msgs/msg/Sample", definition, metadata)
 
     def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
-        """The next samples."""
+        """Write the next samples."""
         template, numbers = self._template, tables(run, self._layout)
         self._writer.write(
             self._channel,
@@ -165,18 +171,18 @@ class _SampleTopic:
 
 
 def sample_template(columns: int) -> Template:
-    """The layout of /sample: a stamp, then the columns."""
+    """Return the layout of /sample: a stamp, then the columns."""
     return Template().stamp().words(columns)
 
 
 def checksum(*texts: Mapping[str, str]) -> str:
-    """CRC-32 of all names and texts, in hexadecimal."""
+    """Return the CRC-32 of all names and texts, in hexadecimal."""
     parts = [part for table in texts for entry in table.items() for part in entry]
     return f"{zlib.crc32(chr(0).join(parts).encode()):08x}"
 
 
 def _versions() -> dict[str, str]:
-    """What wrote a file."""
+    """Return the versions of the software that writes the file."""
     return {
         "kinfmu": VERSION,
         "python": platform.python_version(),

@@ -1,4 +1,4 @@
-"""An MCAP file that grows with its run: what was added is there, whatever happens to the process."""
+"""An MCAP file that grows with its run: what was added is in the file, even if the process is killed."""
 
 from __future__ import annotations
 
@@ -12,19 +12,23 @@ from shlex import quote
 from kinfmu.files.whole_file import lock_for_writing
 from kinfmu.log.clock import zero_of
 from kinfmu.log.mcap_file import Content
-from kinfmu.log.target import check_room, checked, replacing, unwritable
+from kinfmu.log.target import check_writable, checked, replacing, write_error
 from kinfmu.log.verdict import status_events, unexplained
 from kinfmu.run import Event, Run
 from kinfmu.solver.python.status import Status
 
 
 class McapLog:
-    """A sink for `simulate`: an MCAP file as `write_mcap` writes it, with a chunk in it for every piece of the run.
+    """A sink for `simulate` that writes the MCAP file of `write_mcap`, one chunk for each piece of the run.
 
-    drawn: with the topics that viewers of ROS 2 draw. The file takes the place of an older one with its first samples.
-    Until its end no other run takes this name. Of a run that was killed it holds what was added; `recover` makes a
-    whole file of it. When it can no longer be
-    written, what was written stays, and the LogError says up to when.
+    The file replaces an older one of this name when the first samples are written. The name is locked until the run
+    ends. If the process is killed, the file holds what was added; `recover` makes a complete file of it. If the file
+    cannot be written any more, what was written stays, and the LogError states up to which time.
+
+    Args:
+        path: The file to write.
+        drawn: True (default) to add the topics that ROS 2 viewers draw.
+
     """
 
     def __init__(self, path: str | Path, *, drawn: bool = True) -> None:
@@ -33,38 +37,63 @@ class McapLog:
         self._content: Content | None = None
         self._file: FileIO | None = None
         self._status = Status.OK  # of the last sample in the file
-        self._held: list[Event] = []  # failures that the next piece may tell the reason of
+        self._held: list[Event] = []  # failures whose reason may be in the next piece
 
     def begin(self, run: Run) -> None:  # noqa: ARG002  # every piece of the run holds what is in this one
-        """The run before its first sample; LogError if no file can be made."""
-        check_room(self.path)
+        """Begin a run.
+
+        Args:
+            run: The run before its first sample.
+
+        Raises:
+            LogError: The file cannot be made, or another run is being written to it.
+
+        """
+        check_writable(self.path)
         self._content, self._status, self._held = None, Status.OK, []
 
     def add(self, run: Run) -> None:
-        """The next samples, and the events since the last call."""
+        """Write the next samples, and the events since the last call.
+
+        Args:
+            run: These samples and events only.
+
+        Raises:
+            LogError: The file cannot be written.
+
+        """
         if self._content is None:
             self._start(run)
         else:
-            with self._kept_if_it_fails():
+            with self._whole_records():
                 self._put(self._content, run)
 
     def end(self, run: Run, reason: str) -> None:
-        """The whole run; reason: why it ended early, if none of its events says so."""
+        """Finish the file.
+
+        Args:
+            run: The whole run.
+            reason: Why it ended early, if none of its events states that; else empty.
+
+        Raises:
+            LogError: The file cannot be written.
+
+        """
         if self._content is None:
             self._start(run)
         if self._content and self._file:
-            with self._kept_if_it_fails():
+            with self._whole_records():
                 self._content.log(self._held, ())
                 self._content.end(run, reason)
         self.close()
 
     def close(self) -> None:
-        """Leave the file as it is: `end` does so, and who gives up before."""
+        """Close the file as it is; `end` does this too."""
         if self._file:
             self._file.close()
 
     def _start(self, run: Run) -> None:
-        """The file with its first samples: whatever fails here leaves an older file as it was."""
+        """Make the file with its first samples; a failure leaves an older file unchanged."""
         file: FileIO | None = None
         try:
             with replacing(self.path) as temporary:
@@ -72,7 +101,7 @@ class McapLog:
                 lock_for_writing(file.fileno())
                 content = Content(file, run, zero_of(run.t), drawn=self._drawn, at_once=True)
                 self._put(content, run)
-                if sys.platform == "win32":  # where an open file cannot be renamed
+                if sys.platform == "win32":  # an open file cannot be renamed there
                     file.close()
         except BaseException:
             if file:
@@ -80,7 +109,7 @@ class McapLog:
             raise
         if file.closed:
             file = FileIO(checked(self.path), "a")
-            content.go_on_in(file)
+            content.continue_in(file)
         self._file, self._content = file, content
 
     def _put(self, content: Content, run: Run) -> None:
@@ -93,8 +122,8 @@ class McapLog:
             self._status = Status(int(run.status[-1]))
 
     @contextmanager
-    def _kept_if_it_fails(self) -> Iterator[None]:
-        """What fails in this block leaves whole records in the file."""
+    def _whole_records(self) -> Iterator[None]:
+        """If writing fails in this block, cut the file after its last complete record."""
         try:
             yield
         except OSError as error:
@@ -104,4 +133,4 @@ class McapLog:
                 self._file.truncate(self._content.length)
             self.close()
             kept = f"; it holds the run up to t = {self._content.until:g} s: kinfmu recover {quote(str(self.path))}"
-            raise unwritable(self.path, error, kept) from error
+            raise write_error(self.path, error, kept) from error

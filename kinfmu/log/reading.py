@@ -1,4 +1,4 @@
-"""The run in an MCAP file, read back: whole, or what is left of one that was cut off."""
+"""Reading the run in an MCAP file, complete or cut off."""
 
 from __future__ import annotations
 
@@ -34,9 +34,14 @@ from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 
 
 def read(path: str | Path) -> Run:
-    """The run that was written to `path`, equal in every bit.
+    """Return the run in an MCAP file, bit for bit as it was written.
 
-    Raises a LogError for a file that cannot be read, is no record of kinfmu, or is cut off or damaged, with the place.
+    Args:
+        path: A file of `write_mcap`, `McapLog` or `kinfmu simulate`.
+
+    Raises:
+        LogError: The file is not a record of kinfmu, cannot be read, or is damaged or cut off, with the place.
+
     """
     scan = _scan(path)
     if scan.fault:
@@ -45,25 +50,35 @@ def read(path: str | Path) -> Run:
         run, _ = _run_in(scan)
         return run
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise _read_error(path, error) from None
     except LogError as error:
         raise LogError(f"{path}: {error}{_advice(scan, path)}") from None
 
 
 def recover(path: str | Path, output: str | Path) -> Run:
-    """Write what is in a file that was cut off or damaged, up to there, as a whole file; returns that run.
+    """Write what is left of a file that was cut off or damaged as a complete file.
 
-    An event of level "warning" says where the samples end and why. Raises a LogError if there is no beginning of a run,
-    or if a file cannot be read or written.
+    An event of level "warning" states where the samples end and why.
+
+    Args:
+        path: The damaged MCAP file.
+        output: The MCAP file to write.
+
+    Returns:
+        The run in `output`.
+
+    Raises:
+        LogError: `path` holds no beginning of a run, or a file cannot be read or written.
+
     """
     scan = _scan(path)
     try:
         run, fault = _run_in(scan, is_cut=True)
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise _read_error(path, error) from None
     except LogError as error:
         raise LogError(f"{path}: nothing can be recovered: {scan.fault or error}") from None
-    run = _cut_off(run, fault)
+    run = _with_end_noted(run, fault)
     write_mcap(run, output)
     return run
 
@@ -72,36 +87,36 @@ def _scan(path: str | Path) -> Scan:
     try:
         return Scan(Path(path))
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise _read_error(path, error) from None
 
 
-def _unreadable(path: str | Path, error: OSError) -> LogError:
+def _read_error(path: str | Path, error: OSError) -> LogError:
     return LogError(f"{path}: cannot be read ({error.strerror or error})")
 
 
 def _advice(scan: Scan, path: str | Path) -> str:
-    """What helps where the first samples of a run are."""
+    """Return the next command for a file that holds the beginning of a run, else ''."""
     is_begun = RECORD in scan.metadata and scan.id_of(SAMPLE_TOPIC) is not None
-    return f"; kinfmu recover {quote(str(path))} keeps what is there" if is_begun else ""
+    return f"; kinfmu recover {quote(str(path))} keeps what is left" if is_begun else ""
 
 
 def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
-    """The run in a file; is_cut: as far as it goes, and why it goes no further."""
+    """Return the run in a file; if is_cut, what is left of it, and why there is no more."""
     channel = scan.id_of(SAMPLE_TOPIC)
     if RECORD not in scan.metadata or channel is None:
         topics = listed(sorted(one.topic for one in scan.channels.values()))
-        raise LogError(f"no topic {SAMPLE_TOPIC}, so this is no run of kinfmu; topics: {topics}")
+        raise LogError(f"no topic {SAMPLE_TOPIC}, so this is not a run of kinfmu; topics: {topics}")
     texts, info, end = (scan.metadata.get(name, {}) for name in (RECORD, INFO, END))
     try:
         attachments = {name: scan.attachments.get(name, b"").decode() for name in (MECHANISM_FILE, MODEL_DESCRIPTION)}
     except UnicodeDecodeError:
         attachments = {}
     if texts.pop(CHECKSUM, "") != checksum(texts, info, attachments):
-        raise LogError("metadata or mechanism are damaged (their checksum does not fit)")
+        raise LogError("metadata or mechanism are damaged (wrong checksum)")
     if end and end.pop(CHECKSUM, "") != checksum(end):
         end = {}
     if not (end or is_cut):
-        raise LogError("how the run ended is missing or damaged")
+        raise LogError(f"metadata '{END}', written at the end of a run, are missing or damaged")
     about = lists_in(texts)
     count = samples_of(end) if end else MOST_SAMPLES
     events = events_of(end) if end else ()
@@ -118,9 +133,9 @@ def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
 def _samples(
     scan: Scan, channel: int, template: Template, count: int, *, is_cut: bool
 ) -> tuple[list[NDArray[np.uint64]], str]:
-    """Rows of samples, in blocks in the order of their numbers, and why there are no more; count: the most there are.
+    """Return rows of samples as blocks, in order of their numbers, and why there are no more.
 
-    The count that the file states bounds the memory: reading ends there.
+    count: the largest number of samples; it bounds the memory.
     """
     blocks: list[NDArray[np.uint64]] = []
     numbers: list[NDArray[np.uint32]] = []
@@ -141,7 +156,7 @@ def _samples(
     sequence = np.concatenate(numbers) if numbers else np.empty(0)
     if np.array_equal(sequence, np.arange(len(sequence))):
         return blocks, fault
-    order = np.argsort(sequence, kind="stable")  # another program put them into another order, or some are missing
+    order = np.argsort(sequence, kind="stable")  # another program has sorted them differently, or some are missing
     known = int(np.argmin(np.append(sequence[order] == np.arange(len(order)), False)))
     return [np.concatenate(blocks)[order[:known]]], fault or (
         "" if known == len(order) else f"sample {known} is missing"
@@ -149,7 +164,7 @@ def _samples(
 
 
 def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
-    """The run's own events from the log, at the times of samples where they were logged with one."""
+    """Return the run's events from the log topic; events logged with a sample get its exact time."""
     channel = scan.id_of(LOG_TOPIC)
     about = scan.metadata.get(ABOUT, {})
     if channel is None:
@@ -164,12 +179,12 @@ def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
                 if event:
                     events.append(event)
     except (LogError, ValueError, IndexError, struct.error):
-        pass  # reading the samples reports why the file ends there; a damaged message ends the events too
+        pass  # events after a damaged message are lost; reading the samples reports where the file is damaged
     return tuple(events)
 
 
-def _cut_off(run: Run, fault: str) -> Run:
-    """The run with an event that says where its samples end."""
+def _with_end_noted(run: Run, fault: str) -> Run:
+    """Return the run with an event that states where and why its samples end."""
     if not fault:
         return run
     end = float(run.t[-1]) if len(run) else 0.0

@@ -1,7 +1,7 @@
-"""A run as texts and rows of 8-byte items, and back: what every file that keeps a whole run stores.
+"""A run as texts and rows of 8-byte items, and back: the common content of all files that keep a whole run.
 
-The texts hold what the columns do not say: names, units, constants when the run begins, how many samples and which
-events when it has ended. Floats are written so that they read back to the same bits.
+The texts hold what is not in the columns: names, units and constants, known when the run begins; the number of samples
+and the events, known when it has ended. Floats are written so that they read back to the same bits.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from kinfmu.mechanism.valid import quoted
 from kinfmu.run import Event, Run
 from kinfmu.solver.python.status import Status
 
-FORMAT = "2"  # raised when files written before can no longer be read the same way
+FORMAT = "2"  # increased when older files can no longer be read the same way
 _INTEGERS = ("status", "iterations")
 _TABLES = ("inputs", "values", "rates", "accelerations", "error", "watch")  # of several columns
 
 
 def description(run: Run) -> dict[str, str]:
-    """What is known of a run when it begins, without its info and its mechanism, as texts."""
+    """Return what is known when a run begins as texts; its info and its mechanism are stored separately."""
     lists: dict[str, Any] = {
         "columns": [place.name for place in run.places()],
         "units": {place.name: place.unit for place in run.places()},
@@ -44,23 +44,23 @@ def description(run: Run) -> dict[str, str]:
 
 
 def ending(run: Run) -> dict[str, str]:
-    """What is known only when it has ended, as texts."""
+    """Return what is known only when a run has ended as texts."""
     return {"samples": json.dumps(len(run)), "events": json.dumps(run.events, ensure_ascii=False)}
 
 
 def lists_in(texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return what `description` put into texts; LogError for another format, and for lists that do not go together."""
+    """Return the values that `description` made texts of; LogError for another format and for lists that disagree."""
     if texts.get("format") != FORMAT:
-        raise LogError(f"format {quoted(texts.get('format'))} of the record; this kinfmu reads {FORMAT!r}")
+        raise LogError(f"format {quoted(texts.get('format'))} of the record; this version of kinfmu reads {FORMAT!r}")
     about = lists_of(texts)
     names = [place.name for place in _empty(about, 0).places()]
     if names != about["columns"]:
-        raise LogError("columns of the record are not those of its outputs, inputs and watches")
+        raise LogError("columns of the record do not match its outputs, inputs and watches")
     return about
 
 
 def is_integer(table: str) -> bool:
-    """True for tables that count, which hold int64; the others hold float64."""
+    """Return True for tables of int64; the others hold float64."""
     return table in _INTEGERS
 
 
@@ -68,7 +68,7 @@ Layout = Sequence[tuple[str, list[int] | None]]  # tables by name, and which of 
 
 
 def layout(run: Run) -> Layout:
-    """Where the columns that were kept stand, in their order."""
+    """Return the tables and columns that were kept, in their order."""
     found: list[tuple[str, list[int] | None]] = []
     for name, group in groupby(run.places(kept=False), key=lambda place: place.table):
         places = list(group)
@@ -79,7 +79,7 @@ def layout(run: Run) -> Layout:
 
 
 def tables(run: Run, columns: Layout) -> list[NDArray[np.generic]]:
-    """All columns that were kept, side by side, as tables (n, k) of 8-byte items."""
+    """Return all columns that were kept as tables (n, k) of 8-byte items."""
     found = []
     for name, kept in columns:
         table = _of_columns(np.asarray(getattr(run, name), "<i8" if is_integer(name) else "<f8"))
@@ -88,7 +88,7 @@ def tables(run: Run, columns: Layout) -> list[NDArray[np.generic]]:
 
 
 def _of_columns(table: NDArray[Any]) -> NDArray[Any]:
-    """A column as a table of one."""
+    """Return a column as a table of one column."""
     return table[:, None] if table.ndim == 1 else table
 
 
@@ -100,9 +100,10 @@ def run_of(
     mechanism_text: str,
     model_description: str,
 ) -> Run:
-    """The run that was written; about: of `lists_in`; blocks: (k, columns) rows of `tables`.
+    """Return the run that was written.
 
-    Raises a LogError for samples with an invalid status or time.
+    about: result of `lists_in`; blocks: (k, columns) rows of `tables`. LogError for samples with an invalid status or
+    time.
     """
     run = replace(
         _empty(about, sum(map(len, blocks))),
@@ -121,12 +122,12 @@ def run_of(
 
 
 def _empty(about: Mapping[str, Any], n: int) -> Run:
-    """A run of n samples that are not filled in yet; columns that were not kept hold NaN."""
+    """Return a run of n samples that are not filled in yet; columns that were not kept hold NaN."""
     outputs, inputs, watches = (tuple(about[key]) for key in ("outputs", "input_names", "watch_names"))
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
     blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
-    blank["inputs"] = np.zeros((n, len(inputs)))  # numbers, for they are looked at before they are filled
+    blank["inputs"] = np.zeros((n, len(inputs)))  # they are read before they are filled
     blank |= {name: np.empty(n) for name in ("residual", "margin")}
     blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
     empty = Run(
@@ -148,7 +149,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
 
 
 def _fill(run: Run, blocks: Sequence[NDArray[np.uint64]]) -> None:
-    """Rows into the tables of a run, block by block while they are in the processor's cache."""
+    """Copy rows into the tables of a run, block by block so that each block stays in the processor's cache."""
     moves = []
     at = 0
     for name, kept in layout(run):

@@ -1,4 +1,4 @@
-"""Reading the texts of a record: a foreign file may hold anything under a valid checksum."""
+"""Reading and checking the texts of a record: a foreign file may hold anything under a valid checksum."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 
 
 def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return what `record.description` put into the texts: names by kind, units, constants, counts.
+    """Return the values in the texts of `record.description`: names by kind, units, constants, counts.
 
-    Raises a LogError for what is missing or of another kind, for names that cannot be names, and for too many of them.
+    LogError for values that are missing, of another type or invalid, and for lists that are too long.
     """
     kinds: dict[str, tuple[Callable[[Any], bool], str]] = {
         "columns": (_are_lines, "names"),
@@ -42,7 +42,7 @@ def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
             raise LogError(f"{key} of the record: {len(value)} entries; {MOST_COLUMNS} at most")
         if not is_valid(value):
             raise LogError(f"{key} of the record = {quoted(value)} must be {valid}")
-    found["axis"] = axis = _value(texts, "axis") if "axis" in texts else TIME  # which older records do not name
+    found["axis"] = axis = _value(texts, "axis") if "axis" in texts else TIME  # older records have no axis
     if not isinstance(axis, str):
         raise LogError(f"axis of the record = {quoted(axis)} must be the name of an input, or {TIME} or {SAMPLE}")
     if found["coordinate_count"] > len(found["outputs"]):
@@ -61,7 +61,7 @@ def samples_of(texts: Mapping[str, str]) -> int:
 
 
 def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
-    """Return the events in the texts of `record.ending`; LogError for what is no event."""
+    """Return the events in the texts of `record.ending`; LogError for entries that are not events."""
     entries = _value(texts, "events")
     if not isinstance(entries, list):
         raise LogError(f"events of the record = {quoted(entries)} must be a list")
@@ -72,7 +72,7 @@ def events_of(texts: Mapping[str, str]) -> tuple[Event, ...]:
 
 
 def whole_number(texts: Mapping[str, str], key: str) -> int:
-    """Return a whole number that is written as a text, 0 if there is none; LogError for any other text."""
+    """Return a whole number that is written as text, default 0; LogError for any other text."""
     text = texts.get(key, "0")
     if not re.fullmatch(r"[+-]?[0-9]{1,12}", text):
         raise LogError(f"{key} of the record = {quoted(text)} must be a whole number")
@@ -80,7 +80,7 @@ def whole_number(texts: Mapping[str, str], key: str) -> int:
 
 
 def _value(texts: Mapping[str, str], key: str) -> Any:
-    """The JSON value of a text."""
+    """Return the JSON value of a text."""
     if key not in texts:
         raise LogError(f"{key} of the record is missing")
     try:
@@ -96,7 +96,7 @@ def _is_count(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """True for a number that a double holds; infinity and NaN are numbers of JSON in Python."""
+    """Return True for a number that a double can hold; Python's JSON has infinity and NaN as well."""
     return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1e300)
 
 

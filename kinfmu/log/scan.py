@@ -1,4 +1,4 @@
-"""The container MCAP, read: record after record, as far as the file goes, whole or cut off."""
+"""Reader of the MCAP container: record after record, of a file that is complete or cut off."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from kinfmu.log.container import MAGIC, MESSAGE, Bytes, Opcode
 from kinfmu.mechanism.valid import quoted
 
 MOST_IN_CHUNK = 2**27  # [bytes] unpacked; twice what a chunk of ours holds
-ALWAYS = 2**20  # [bytes] that every chunk may unpack to, whatever its index says
+ALWAYS = 2**20  # [bytes] that every chunk may unpack to, whatever its index states
 MOST_UNPACKED = 2**27  # [bytes] in all chunks of a channel, or LARGEST_RATIO times the file
 LARGEST_RATIO = 2000  # of unpacked to packed; an index of 16 bytes a message leaves less
-MOST_RECORDS = 4  # for each packed byte of a chunk; messages differ in their numbers, so each takes a byte or more
+MOST_RECORDS = 4  # per packed byte of a chunk; a message takes at least one, because messages differ
 _HEAD = struct.Struct("<BQ")  # of a record: its kind and its length
 _ENTRY = 16  # [bytes] of a message in the index of its chunk
 
@@ -42,14 +42,14 @@ class Block(NamedTuple):
 
 @dataclass
 class _Chunk:
-    """Where a chunk's record is, and how many messages of each channel its index counts; none without an index."""
+    """Place of a chunk's record, and the number of messages by channel in its index; empty without an index."""
 
     place: int
     length: int
     messages: dict[int, int] = field(default_factory=dict)
 
     def most(self, channel: int, length: int | None) -> int:
-        """Bytes that it may unpack to; length: of a message's payload, if all have the same."""
+        """Return the largest valid unpacked size [bytes]; length: of each payload, if all are of one length."""
         if length is None:
             return MOST_IN_CHUNK
         count = 2 * self.messages[channel] if list(self.messages) == [channel] else MOST_RECORDS * self.length
@@ -57,7 +57,7 @@ class _Chunk:
 
 
 class Scan:
-    """What an MCAP file holds. fault: where and why its records end early, empty if the file is whole."""
+    """Content of an MCAP file; fault: where and why its records end early, empty if the file is complete."""
 
     def __init__(self, path: Path) -> None:
         self.channels: dict[int, Channel] = {}
@@ -70,13 +70,13 @@ class Scan:
             self.fault = self._read(file, self._size)
 
     def id_of(self, topic: str) -> int | None:
-        """The channel of a topic."""
+        """Return the number of a topic's channel, None if there is none."""
         return next((number for number, channel in self.channels.items() if channel.topic == topic), None)
 
     def blocks(self, channel: int, length: int | None = None) -> Iterator[Block]:
-        """The messages of a channel in file order; length: of every payload, if they are known to have the same.
+        """Yield the messages of a channel in file order; length: of each payload, if all are of one length.
 
-        Raises a LogError where a chunk is damaged, and where one or all of them unpack to more than they can hold.
+        LogError for a damaged chunk, and for chunks whose unpacked size is larger than valid ones can be.
         """
         left = max(MOST_UNPACKED, LARGEST_RATIO * self._size)
         with self._path.open("rb") as file:
@@ -109,7 +109,7 @@ class Scan:
             file.seek(place + 9 + length)
 
     def _take(self, kind: int, file: BinaryIO, length: int) -> bool:
-        """Look at a record; True for the last one."""
+        """Take what is needed of a record; return True for the last record of a file."""
         if kind == Opcode.CHUNK:
             self._chunks.append(_Chunk(file.tell(), length))
         elif kind == Opcode.MESSAGE_INDEX and self._chunks:
@@ -133,12 +133,12 @@ class Scan:
             (count,) = body.numbers("<Q")
             self.attachments[name] = body.taken(count)
         elif kind not in Opcode._value2member_map_:
-            raise ValueError(f"{kind:#x} is no kind of record")
+            raise ValueError(f"{kind:#x} is not a kind of record")
         return kind == Opcode.FOOTER
 
 
 class _Body:
-    """The bytes of a record, taken one field after another."""
+    """The bytes of a record, read field by field."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
@@ -167,20 +167,20 @@ class _Body:
 
 
 def _unpacked(data: bytes, place: int, most: int) -> Bytes:
-    """The messages of a chunk, whose record has this body at this byte of the file; most: bytes that they may have."""
+    """Return the unpacked messages of a chunk; data: its record's body, at byte `place`; most: largest size [bytes]."""
     try:
         body = _Body(data)
         _, _, size = body.numbers("<QQQ")
         (crc,) = body.numbers("<I")
         compression = body.text()
         if size > most:
-            raise ValueError(f"it says that it unpacks to {size} bytes, and {most} is the most here")
+            raise ValueError(f"its unpacked size is {size} bytes; the largest valid size is {most}")
         (count,) = body.numbers("<Q")
         raw = _decompressed(compression, body.taken(count), size)
     except (ValueError, struct.error) as error:
         raise LogError(f"the chunk at byte {place} is damaged: {error}") from None
     if len(raw) != size or (crc and zlib.crc32(raw) != crc):
-        raise LogError(f"the chunk at byte {place} is damaged: its checksum does not fit")
+        raise LogError(f"the chunk at byte {place} is damaged: wrong checksum")
     return np.frombuffer(raw, np.uint8)
 
 
@@ -193,7 +193,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
 
             try:
                 if zstandard.frame_content_size(data) not in (-1, size):
-                    raise ValueError("its sizes do not fit")
+                    raise ValueError("its sizes disagree")
                 return zstandard.ZstdDecompressor().decompress(data, size)
             except zstandard.ZstdError as error:
                 raise ValueError(str(error)) from None
@@ -206,16 +206,16 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
                 raise ValueError(str(error)) from None
     except ImportError as error:
         raise MissingPackageError(f"chunks of {compression} need {error.name}: pip install {error.name}") from None
-    raise ValueError(f"compression {quoted(compression)} is not known")
+    raise ValueError(f"compression {quoted(compression)} is not known; known: zstd, lz4")
 
 
 def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Block]:
-    """Messages of a channel in a chunk, which begins at this byte of the file; most: records that it may hold."""
+    """Yield the messages of a channel in an unpacked chunk at byte `place`; most: largest valid number of records."""
     length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
     if length and len(raw) % length == 0:
         table = raw.reshape(-1, length)
         heads = table[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0] if length >= MESSAGE.itemsize else None
-        if heads is not None and _are_alike(heads):
+        if heads is not None and _are_uniform(heads):
             if heads["channel"][0] == channel:
                 yield _block(table)
             return
@@ -233,8 +233,8 @@ def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Block
         at += 9 + length
 
 
-def _are_alike(heads: NDArray[np.void]) -> bool:
-    """True if all records are messages of one channel and one length."""
+def _are_uniform(heads: NDArray[np.void]) -> bool:
+    """Return True if all records are messages of one channel and one length."""
     first = heads[0]
     return first["opcode"] == Opcode.MESSAGE and all(
         bool((heads[name] == first[name]).all()) for name in ("opcode", "length", "channel")

@@ -1,4 +1,4 @@
-"""Tables of a run for everything else: CSV, Parquet and numpy's npz, one column for each name of the contract."""
+"""Tables of a run for other programs: CSV, Parquet and numpy's npz, one column for each variable."""
 
 from __future__ import annotations
 
@@ -15,33 +15,39 @@ from kinfmu.run import Column, Run
 from kinfmu.run.channels import select
 from kinfmu.run.run import arrow_table
 
-ROWS = 4096  # of a CSV file at once: numbers of Python take four times the memory
+ROWS = 4096  # of a CSV file converted at once: Python's numbers take four times the memory
 
 
 def write_table(run: Run, path: str | Path, columns: Sequence[str] | None = None) -> None:
-    """Write columns of `run` to a .csv, .parquet or .npz file: all, or those named, in the run's order.
+    """Write columns of `run` to a .csv, .parquet or .npz file, in the run's order.
 
-    columns: names such as 'coupler.x', 'coupler.*', 'q' or '-error', as those of channels that a simulation keeps; time
-    and status are always there.
+    CSV: one line of names, then one line per sample, as `pandas.read_csv(path)` reads it; samples without numbers are
+    nan. Parquet (in the metadata of fields and table) and npz (`kinfmu.units` for `kinfmu.columns`) also hold units and
+    mechanism. Numbers read back to the same bits, except -0.0, which is written as 0.0.
 
-    CSV: one line of names, then one a sample, and nothing else, so that `pandas.read_csv(path)` reads it; a sample
-    without numbers says nan. Parquet (metadata of fields and table) and npz (`kinfmu.units` beside `kinfmu.columns`)
-    carry the units and the mechanism too. Numbers read back to the same bits, but -0.0, which is written as 0.0.
+    Args:
+        run: The run.
+        path: The file; its suffix chooses the format.
+        columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-error', see kinfmu.run.channels; time and status are
+            always written. Default: all columns.
 
-    Raises a RequestError for a name that is not there, a LogError for another suffix or a file that cannot be written,
-    MissingPackageError without pyarrow.
+    Raises:
+        RequestError: The run has no column of that name.
+        LogError: The suffix is unknown, or the file cannot be written.
+        MissingPackageError: Parquet without pyarrow.
+
     """
     writers = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
     suffix = suffix_of(path)
     if suffix not in writers:
-        raise LogError(f"{path}: '{suffix}' is no table that can be written; known: {listed(writers)}")
+        raise LogError(f"{path}: '{suffix}' is not a known format of tables; known: {listed(writers)}")
     chosen = run if columns is None else select(run, columns)
     with replacing(path) as temporary:
         writers[suffix](chosen, temporary)
 
 
 def _columns(run: Run) -> list[Column]:
-    """The run's columns without negative zeros, which mean nothing to who reads a table."""
+    """Return the run's columns with 0.0 in place of -0.0, whose sign has no meaning in a table."""
     return [column._replace(values=column.values + 0) for column in run.columns()]
 
 
@@ -56,7 +62,7 @@ def _write_csv(run: Run, path: Path) -> None:
 
 
 def _quoted(name: str) -> str:
-    """A name as a CSV field."""
+    """Return a name as a CSV field."""
     return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n\r') else name
 
 
@@ -79,5 +85,5 @@ def _write_npz(run: Run, path: Path) -> None:
         "kinfmu.units": np.array([column.unit for column in columns]),
         "kinfmu.mechanism": np.array(run.mechanism_text),
     }
-    with path.open("wb") as file:  # numpy would give a path another suffix
+    with path.open("wb") as file:  # numpy would change the suffix of a path
         np.savez_compressed(file, allow_pickle=False, **{column.name: column.values for column in columns}, **texts)

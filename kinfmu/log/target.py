@@ -1,4 +1,4 @@
-"""Files appear whole or not at all: written beside the target under a temporary name, then renamed."""
+"""Files that appear complete or not at all: written under a temporary name, then renamed."""
 
 from __future__ import annotations
 
@@ -13,22 +13,21 @@ from kinfmu.files.whole_file import check_is_free, hidden_sibling, replacement
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """An empty file beside `path` to write into; it takes the place of `path` when the block ends without an error.
+    """Yield an empty file in the folder of `path`, which replaces `path` when the block ends without an error.
 
-    A failure loses nothing: what stood at `path` before still stands there. A folder that is missing or cannot be
-    written is a LogError.
+    After a failure `path` is unchanged. LogError for a folder that is missing or cannot be written.
     """
     target = checked(path)
     try:
         with replacement(target) as temporary:
             yield temporary
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise write_error(path, error) from error
 
 
 def checked(path: str | Path) -> Path:
-    """Where a file of that name is, or is to be: the end of a link; LogError if none can be there."""
-    target = Path(os.path.realpath(path))  # a link stays a link
+    """Return where a file of that name is or will be, the target of a link; LogError if no file can be there."""
+    target = Path(os.path.realpath(path))  # the link is kept
     if target.is_dir():
         raise LogError(f"{path}: is a folder; the name of a file is needed")
     if not target.parent.is_dir():
@@ -38,8 +37,8 @@ def checked(path: str | Path) -> Path:
     return target
 
 
-def check_room(path: str | Path) -> None:
-    """LogError if no file can be made where `path` is to be, or if another run is being written to it."""
+def check_writable(path: str | Path) -> None:
+    """Raise a LogError if no file can be made at `path`, or if another run is being written to it."""
     target = checked(path)
     temporary = hidden_sibling(target)
     try:
@@ -47,9 +46,9 @@ def check_room(path: str | Path) -> None:
         temporary.open("xb").close()
         temporary.unlink()
     except OSError as error:
-        raise unwritable(path, error) from error
+        raise write_error(path, error) from error
 
 
-def unwritable(path: str | Path, error: OSError, more: str = "") -> LogError:
-    """What is told when a file cannot be written."""
+def write_error(path: str | Path, error: OSError, more: str = "") -> LogError:
+    """Return the error for a file that cannot be written; more: added to its message."""
     return LogError(f"{path}: cannot be written ({error.strerror or error}){more}")

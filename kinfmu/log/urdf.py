@@ -1,4 +1,4 @@
-"""The robot description of a record: links of simple shapes as URDF, and the frames in which they move."""
+"""Robot description of a record: links of simple shapes as URDF, and the poses of their frames."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from kinfmu.scene.placing import poses_of, world
 from kinfmu.scene.scene import DrawnCylinder, Scene
 from kinfmu.scene.strokes import Stroke
 
-KNOWN_AT_ONCE = ("cam", "roller", "wheel", "spoke", "belt", "block")  # strokes that one pose tells the size of
-_BAR, _BARREL, _ROD, _BLOCK = 0.02, 1.4, 0.6, 1.8  # width of links as a part of the size; of others against theirs
+KNOWN_AT_ONCE = ("cam", "roller", "wheel", "spoke", "belt", "block")  # strokes whose size follows from one pose
+_BAR, _BARREL, _ROD, _BLOCK = 0.02, 1.4, 0.6, 1.8  # width of links relative to the size; of others relative to links
 
 
 def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
-    """Pose (n, 3) of x, y [length], phi [rad] of every link of the description: bodies, bars, then cylinders."""
+    """Return poses (n, 3) of x, y [length], phi [rad] of every link of the description: bodies, bars, cylinders."""
     poses, _ = poses_of(run, mechanism)
     placed = {body.name: poses[body.name] for body in mechanism.moving_bodies if body.name in poses}
     points = mechanism.body_points
@@ -49,11 +49,11 @@ def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
 
 
 def robot_description(name: str, scene: Scene, metres: float) -> str:
-    """URDF of the scene: every link under ROOT by a floating joint, so that closed loops need no tree.
+    """Return the URDF of the scene; a floating joint connects each link to ROOT, since closed loops are not a tree.
 
-    metres: length of the mechanism's unit [m]. Links lie in layers above each other so that none hides another. What
-    joints add to them is there as far as one pose tells how large it is (KNOWN_AT_ONCE): a record that grows knows no
-    more. For the same reason a cylinder's rod is as long as the cylinder is in that pose.
+    metres: length of the mechanism's unit [m]. Each link has its own layer, so that none hides another. Of what joints
+    add to links only KNOWN_AT_ONCE is drawn, whose size follows from one pose: a record that grows does not know the
+    later poses. For the same reason a cylinder's rod is as long as the cylinder is in that pose.
     """
     brush = _Brush(scene.size, metres)
     width = brush.width
@@ -90,12 +90,12 @@ def _bar_frame(joint: str) -> str:
 
 
 def _cylinder_frames(driver: str) -> tuple[str, str]:
-    """Of the barrel and of the rod."""
+    """Return the frames of the barrel and of the rod."""
     return f"cylinder.{driver}.barrel", f"cylinder.{driver}.rod"
 
 
 def _cylinder(brush: _Brush, cylinder: DrawnCylinder, height: float) -> dict[str, list[str]]:
-    """The links of the barrel, from its pin on, and of the rod, back from its own."""
+    """Return the links of the barrel and of the rod; each begins at its own pin."""
     barrel, rod = _cylinder_frames(cylinder.shape.driver)
     length = float(np.hypot(*(cylinder.ends[0, 1] - cylinder.ends[0, 0])))
     tube, shaft = np.array([[0.0, 0.0], [cylinder.shape.barrel, 0.0]]), np.array([[-length, 0.0], [0.0, 0.0]])
@@ -106,7 +106,7 @@ def _cylinder(brush: _Brush, cylinder: DrawnCylinder, height: float) -> dict[str
 
 
 def _added(brush: _Brush, strokes: Iterable[Stroke], own: palette.Colour, height: float) -> Iterator[str]:
-    """What joints add to a body, where one pose tells its size; blocks above the links, the rest below them."""
+    """Yield what joints add to a body, of KNOWN_AT_ONCE; blocks above the links, the rest below them."""
     for stroke in strokes:
         kind = stroke.name.partition("/")[0]
         if kind not in KNOWN_AT_ONCE:
@@ -119,14 +119,14 @@ def _added(brush: _Brush, strokes: Iterable[Stroke], own: palette.Colour, height
 
 
 class _Brush:
-    """Draws visuals of URDF. size: of the mechanism [length]; metres: length of its unit [m]; width: of links [m]."""
+    """Writer of URDF visuals; size: of the mechanism [length]; metres: length of its unit [m]; width: of links [m]."""
 
     def __init__(self, size: float, metres: float) -> None:
         self.width = _BAR * size * metres
         self._metres = metres
 
     def bars(self, points: FloatArray, colour: palette.Colour, width: float, height: float) -> Iterator[str]:
-        """Boxes along a polyline (k, 2) [length]; width, height above the ground [m]."""
+        """Yield boxes along a polyline (k, 2) [length]; width, height above the ground [m]."""
         for start, end in pairwise(self._metres * points):
             (x, y), (dx, dy) = (start + end) / 2, end - start
             if dx or dy:
@@ -137,7 +137,7 @@ class _Brush:
                 )
 
     def discs(self, points: FloatArray, colour: palette.Colour, width: float, height: float) -> Iterator[str]:
-        """Discs on points (k, 2) [length], on each once."""
+        """Yield one disc on each of the points (k, 2) [length]."""
         for x, y in self._metres * np.unique(points, axis=0):
             yield _visual(
                 f'xyz="{x:.9g} {y:.9g} {height:.9g}" rpy="0 0 0"',

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SAME = 1e-6  # [rad, sizes]; how near the coordinates solved again must come to those of the run
 
 
-def solved_again(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | None:
+def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | None:
     """Return all coordinates (n,) by name, NaN in a gap; None if they cannot be known.
 
     A run of few outputs, as [outputs] or --outputs choose them, is solved for all of them at its drivers' values. What

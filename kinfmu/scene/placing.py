@@ -6,7 +6,7 @@ import numpy as np
 
 from kinfmu.mechanism.mechanism import COORDINATES, Mechanism
 from kinfmu.run import FloatArray, Run
-from kinfmu.scene.completing import solved_again
+from kinfmu.scene.completing import recomputed
 
 
 def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
@@ -17,7 +17,7 @@ def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dic
     columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
     if not columns.keys() >= set(mechanism.coordinate_names):
-        columns |= solved_again(run, mechanism) or {}
+        columns |= recomputed(run, mechanism) or {}
     poses: dict[str, FloatArray] = {}
     left_out: dict[str, tuple[str, ...]] = {}
     for body in mechanism.moving_bodies:

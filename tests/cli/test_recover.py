@@ -44,7 +44,7 @@ def test_a_whole_record_is_recovered_as_it_is(command: Command, tmp_path: Path) 
 
 def test_other_commands_name_recover(cut: Path, fails: Callable[..., str]) -> None:
     for arguments in (("export", cut, "-o", "run.csv"), ("review", cut, "--save", "run.rrd")):
-        assert fails(*arguments).endswith(f"; kinfmu recover {cut} keeps what is there")
+        assert fails(*arguments).endswith(f"; kinfmu recover {cut} keeps what is left")
 
 
 def test_what_cannot_be_recovered_is_told(

@@ -116,7 +116,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
 
 
-def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
     run = fourbar(np.arange(181.0))
     path = tmp_path / "run.gif"
     with pytest.raises(FigureError, match=r"run\.gif: the run does not hold its mechanism, so there"):

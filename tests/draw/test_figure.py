@@ -1,4 +1,4 @@
-"""Figures as files: names, bytes, sizes, and what is told when one cannot be drawn."""
+"""Figures as files: names, bytes, sizes, and the messages when one cannot be drawn."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_a_mechanism_that_only_closes_is_drawn(drivers: tuple[AngleDriver, ...],
     assert {"crank", "coupler", "rocker", "O", "P", "Q", "C"} <= set(texts_in(path).split())
 
 
-def test_a_mechanism_that_does_not_close_is_told_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
+def test_a_mechanism_that_does_not_close_is_reported_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
     path = tmp_path / "figure.svg"
     with pytest.raises(AssemblyError) as caught:
         figure(fourbar(9.0, 1.0, 3.5, 3.0), path)
@@ -125,21 +125,23 @@ def test_another_kind_of_file_is_refused(name: str, tmp_path: Path) -> None:
     assert str(caught.value) == f"{path}: '{path.suffix}' is no figure that can be drawn; known: .svg, .png"
 
 
-def test_a_place_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+def test_a_place_where_nothing_can_be_written_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "none" / "figure.svg"
     with pytest.raises(FigureError) as caught:
         figure(reference_fourbar(), path)
     assert str(caught.value) == f"{path}: cannot be written (No such file or directory)"
 
 
-def test_without_matplotlib_the_line_that_installs_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_the_line_that_installs_it_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingPackageError) as caught:
         figure(kinfmu.load("fourbar"), tmp_path / "figure.svg")
     assert str(caught.value).endswith("figure.svg: drawing needs matplotlib: pip install 'kinfmu[figures]'")
 
 
-def test_many_names_are_left_out_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_names_are_left_out_and_that_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kinfmu.draw.drawing.MOST_NAMES", 3)
     path = tmp_path / "figure.svg"
     figure(kinfmu.load("fourbar"), path)
@@ -228,7 +230,7 @@ def test_a_figure_is_drawn_at_the_drivers_value_that_is_asked_for(tmp_path: Path
         figure(kinfmu.load("five_bar"), tmp_path / "at.svg", 1.0)
 
 
-def test_a_figure_shows_where_the_law_starts_or_says_so() -> None:
+def test_a_figure_shows_where_the_law_starts_or_reports_it() -> None:
     assert pose_note(instant(kinfmu.load("jansen_leg"))) == ""
     assert pose_note(instant(kinfmu.load("fourbar"))) == "the run starts at crank = 0°"  # there all links lie in line
     mechanism = kinfmu.load("crank_rocker")

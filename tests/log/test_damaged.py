@@ -1,4 +1,4 @@
-"""What is told of a record that is damaged, each kind of damage in its words."""
+"""Messages about damaged records, one for each kind of damage."""
 
 from __future__ import annotations
 
@@ -14,69 +14,69 @@ from kinfmu.run import Run
 
 
 def complaint(path: Path) -> str:
-    """What reading says, without the name of the file and the advice to recover what is there."""
+    """Return the message of reading a file, without the file's name and the advice to recover what is left."""
     with pytest.raises(LogError) as caught:
         read(path)
-    told = str(caught.value).removeprefix(f"{path}: ")
-    return told.removesuffix(f"; kinfmu recover {path} keeps what is there")
+    message = str(caught.value).removeprefix(f"{path}: ")
+    return message.removesuffix(f"; kinfmu recover {path} keeps what is left")
 
 
 @pytest.mark.parametrize(
-    ("offset", "changed", "told"),
+    ("offset", "changed", "message"),
     [
-        (-8, b"\x00", "its checksum does not fit"),
-        (-16, b"\x01", "its sizes do not fit"),
+        (-8, b"\x00", "wrong checksum"),
+        (-16, b"\x01", "its sizes disagree"),
         (-4, b"\x04\x00\x00\x01", "a field goes beyond its end"),
-        (0, b"zoom", "compression 'zoom' is not known"),
+        (0, b"zoom", "compression 'zoom' is not known; known: zstd, lz4"),
         (4, b"\xff\xff\xff\xff", "a field goes beyond its end"),
     ],
     ids=["checksum", "size", "length of a text", "compression", "length of the data"],
 )
-def test_a_damaged_chunk_is_told_with_its_place(
-    run: Run, tmp_path: Path, offset: int, changed: bytes, told: str
+def test_a_damaged_chunk_is_reported_with_its_place(
+    run: Run, tmp_path: Path, offset: int, changed: bytes, message: str
 ) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run, path)
     whole = bytearray(path.read_bytes())
-    name = whole.index(b"zstd")  # before it size, checksum and length of the name, behind it the length of the data
+    name = whole.index(b"zstd")  # size, checksum and length of the name come before it, the length of the data after it
     place = name + offset
     assert whole[place : place + len(changed)] != changed
     whole[place : place + len(changed)] = changed
     path.write_bytes(whole)
-    assert complaint(path) == f"the chunk at byte {name - 32} is damaged: {told}"
+    assert complaint(path) == f"the chunk at byte {name - 32} is damaged: {message}"
 
 
-def test_a_record_of_no_kind_is_told_with_its_place(run: Run, tmp_path: Path) -> None:
+def test_a_record_of_no_kind_is_reported_with_its_place(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run, path)
     whole = bytearray(path.read_bytes())
     whole[8] = 0x7F
     path.write_bytes(whole)
-    assert complaint(path) == "not a whole MCAP file: the record at byte 8 is damaged: 0x7f is no kind of record"
+    assert complaint(path) == "not a whole MCAP file: the record at byte 8 is damaged: 0x7f is not a kind of record"
 
 
 @pytest.mark.parametrize(
-    ("text", "other", "told"),
+    ("text", "other", "message"),
     [
-        (b'"coupler.x"', b'"coupler.w"', "metadata or mechanism are damaged (their checksum does not fit)"),
-        (b"outcome", b"outcomf", "how the run ended is missing or damaged"),
+        (b'"coupler.x"', b'"coupler.w"', "metadata or mechanism are damaged (wrong checksum)"),
+        (b"outcome", b"outcomf", "metadata 'kinfmu.end', written at the end of a run, are missing or damaged"),
     ],
 )
-def test_damaged_texts_are_told(run: Run, tmp_path: Path, text: bytes, other: bytes, told: str) -> None:
+def test_damaged_texts_are_reported(run: Run, tmp_path: Path, text: bytes, other: bytes, message: str) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run, path)
     path.write_bytes(path.read_bytes().replace(text, other, 1))
-    assert complaint(path) == told
+    assert complaint(path) == message
 
 
-def test_a_record_of_another_format_is_told(run: Run, tmp_path: Path) -> None:
+def test_a_record_of_another_format_is_reported(run: Run, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(record, "FORMAT", "1")
         write_mcap(run, tmp_path / "run.mcap")
-    assert complaint(tmp_path / "run.mcap") == "format '1' of the record; this kinfmu reads '2'"
+    assert complaint(tmp_path / "run.mcap") == "format '1' of the record; this version of kinfmu reads '2'"
 
 
-def test_samples_of_another_length_than_their_columns_have_are_told(run: Run, tmp_path: Path) -> None:
+def test_samples_whose_length_does_not_match_their_columns_are_reported(run: Run, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mcap_file, "sample_template", lambda columns: Template().stamp().words(columns + 1))
         write_mcap(run, tmp_path / "run.mcap")

@@ -33,15 +33,15 @@ except LogError as error:
 def test_a_file_that_finds_no_room_is_one_clear_line(suffix: str, room: int, tmp_path: Path) -> None:
     path = tmp_path / f"run.{suffix}"
     path.write_bytes(b"old")
-    told = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(path), str(room)],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(__file__).parents[2],
     )
-    assert len(told.stdout.splitlines()) == 1
-    assert told.stdout.startswith(f"{path}: ")
-    assert "written" in told.stdout
+    assert len(process.stdout.splitlines()) == 1
+    assert process.stdout.startswith(f"{path}: ")
+    assert "written" in process.stdout
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]

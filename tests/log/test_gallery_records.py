@@ -44,10 +44,10 @@ def test_a_mechanism_of_the_gallery_is_recorded_with_all_that_draws_it(name: str
     assert {channel.topic for channel in summary.channels.values()} == {"/sample", "/log", *DRAWN}
     with path.open("rb") as file:
         assert sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()) == count
-    told = subprocess.run(
+    process = subprocess.run(
         [executable(), "mcap", "check", "--full", str(path)], capture_output=True, text=True, check=True
     )
-    rows = [line.split() for line in told.stdout.splitlines() if "/" in line and "ID" not in line]
+    rows = [line.split() for line in process.stdout.splitlines() if "/" in line and "ID" not in line]
     assert {row[0] for row in rows[1:]} == {"ok"}
 
 

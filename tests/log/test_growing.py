@@ -87,13 +87,13 @@ def test_a_failure_without_a_reason_is_in_the_log_in_the_end(rows: int, run_with
 
 def test_rerun_finds_no_fault_with_a_file_that_grew(run_with_gap: Run, tmp_path: Path) -> None:
     grown(run_with_gap, tmp_path / "run.mcap", 7)
-    told = subprocess.run(
+    process = subprocess.run(
         [executable(), "mcap", "check", "--full", str(tmp_path / "run.mcap")],
         capture_output=True,
         text=True,
         check=True,
     )
-    rows = [line.split() for line in told.stdout.splitlines() if "/" in line and "ID" not in line]
+    rows = [line.split() for line in process.stdout.splitlines() if "/" in line and "ID" not in line]
     assert {row[0] for row in rows[1:]} == {"ok"}
 
 
@@ -129,7 +129,7 @@ def test_the_older_file_stays_until_the_first_samples(run: Run, tmp_path: Path) 
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_place_where_no_file_can_be_is_told_before_the_first_sample(run: Run, tmp_path: Path) -> None:
+def test_a_place_where_no_file_can_be_is_reported_before_the_first_sample(run: Run, tmp_path: Path) -> None:
     (tmp_path / "null.mcap").symlink_to(os.devnull)
     for name, why in (("none/run.mcap", "the folder '.*none' does not exist"), ("null.mcap", "is a device or a pipe")):
         with pytest.raises(LogError, match=why):
@@ -177,7 +177,7 @@ def test_a_damaged_chunk_ends_what_is_recovered(run: Run, tmp_path: Path) -> Non
     places = [k for k in range(len(damaged)) if damaged[k : k + 4] == b"zstd"]
     damaged[places[len(places) // 3] + 40] ^= 1
     path.write_bytes(damaged)
-    with pytest.raises(LogError, match=r"the chunk at byte \d+ is damaged: .*; kinfmu recover .* keeps what is there"):
+    with pytest.raises(LogError, match=r"the chunk at byte \d+ is damaged: .*; kinfmu recover .* keeps what is left"):
         read(path)
     found = recover(path, tmp_path / "found.mcap")
     assert 0 < len(found) < len(run)
@@ -264,13 +264,13 @@ except LogError as error:
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
 def test_a_disk_that_fills_up_loses_nothing_that_was_written(fmu: Callable[[], Path], tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    told = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", FULL, str(fmu()), str(path)], capture_output=True, text=True, cwd=ROOT, check=True
     )
-    assert told.stdout.count("\n") == 1
-    assert told.stdout.startswith(f"{path}: cannot be written (File too large); it holds the run up to t = ")
-    assert told.stdout.rstrip().endswith(f"kinfmu recover {path}")
-    until = float(told.stdout.partition("t = ")[2].split()[0])
+    assert process.stdout.count("\n") == 1
+    assert process.stdout.startswith(f"{path}: cannot be written (File too large); it holds the run up to t = ")
+    assert process.stdout.rstrip().endswith(f"kinfmu recover {path}")
+    until = float(process.stdout.partition("t = ")[2].split()[0])
     found = recover(path, tmp_path / "found.mcap")
     assert found.t[-1] == pytest.approx(until)
     assert len(found) > 100

@@ -36,7 +36,7 @@ def line_of(path: Path) -> str:
         assert len(str(error).splitlines()) == 1  # noqa: PT017  # the file may have a beginning that is whole
     assert line.startswith(f"{path}: ")
     assert len(line) < 1000
-    return line.removeprefix(f"{path}: ").removesuffix(f"; kinfmu recover {path} keeps what is there")
+    return line.removeprefix(f"{path}: ").removesuffix(f"; kinfmu recover {path} keeps what is left")
 
 
 def with_texts(run: Run, path: Path, begin: dict[str, str], end: dict[str, str] | None = None) -> Path:
@@ -84,10 +84,10 @@ def test_odd_texts_at_the_end_are_one_line(run: Run, tmp_path: Path, key: str) -
         ({"input_names": '["a_angle", "a_acceleration", "a_speed"]'}, "must be inputs, three for each driver"),
         ({"length_unit": '"parsec"'}, "length_unit of the record = 'parsec' must be one of m, mm"),
         ({"coordinate_count": "8"}, "coordinate_count of the record = 8 is more than its outputs"),
-        ({"watch_names": '["AB", "CD"]'}, "columns of the record are not those of its outputs, inputs and watches"),
-        ({"absent": '["coupler.x"]'}, "columns of the record are not those of its outputs, inputs and watches"),
+        ({"watch_names": '["AB", "CD"]'}, "columns of the record do not match its outputs, inputs and watches"),
+        ({"absent": '["coupler.x"]'}, "columns of the record do not match its outputs, inputs and watches"),
         ({"columns": '["time", "time"]'}, "columns of the record hold a name twice"),
-        ({"format": "9\n9"}, r"format '9\n9' of the record; this kinfmu reads '2'"),
+        ({"format": "9\n9"}, r"format '9\n9' of the record; this version of kinfmu reads '2'"),
     ],
 )
 def test_texts_that_do_not_go_together_are_one_line(
@@ -101,8 +101,8 @@ def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str)
     names = json.dumps([f"a{k}.x" for k in range(NAMES)])
     path = with_texts(run, tmp_path / "a.mcap", {key: names})
     began = time.process_time()
-    told = f"{key} of the record: {NAMES} entries; {record_text.MOST_COLUMNS} at most"
-    assert line_of(path) == told
+    message = f"{key} of the record: {NAMES} entries; {record_text.MOST_COLUMNS} at most"
+    assert line_of(path) == message
     assert time.process_time() - began < 5.0
 
 
@@ -154,7 +154,7 @@ def test_a_chunk_that_says_it_unpacks_to_a_terabyte_is_refused(run: Run, tmp_pat
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 2**40, packed=b""))
     tracemalloc.start()
     try:
-        assert f"it says that it unpacks to {2**40} bytes, and {scan.ALWAYS} is the most here" in line_of(path)
+        assert f"its unpacked size is {2**40} bytes; the largest valid size is {scan.ALWAYS}" in line_of(path)
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:
         tracemalloc.stop()
@@ -167,7 +167,7 @@ def test_chunks_that_unpack_to_gigabytes_are_refused_together(
     monkeypatch.setattr(scan, "LARGEST_RATIO", 1)
     empty = struct.pack("<BQ", Opcode.DATA_END, 2**20 - 9) + bytes(2**20 - 9)
     path = behind_the_first(run, tmp_path / "a.mcap", *[chunk(empty)] * 10)
-    assert "it says that it unpacks to 1048576 bytes, and" in line_of(path)
+    assert "its unpacked size is 1048576 bytes; the largest" in line_of(path)
 
 
 def test_a_chunk_may_unpack_to_little_more_than_its_index_says(run: Run, tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_says(run: Run, tmp_path: Path
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 100, "lz4", lz4.compress(raw)))
     tracemalloc.start()
     try:
-        assert "its checksum does not fit" in line_of(path)
+        assert "wrong checksum" in line_of(path)
         assert tracemalloc.get_traced_memory()[1] < 8e6
     finally:
         tracemalloc.stop()

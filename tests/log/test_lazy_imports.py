@@ -10,8 +10,8 @@ def loaded(code: str) -> set[str]:
     """Which of the heavy packages a fresh Python has after running `code`."""
     heavy = "{'rerun', 'mcap', 'pyarrow', 'zstandard', 'fmpy', 'pythonfmu', 'scipy'}"
     program = f"import sys\n{code}\nprint(*sorted({heavy} & set(sys.modules)))"
-    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    return set(told.stdout.split())
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return set(process.stdout.split())
 
 
 def test_importing_the_room_loads_nothing_heavy() -> None:

@@ -65,14 +65,15 @@ def numbers_of_joint_state(payload: bytes) -> tuple[list[str], list[np.ndarray]]
 
 
 def assert_same(a: Run, b: Run) -> None:
-    """Equal in every field, arrays in type, shape and bits."""
-    for field in dataclasses.fields(Run):
-        x, y = getattr(a, field.name), getattr(b, field.name)
+    """Check that runs are equal in every field, arrays in type, shape and bits."""
+    names = {field.name for field in dataclasses.fields(Run)} - {"mechanism_source"} | {"mechanism", "mechanism_text"}
+    for name in names:
+        x, y = getattr(a, name), getattr(b, name)
         if isinstance(x, np.ndarray):
-            assert (x.dtype, x.shape) == (y.dtype, y.shape), field.name
-            assert x.tobytes() == y.tobytes(), field.name
+            assert (x.dtype, x.shape) == (y.dtype, y.shape), name
+            assert x.tobytes() == y.tobytes(), name
         else:
-            assert x == y, field.name
+            assert x == y, name
 
 
 def test_a_run_reads_back_bit_for_bit(any_run: Run, tmp_path: Path) -> None:
@@ -146,14 +147,14 @@ def test_margins_and_errors_that_are_not_logged_are_not_computed(run: Run, tmp_p
 
 def test_rerun_finds_no_fault_with_the_file(any_run: Run, tmp_path: Path) -> None:
     write_mcap(any_run, tmp_path / "run.mcap")
-    told = subprocess.run(
+    process = subprocess.run(
         [executable(), "mcap", "check", "--full", str(tmp_path / "run.mcap")],
         capture_output=True,
         text=True,
         check=False,
     )
-    assert told.returncode == 0, told.stdout + told.stderr
-    rows = [line.split() for line in told.stdout.splitlines() if "/" in line and "ID" not in line]
+    assert process.returncode == 0, process.stdout + process.stderr
+    rows = [line.split() for line in process.stdout.splitlines() if "/" in line and "ID" not in line]
     assert {row[0] for row in rows[1:]} == {"ok"}
 
 
@@ -265,7 +266,7 @@ def test_a_link_stays_a_link(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kept", [0, 5, 3000, -20])
-def test_a_truncated_file_is_told_in_one_line(run: Run, tmp_path: Path, kept: int) -> None:
+def test_a_truncated_file_is_reported_in_one_line(run: Run, tmp_path: Path, kept: int) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run, path)
     path.write_bytes(path.read_bytes()[:kept])
@@ -274,11 +275,11 @@ def test_a_truncated_file_is_told_in_one_line(run: Run, tmp_path: Path, kept: in
     assert "\n" not in str(caught.value)
 
 
-def test_a_damaged_file_is_told_or_reads_back_as_it_was(run_with_gap: Run, tmp_path: Path) -> None:
+def test_a_damaged_file_is_reported_or_reads_back_as_it_was(run_with_gap: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run_with_gap, path)
     whole, random = path.read_bytes(), np.random.default_rng(1)
-    told: list[str] = []
+    messages_found: list[str] = []
     for place in random.integers(len(whole), size=150):
         damaged = bytearray(whole)
         damaged[place] ^= int(random.integers(1, 256))
@@ -286,12 +287,12 @@ def test_a_damaged_file_is_told_or_reads_back_as_it_was(run_with_gap: Run, tmp_p
         try:
             assert_same(run_with_gap, read(path))
         except LogError as error:
-            told.append(str(error))
-    assert len(told) > 30
-    assert all(text.startswith(f"{path}: ") and "\n" not in text for text in told)
+            messages_found.append(str(error))
+    assert len(messages_found) > 30
+    assert all(text.startswith(f"{path}: ") and "\n" not in text for text in messages_found)
 
 
-def test_a_foreign_file_is_told_from_a_run(tmp_path: Path) -> None:
+def test_a_foreign_file_is_reported_from_a_run(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -299,7 +300,7 @@ def test_a_foreign_file_is_told_from_a_run(tmp_path: Path) -> None:
         channel = writer.register_channel("/camera", "json", writer.register_schema("s", "jsonschema", b"{}"))
         writer.add_message(channel, 0, b"{}", 0)
         writer.finish()
-    with pytest.raises(LogError, match=r"no topic /sample, so this is no run of kinfmu; topics: /camera"):
+    with pytest.raises(LogError, match=r"no topic /sample, so this is not a run of kinfmu; topics: /camera"):
         read(path)
     (tmp_path / "text.mcap").write_text("t,x\n0,1\n" * 20)
     with pytest.raises(LogError, match="not a whole MCAP file"):

@@ -85,7 +85,7 @@ def test_negative_zeros_are_written_as_zero(suffix: str, run: Run, tmp_path: Pat
 
 
 def test_an_unknown_kind_of_table_is_refused(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"'\.xls' is no table that can be written; known: \.csv, \.parquet, \.npz"):
+    with pytest.raises(LogError, match=r"'\.xls' is not a known format of tables; known: \.csv, \.parquet, \.npz"):
         write_table(run, tmp_path / "run.xls")
 
 

@@ -1,4 +1,4 @@
-"""How a run is summed up in words."""
+"""The verdict on a run and its card."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from kinfmu.log.verdict import happenings, sentence
+from kinfmu.log.verdict import notable_events, sentence
 from kinfmu.log.viewer.card import card
 from kinfmu.run import Event, Run
 from kinfmu.solver.python.status import Status
@@ -17,33 +17,33 @@ def test_the_verdict_counts_samples_by_status(run_with_gap: Run) -> None:
     assert sentence(run_with_gap) == "181 samples: 158 ok, 2 bridged, 21 outside; worst residual 1.1e-16 at 90 s"
 
 
-def test_what_happened_is_told_by_time_with_its_level(run_with_gap: Run) -> None:
-    found = [(event.t, event.level) for event in happenings(run_with_gap)]
+def test_events_are_in_order_of_time_with_their_levels(run_with_gap: Run) -> None:
+    found = [(event.t, event.level) for event in notable_events(run_with_gap)]
     assert found == [(0, "info"), (1, "info"), (100, "error"), (121, "info"), (180, "info")]
 
 
-def test_a_failure_is_told_once_with_its_reason_and_without_the_time_that_stands_beside_it(run: Run) -> None:
+def test_a_failure_is_reported_once_with_its_reason_and_without_its_time(run: Run) -> None:
     reason = "crank = 1.9 rad cannot be reached: the limit is 1.75 rad"
     failed = dataclasses.replace(with_gap(run, 100, 180), events=(Event(100.0, "error", f"at t = 100 s: {reason}"),))
-    assert [event for event in happenings(failed) if event.level == "error"] == [Event(100.0, "error", reason)]
+    assert [event for event in notable_events(failed) if event.level == "error"] == [Event(100.0, "error", reason)]
 
 
-def test_a_failure_that_no_event_explains_is_told_by_its_status(run: Run) -> None:
+def test_a_failure_that_no_event_explains_is_reported_by_its_status(run: Run) -> None:
     failed = dataclasses.replace(with_gap(run, 100, 120), events=(Event(99.0, "error", "something else"),))
-    told = [event.text for event in happenings(failed) if event.level == "error"]
-    assert told == ["something else", "outside: the drivers cannot take the mechanism there"]
+    failures = [event.text for event in notable_events(failed) if event.level == "error"]
+    assert failures == ["something else", "outside: the drivers cannot take the mechanism there"]
 
 
-def test_a_run_that_is_well_from_the_start_has_nothing_to_tell() -> None:
-    assert happenings(fourbar(np.arange(10.0, 20.0))) == []
+def test_a_run_whose_samples_are_all_ok_has_no_events() -> None:
+    assert notable_events(fourbar(np.arange(10.0, 20.0))) == []
 
 
 def test_near_singular_samples_are_a_warning(run: Run) -> None:
     near = dataclasses.replace(run, status=np.where(run.t == 5.0, Status.NEAR_SINGULAR, Status.OK))
-    assert [(event.t, event.level) for event in happenings(near)] == [(5.0, "warning"), (6.0, "info")]
+    assert [(event.t, event.level) for event in notable_events(near)] == [(5.0, "warning"), (6.0, "info")]
 
 
-def test_the_card_tells_mechanism_run_verdict_and_events(run_with_gap: Run) -> None:
+def test_the_card_states_mechanism_run_verdict_and_events(run_with_gap: Run) -> None:
     text = card(run_with_gap, "Not drawn: coupler.")
     for part in (
         "### Four-bar crank with a redundant constraint",
@@ -63,6 +63,6 @@ def test_text_from_outside_cannot_break_the_card(run: Run) -> None:
     assert "* **1 s:** x\\|y z\n" in card(odd)
 
 
-def test_a_long_story_is_cut_on_the_card(run: Run) -> None:
+def test_the_card_lists_the_first_events_and_counts_the_others(run: Run) -> None:
     long = dataclasses.replace(run, events=tuple(Event(float(k), "info", f"event {k}") for k in range(100)))
     assert "* and 91 more, in the log\n" in card(long)

@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import KinfmuError
-from kinfmu.scene.completing import solved_again
+from kinfmu.scene.completing import recomputed
 from kinfmu.sweep.continued import continued
 from tests.test_parameters_by_every_way import LENGTHS, TIMES, drawn, linkage, side
 
@@ -24,7 +24,7 @@ def test_a_run_with_parameters_set_is_completed_on_its_own_branch(tmp_path: Path
     set_ = {name: lengths[name] for name in LENGTHS}
     fmu = kinfmu.build(mechanism, tmp_path / "short.fmu", flavour="python")
     run = kinfmu.simulate(fmu, parameters=set_)
-    columns = solved_again(run, mechanism)
+    columns = recomputed(run, mechanism)
     assert columns is not None
     followed = kinfmu.solve(continued(whole, set_).mechanism, run.t)
     for name in ("coupler.x", "coupler.phi", "rocker.phi"):

@@ -1,4 +1,4 @@
-"""What is drawn, against the closed form of the four-bar."""
+"""The scene of a run, compared with the closed form of the four-bar."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ from tests.log.runs import DEGREE
 
 @pytest.fixture
 def fourbar_scene(run: Run) -> Scene:
+    return everything_drawn(run)
+
+
+def everything_drawn(run: Run) -> Scene:
     found, note = drawable(run)
     assert found
     assert not note
     return found
 
 
-def test_bodies_stand_where_their_coordinates_and_constants_say(fourbar_scene: Scene, run: Run) -> None:
+def test_bodies_have_the_poses_of_their_coordinates_and_constants(fourbar_scene: Scene, run: Run) -> None:
     crank, coupler, rocker = fourbar_scene.bodies
     phi = DEGREE * run.t
     tip = np.column_stack([np.cos(phi), np.sin(phi)])
@@ -47,11 +51,11 @@ def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene) -> 
     assert sorted(name for name, _ in pins) == ["AB", "AB", "C", "O", "P", "Q"]
 
 
-def test_the_path_is_that_of_the_point_of_interest(fourbar_scene: Scene, run: Run) -> None:
+def test_the_path_is_the_motion_of_the_point_of_interest(fourbar_scene: Scene, run: Run) -> None:
     np.testing.assert_allclose(fourbar_scene.paths["A"], np.column_stack([run["A.x"], run["A.y"]]), atol=1e-15)
 
 
-def test_the_frame_holds_everything(fourbar_scene: Scene) -> None:
+def test_the_bounds_hold_everything(fourbar_scene: Scene) -> None:
     np.testing.assert_allclose(fourbar_scene.low, [-1.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(fourbar_scene.high, [3.0, 1.0], atol=1e-15)
 
@@ -83,15 +87,17 @@ def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
         kinfmu.solve(mechanism, whole.t, outputs=few),
     ):
         assert set(less.outputs) < set(whole.outputs)
-        (found, note), (expected, _) = drawable(less), drawable(whole)
-        assert found
-        assert expected
-        assert note == ""
-        for body, other in zip(found.bodies, expected.bodies, strict=True):
-            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+        check_equal_poses(less, whole)
 
 
-def test_a_run_of_few_outputs_with_other_parameters_is_drawn_with_these() -> None:
+def check_equal_poses(run: Run, expected: Run) -> None:
+    """Check that everything of a run is drawn, in the poses of another run."""
+    found, wanted = everything_drawn(run), everything_drawn(expected)
+    for body, other in zip(found.bodies, wanted.bodies, strict=True):
+        np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * wanted.size)
+
+
+def test_a_run_of_few_outputs_is_drawn_with_its_own_parameters() -> None:
     mechanism = kinfmu.load("jansen_leg")
     name, value = next((n, 1.02 * float(p.value)) for n, p in mechanism.parameters.items() if p.expression is None)
     whole = kinfmu.solve(mechanism, [0.0, 0.1], parameters={name: value})
@@ -99,24 +105,18 @@ def test_a_run_of_few_outputs_with_other_parameters_is_drawn_with_these() -> Non
     of_fmu = dataclasses.replace(
         few, mechanism_source=mechanism, info={"parameters": f"crank.speed = 1.0, {name} = {value!r}"}
     )
-    expected, _ = drawable(whole)
     for run in (few, of_fmu):
-        found, note = drawable(run)
-        assert found
-        assert expected
-        assert note == ""
-        for body, other in zip(found.bodies, expected.bodies, strict=True):
-            np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * expected.size)
+        check_equal_poses(run, whole)
 
 
-def test_what_would_be_drawn_otherwise_than_the_run_says_is_left_out_with_the_remedy() -> None:
+def test_recomputed_bodies_that_contradict_the_run_are_left_out_with_the_remedy() -> None:
     run = kinfmu.solve(kinfmu.load("crank_rocker"), [0.0, 0.1], outputs=["rocker.phi"])
     other = dataclasses.replace(run, values=run.values + 0.1)
     _, note = drawable(other)
     assert note.endswith("; name them in [outputs] coordinates, or leave that out.")
 
 
-def test_a_run_without_its_mechanism_says_so(run: Run) -> None:
+def test_a_run_without_a_valid_mechanism_is_not_drawn(run: Run) -> None:
     assert drawable(dataclasses.replace(run, mechanism_source="")) == (
         None,
         "Not drawn: the run does not hold its mechanism.",
@@ -133,10 +133,7 @@ def solved(name: str) -> Run:
 
 def drawn(name: str) -> tuple[Scene, Run]:
     run = solved(name)
-    found, note = drawable(run)
-    assert found
-    assert not note
-    return found, run
+    return everything_drawn(run), run
 
 
 def placed(scene: Scene, body: str, stroke: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kinfmu.log.verdict import happenings
+from kinfmu.log.verdict import notable_events
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
 from kinfmu.log.viewer.timeline import Timeline
@@ -85,7 +85,7 @@ def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.C
     """
     import rerun.blueprint as rrb
 
-    if any(happenings(run) for run in runs):
+    if any(notable_events(run) for run in runs):
         return rrb.Vertical(linkage, card_view(), log_view(roots), row_shares=[1.5, 0.9, 0.6])
     return rrb.Vertical(linkage, card_view(), row_shares=[1.7, 1.0])
 

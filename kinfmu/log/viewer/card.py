@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from kinfmu.log.verdict import MEANINGS, counts, happenings, worst_residual
+from kinfmu.log.verdict import MEANINGS, counts, notable_events, worst_residual
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 
@@ -25,7 +25,7 @@ def card(run: Run, note: str = "") -> str:
     if worst:
         lines += [f"Worst residual {worst.residual:.2g} of the mechanism's size, at {axis.place(worst.t)}.", ""]
     lines += [f"* {number} {MEANINGS[status]}" for status, number in counts(run).items()]
-    events = happenings(run)
+    events = notable_events(run)
     if events:
         lines += ["", "What happened:", ""]
         lines += [f"* **{plain(axis.place(event.t))}:** {plain(event.text)}" for event in events[:MOST_EVENTS]]

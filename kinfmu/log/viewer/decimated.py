@@ -20,11 +20,11 @@ def decimated(run: Run, most: int | None = None) -> Run:
     most = MOST_ROWS if most is None else most
     if len(run) <= most:
         return run
-    rows = np.union1d(np.arange(0, len(run), -(-len(run) // most)), _telling(run))
+    rows = np.union1d(np.arange(0, len(run), -(-len(run) // most)), _indispensable(run))
     return run.part(rows, events=run.events)
 
 
-def _telling(run: Run) -> NDArray[np.int64]:
+def _indispensable(run: Run) -> NDArray[np.int64]:
     """Samples that must not be left out."""
     found = [0, len(run) - 1]
     turns = np.flatnonzero(np.diff(run.good.astype(int)))

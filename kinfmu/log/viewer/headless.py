@@ -104,7 +104,7 @@ def executable() -> str:
     return str(found)
 
 
-def last_words(stream: IO[bytes]) -> str:
+def last_error(stream: IO[bytes]) -> str:
     """The line in a viewer's complaints that says why it ended."""
     stream.seek(0)
     plain = _COLOUR.sub("", stream.read().decode(errors="replace"))
@@ -143,7 +143,7 @@ def viewer(size: tuple[int, int] = (1600, 900)) -> Iterator[Viewer]:
                 except OSError as error:  # what the client raises when the viewer is gone
                     with suppress(subprocess.TimeoutExpired):
                         process.wait(END_TIME)
-                    _still_there(process, complaints)
+                    _check_running(process, complaints)
                     raise LogError(f"the viewer does not answer any more: {error}") from error
         finally:
             _end(process)
@@ -158,7 +158,7 @@ def _free_port() -> int:
 def _await_port(process: subprocess.Popen[bytes], port: int, complaints: IO[bytes]) -> None:
     deadline = time.monotonic() + START_TIME
     while time.monotonic() < deadline:
-        _still_there(process, complaints)
+        _check_running(process, complaints)
         with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=0.5):
             return
         time.sleep(_POLL)
@@ -172,7 +172,7 @@ def _await_answer(process: subprocess.Popen[bytes], client: ViewerClient, compla
         try:
             client.get_state()
         except Exception as error:  # whatever the transport raises, until the viewer answers
-            _still_there(process, complaints)
+            _check_running(process, complaints)
             if time.monotonic() > deadline:
                 raise LogError(f"the viewer does not answer: {error}") from error
             time.sleep(_POLL)
@@ -180,10 +180,10 @@ def _await_answer(process: subprocess.Popen[bytes], client: ViewerClient, compla
             return
 
 
-def _still_there(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> None:
+def _check_running(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> None:
     if process.poll() is None:
         return
-    words = last_words(complaints)
+    words = last_error(complaints)
     if any(sign in words for sign in _SIGNS_OF_NO_DRIVER):
         raise LogError(NO_DRIVER, no_graphics=True)
     raise LogError(f"the viewer ended at once: {words}")

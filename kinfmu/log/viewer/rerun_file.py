@@ -29,7 +29,7 @@ import numpy as np
 from kinfmu.errors import LogError
 from kinfmu.log.clock import nanoseconds
 from kinfmu.log.target import replacing
-from kinfmu.log.verdict import changes, happenings, label, sentence
+from kinfmu.log.verdict import changes, label, notable_events, sentence
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
@@ -86,7 +86,9 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
     """Name of the application that recordings of such runs and curves belong to, such as 'kinfmu_fourbar_12ab34cd'."""
     ranges = [(group.path, group.shown) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
-    facts = repr((spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(happenings(run))) for run in runs]))
+    facts = repr(
+        (spans, ranges, [(run.mechanism_text, run.outputs, run.axis, bool(notable_events(run))) for run in runs])
+    )
     names = [re.sub("[^a-z0-9]+", "_", run.info.get("name", "run").lower()) for run in runs]
     return "_".join([APPLICATION, *dict.fromkeys(names), f"{crc32(facts.encode()):08x}"])
 
@@ -155,7 +157,7 @@ def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run)
     times = np.array([turn.t for turn in turns])
     states = [label(turn.status) for turn in turns]
     send(rec, path, timeline, times, lambda rows: rr.StateChange.columns(state=states[rows]))
-    events = happenings(run)
+    events = notable_events(run)
     send(
         rec,
         f"{root}/log",

@@ -14,7 +14,7 @@ from kinfmu.errors import LogError, RequestError
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.log.reading import read
 from kinfmu.log.target import replacing
-from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_words, shoot
+from kinfmu.log.viewer.headless import Cursor, CursorOn, executable, last_error, shoot
 from kinfmu.log.viewer.rerun_file import write_rrd
 from kinfmu.log.viewer.timeline import Timeline, timeline_named, timeline_of
 from kinfmu.run.axis import axis_of
@@ -36,14 +36,14 @@ def review(
     save: str | Path | None = None,
     screenshot: str | Path | None = None,
     at: Place | None = None,
-    tell: Callable[[str], None] | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> Path | None:
     """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
 
     run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s],
     of a run over driver values the value [rad or the unit of length] or the number of the sample, or a function that
     returns it from the timeline of the recording;
-    tell: called with a line on which coordinates two runs have in common if they are not the same.
+    report: called with a line on which coordinates two runs have in common if they are not the same.
     Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
     recording is, None if there was only a picture.
 
@@ -60,14 +60,14 @@ def review(
             recording, moment = run, _on_shown(at)
             if suffix_of(run) == ".mcap":
                 recording = Path(folder) / f"{run.stem}.rrd"
-                moment = _record(run, other, recording, at, tell)
+                moment = _record(run, other, recording, at, report)
             _shoot(recording, screenshot, moment)
         return None
     if suffix_of(run) == ".rrd":
         recording, moment = run, _on_shown(at)
     else:
-        recording = Path(save) if save else run.with_name(_beside(run, other))
-        moment = _record(run, other, recording, at, tell)
+        recording = Path(save) if save else run.with_name(_default_path(run, other))
+        moment = _record(run, other, recording, at, report)
     if screenshot:
         _shoot(recording, screenshot, moment)
     elif not save:
@@ -97,7 +97,7 @@ def _check(
             raise RequestError(f"{target}: the name must end in {suffix}")
 
 
-def _beside(run: Path, other: str | Path | None) -> str:
+def _default_path(run: Path, other: str | Path | None) -> str:
     return f"{run.stem}-{Path(other).stem}.rrd" if other else f"{run.stem}.rrd"
 
 
@@ -106,7 +106,7 @@ def _record(
     other: str | Path | None,
     recording: Path,
     at: Place | None,
-    tell: Callable[[str], None] | None,
+    report: Callable[[str], None] | None,
 ) -> Cursor | None:
     """Write the recording; returns where a picture of it shows something."""
     first = read(run)
@@ -126,8 +126,8 @@ def _record(
 
         names = (run.name, Path(other).name)
         write_comparison(first, second, recording, names)
-        if tell and (line := in_common(first, second, names)):
-            tell(line)
+        if report and (line := in_common(first, second, names)):
+            report(line)
     placed = timeline.placed(first)
     times = placed.t[first.good] if first.good.any() else placed.t
     if at is not None:
@@ -187,4 +187,4 @@ def _open(recording: Path) -> None:
             _VIEWERS.append(viewer)
             return
         if code:
-            raise LogError(f"{recording}: the viewer could not be opened: {last_words(complaints)}")
+            raise LogError(f"{recording}: the viewer could not be opened: {last_error(complaints)}")

@@ -61,13 +61,13 @@ def entities(path: Path) -> set[str]:
 
 
 def verified(path: Path) -> bool:
-    told = subprocess.run(
+    process = subprocess.run(
         [headless.executable(), "rrd", "verify", str(path)],
         capture_output=True,
         check=False,
         env=os.environ | {"CI": "1"},
     )
-    return told.returncode == 0
+    return process.returncode == 0
 
 
 def test_rerun_finds_no_fault_with_any_recording(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_a_missing_folder_is_named_and_nothing_is_left_behind(run: Run, tmp_path
     assert not list(tmp_path.iterdir())
 
 
-def test_a_recording_without_its_end_is_told(run: Run, tmp_path: Path) -> None:
+def test_a_recording_without_its_end_is_reported(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     write_rrd(run, path)
     path.write_bytes(path.read_bytes()[:-100])
@@ -215,10 +215,10 @@ def test_a_comparison_says_what_runs_of_two_mechanisms_have_in_common(run: Run, 
     )
     wide = [dataclasses.replace(run, outputs=(*map(str, range(7)), last)) for last in ("a", "b")]
     assert in_common(wide[0], wide[1]).endswith(": 0, 1, 2, 3, 4, 5, ...")
-    for other, told in ((renamed(run), none), (part, some)):
+    for other, line in ((renamed(run), none), (part, some)):
         write_comparison(run, other, tmp_path / "compare.rrd")
         (text,) = documents(tmp_path / "compare.rrd", "/card")
-        assert f"\n{told}.\n".replace("_", r"\_") in text
+        assert f"\n{line}.\n".replace("_", r"\_") in text
 
 
 def test_runs_in_different_units_are_not_compared(run: Run, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
-def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_machine_without_graphics_is_reported_what_to_install(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
     monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
     with pytest.raises(LogError, match="on Debian: apt-get install mesa-vulkan-drivers libvulkan1") as caught:
@@ -103,7 +103,7 @@ def test_a_machine_without_graphics_is_told_what_to_install(mcap: Path, monkeypa
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
-def test_a_viewer_that_cannot_draw_is_told_before_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_viewer_that_cannot_draw_is_reported_before_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
     monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
     with pytest.raises(LogError, match="no graphics driver"), headless.viewer((320, 200)):
