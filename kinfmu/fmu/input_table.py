@@ -1,4 +1,4 @@
-"""Inputs over time: from a CSV file or from arrays, checked, and interpolated at the samples of a run."""
+"""Inputs over time, from a CSV file or from arrays: checked, and interpolated at the samples of a run."""
 
 from __future__ import annotations
 
@@ -25,15 +25,20 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 TIME = "time"
-ROUNDING = 1e-9  # of the range: how far times may lie beyond the table by rounding alone
+ROUNDING = 1e-9  # of the range: times beyond the table by less are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class InputTable:
     """Values of inputs at given times.
 
-    t: (r,) [s], increasing; names: the k inputs; values: (r, k); source: as messages name it; unitless: names of
-    columns of a file that say no unit.
+    Attributes:
+        t: (r,) times [s], increasing.
+        names: Names of the k inputs.
+        values: (r, k) values.
+        source: Name of the table in messages.
+        unitless: Names of columns of a file that have no unit.
+
     """
 
     t: NDArray[np.float64]
@@ -53,15 +58,20 @@ class InputTable:
         return float(self.t[-1])
 
     def at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, k) values at times (n,): those of a row where one matches, linear between rows.
+        """Return the values (n, k) at times (n,), linear between rows.
 
-        Raises a RequestError for times before the first row or after the last: inputs are not made up there.
+        Args:
+            t: (n,) times [s], increasing.
+
+        Raises:
+            RequestError: If a time is before the first row or after the last: there is no extrapolation.
+
         """
         slack = ROUNDING * max(abs(self.start), abs(self.stop), self.stop - self.start)
         if t[0] < self.start - slack or t[-1] > self.stop + slack:
             raise RequestError(
                 f"{self.source}: holds {self.start:g} to {self.stop:g} s, the run goes from {t[0]:g} to {t[-1]:g} s; "
-                "choose start and stop within the rows, or add rows: no inputs are made up beyond them"
+                "choose start and stop within the rows, or add rows: inputs are not extrapolated"
             )
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
 
@@ -69,10 +79,19 @@ class InputTable:
 def input_table(
     inputs: str | Path | Mapping[str, ArrayLike], interface: Interface, *, wrap: bool = False
 ) -> InputTable:
-    """The table in a CSV file or in a mapping of arrays, for the inputs of an FMU.
+    """Return the table of inputs of an FMU.
 
-    A file's header is such as `time, crank_angle [deg]`; columns are parted by commas, semicolons or tabs. A
-    column without a unit in brackets is in the unit that the FMU declares. wrap: angles are followed the short way.
+    Args:
+        inputs: CSV file or mapping of arrays by name. The header of a file is such as `time, crank_angle [deg]`, and
+            columns are separated by commas, semicolons or tabs. A column without a unit in brackets is in the unit
+            that the FMU declares.
+        interface: Variables of the FMU.
+        wrap: True: angles that jump by more than half a turn are unwrapped.
+
+    Raises:
+        FmuError: If the table is faulty.
+        RequestError: If the file cannot be read, or `wrap` is true and no column is an angle.
+
     """
     quantities = {
         variable.name: quantity_in(variable.unit or "1", interface.length_unit) for variable in interface.part("inputs")
@@ -85,7 +104,7 @@ def input_table(
 
 
 def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTable:
-    """The table with its angles followed the short way from row to row."""
+    """Return the table with its angles unwrapped."""
     angles = [quantities[name] == Quantity("angle") for name in table.names]
     if not any(angles):
         raise RequestError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
@@ -114,7 +133,7 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
     _check_names(str(path), header, known)
     units = {TIME: Quantity("time")} | dict(quantities)
     into = [_factor(str(path), name, unit, factors(units[name], length_unit)) for name, unit in titles]
-    columns = [array("d") for _ in header]  # 8 bytes a number: a table may be long
+    columns = [array("d") for _ in header]  # 8 bytes per number, since tables may be long
     lines = array("q")
     for line, row in rows:
         if len(row) != len(header):
@@ -134,7 +153,7 @@ def _from_csv(path: Path, quantities: Mapping[str, Quantity], length_unit: str) 
 
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a CSV file that hold anything, each with its line."""
+    """Yield the rows of a CSV file that are not blank, each with its line number."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             first = next((line for line in file if line.strip()), "")
@@ -154,13 +173,13 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _title(cell: str) -> tuple[str, str]:
-    """'crank_angle' and 'deg' of 'crank_angle [deg]'."""
+    """Return 'crank_angle' and 'deg' for 'crank_angle [deg]'."""
     name, bracket, unit = cell.strip().partition("[")
     return (name.rstrip(), unit[:-1].strip()) if bracket and unit.endswith("]") else (cell.strip(), "")
 
 
 def _factor(where: str, name: str, unit: str, known: Mapping[str, float]) -> float:
-    """From the column's unit into the one used inside."""
+    """Return the factor from the column's unit to the unit of the FMU."""
     if not unit:
         return 1.0
     if unit not in known:
@@ -174,26 +193,26 @@ def _check_names(where: str, names: list[str], known: Sequence[str]) -> None:
     for name in names:
         if name != TIME and name not in known:
             raise FmuError(
-                f"{where}: {quoted(name)} is no input of this FMU{_meant(name, known)}; "
+                f"{where}: {quoted(name)} is not an input of this FMU{_hint(name, known)}; "
                 f"columns: {listed((TIME, *known))}"
             )
         if names.count(name) > 1:
-            raise FmuError(f"{where}: the column '{name}' is there twice")
+            raise FmuError(f"{where}: column '{name}' occurs twice")
     if TIME not in names:
         raise FmuError(f"{where}: the column 'time' is missing; columns: {listed(names)}")
     if len(names) == 1:
-        raise FmuError(f"{where}: no input beside 'time'; inputs: {listed(known)}")
+        raise FmuError(f"{where}: the only column is 'time'; inputs: {listed(known)}")
 
 
-def _meant(title: str, known: Sequence[str]) -> str:
-    """What may have been meant by the title of a column that is none."""
+def _hint(title: str, known: Sequence[str]) -> str:
+    """Return a hint for the title of a column that is not an input."""
     names = (TIME, *known)
     base, bracket, unit = title.partition("(")
     if bracket and base.strip() in names:
         meant = f"{base.strip()} [{unit.rstrip(' )')}]"
         return f"; did you mean {quoted(meant)}?"
     if any(name in title.split() for name in names):
-        return "; columns are parted by commas, semicolons or tabs"
+        return "; separate columns by commas, semicolons or tabs"
     try:
         read_decimal(title)
     except ValueError:
@@ -202,7 +221,7 @@ def _meant(title: str, known: Sequence[str]) -> str:
 
 
 def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], place: Callable[[int], str]) -> InputTable:
-    """The table, if it holds at least one row, finite numbers only and increasing times; place: names a row."""
+    """Return the table after checking that it has rows, finite numbers and increasing times; place: names a row."""
     t = columns[TIME]
     if not len(t):
         raise FmuError(f"{where}: holds no samples")

@@ -1,4 +1,4 @@
-"""The one list of an FMU's variables. Model description, value references and the channels of a run follow from it."""
+"""The list of an FMU's variables, from which model description, value references and channels of a run follow."""
 
 from __future__ import annotations
 
@@ -21,25 +21,38 @@ Drive = Literal["time", "inputs"]
 DRIVES: tuple[Drive, ...] = ("time", "inputs")
 
 DEFAULT_TOLERANCE = 1e-9  # residual relative to the mechanism's size above which a sample is not ok
-SMALLEST_TOLERANCE = 1e-15  # round-off: no sample would pass below
+SMALLEST_TOLERANCE = 1e-15  # round-off: below it no sample would be ok
 _COORDINATE_WORDS = {
     "x": ("x", "x velocity", "x acceleration"),
     "y": ("y", "y velocity", "y acceleration"),
     "phi": ("Angle", "Angular velocity", "Angular acceleration"),
 }
-_WIRING = "an input or estimated, as parameter rates says"
+_WIRING = "the input or an estimate: see parameter rates"
 _ORDER_WORDS = ("", "rate of ", "acceleration of ")
 _ANGLES_SHOWN_IN_DEGREES = ("rad", "rad/s", "rad/s2")
 
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of an FMU, in FMI's words.
+    """One variable of an FMU, in FMI's terms.
 
-    derivative_of: the variable of which this is the time derivative. declared_type: name of the type of an Enumeration.
-    dependencies: the inputs that an output depends on structurally, None where FMI lists none; linear_in: those of them
-    whose factor depends on fixed parameters alone; initial_dependencies: inputs and parameters that it depends on when
-    the FMU is initialized.
+    Attributes:
+        name: Name, such as "coupler.vx".
+        type: FMI 2.0's type.
+        causality: FMI's causality.
+        variability: FMI's variability.
+        description: One line for the user of the FMU.
+        initial: FMI's attribute `initial`, if any.
+        unit: Unit, such as "rad/s".
+        start: Start value.
+        minimum: Smallest valid value.
+        maximum: Largest valid value.
+        derivative_of: Variable of which this is the time derivative.
+        declared_type: Name of the type of an Enumeration.
+        dependencies: Inputs that an output depends on structurally; None if FMI lists none.
+        linear_in: Those of them whose factor depends on fixed parameters alone.
+        initial_dependencies: Inputs and parameters that it depends on during initialization.
+
     """
 
     name: str
@@ -60,7 +73,7 @@ class Variable:
 
     @property
     def display_unit(self) -> str | None:
-        """The unit in which tools show the value at first: degrees for angles, else none."""
+        """The unit in which tools show the value by default: degrees for angles, else None."""
         if self.unit in _ANGLES_SHOWN_IN_DEGREES:
             return next(iter(display_units(self.unit)))
         return None
@@ -68,7 +81,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Part:
-    """Neighbours in the list that a slave computes together, such as the rates of all outputs."""
+    """Neighbouring variables that a slave computes together, such as the rates of all outputs."""
 
     name: str
     variables: tuple[Variable, ...]
@@ -82,10 +95,17 @@ class Part:
 class Interface:
     """All variables of an FMU, part by part; the value reference of a variable is its place in the list, from 1.
 
-    FMI 2.0 counts variables from 1 in dependencies, FMI 3.0 names value references there. The two are the same numbers
+    Dependencies are places counted from 1 in FMI 2.0, and value references in FMI 3.0. The two are the same numbers
     here, so a host that takes one for the other reads the same dependencies.
 
-    coordinate_count: how many of the outputs are generalized coordinates (they come first).
+    Attributes:
+        name: Name of the mechanism.
+        title: Title of the mechanism.
+        length_unit: Unit of length.
+        experiment: Default start, stop and step [s].
+        coordinate_count: Number of outputs that are generalized coordinates (they come first).
+        parts: Variables by part.
+
     """
 
     name: str
@@ -105,21 +125,25 @@ class Interface:
             yield from part.variables
 
     def part(self, name: str) -> tuple[Variable, ...]:
-        """The variables of a part; an FMU without that part has none."""
+        """Return the variables of a part, none if the FMU does not have that part."""
         return next((part.variables for part in self.parts if part.name == name), ())
 
     def value_references(self) -> dict[str, int]:
-        """Value reference by name."""
+        """Return the value references by name."""
         return {variable.name: reference for reference, variable in enumerate(self, start=1)}
 
 
 def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False) -> Interface:
-    """The variables of the FMU of a plan; `drive` chooses the default of `driven_by_time`.
+    """Return the variables of the FMU of a plan.
 
-    has_time: time is a variable, too, the last one, as FMI 3.0 wants it; what the drivers move depends on it, and, as
-    FMI 3.0 counts them among what is known after initialization, on tunable parameters.
+    Args:
+        plan: Plan of the mechanism.
+        drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
+        has_time: True for FMI 3.0: time is the last variable, and what the drivers move depends on it and on tunable
+            parameters, which FMI 3.0 counts as known after initialization.
+
     """
-    from kinfmu.fmu.linear import linear_inputs  # with scipy, which stepping an FMU does not need
+    from kinfmu.fmu.linear import linear_inputs  # imports scipy, which stepping an FMU does not need
 
     mechanism = plan.mechanism
     every = tuple(range(len(plan.drivers)))
@@ -174,8 +198,8 @@ _RATES = Variable(
     "Enumeration",
     "parameter",
     "fixed",
-    "Speeds and accelerations of drivers: wired: the inputs, 0 too; estimated: from the driver's values, of order 2 "
-    "and 1; auto: estimated until the input is first other than 0. Model exchange: always wired",
+    "Speeds and accelerations of drivers: wired: the inputs, also if 0; estimated: from the driver's values, of order "
+    "2 and 1; auto: estimated until the input is first other than 0. Model exchange: always wired",
     initial="exact",
     start=int(Rates.AUTO),
     minimum=int(min(Rates)),
@@ -190,15 +214,15 @@ _MESSAGE = Variable(
     "String",
     "local",
     "discrete",
-    "Why the pose cannot be had: driver, value and limit; empty when all is well",
+    "Why the pose is unreachable: driver, value and limit; empty if solver.ok is true",
     initial="calculated",
 )
 
 
 def _in_fmi3(variable: Variable, tunable: Collection[str]) -> Variable:
-    """Return the variable with what FMI 3.0 counts as known: time and tunable parameters, if it depends on drivers.
+    """Return the variable with the dependencies of FMI 3.0: also time and tunable parameters, if it has any.
 
-    Parameters that are fixed are no dependencies of outputs: they cannot change any more.
+    Fixed parameters are not among the dependencies of outputs: they can no longer change.
     """
     if not variable.dependencies:
         return variable
@@ -224,9 +248,9 @@ def _driven_by_time(drive: Drive) -> Variable:
 
 
 def start_values(mechanism: Mechanism) -> dict[str, float]:
-    """Start value of each input: the law's value at the start of the run, so that a fresh FMU holds a pose; rates 0.
+    """Return the start value of each input by name: the law's value at the start of the run, and 0 for rates.
 
-    A rate that stays 0 counts as not wired.
+    So a fresh FMU has a pose. A rate that stays 0 counts as not wired.
     """
     starts = {}
     for driver in mechanism.drivers:
@@ -275,11 +299,11 @@ def _output(
 def _input_names(
     plan: SolvePlan, drivers: tuple[int, ...], order: int, linear_in: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Inputs that a quantity of the given order depends on.
+    """Return the inputs that a quantity of the given order depends on.
 
-    A position depends on the value, a rate also on the speed, an acceleration on all three; but what is linear in the
-    value accelerates without regard to the speed. It depends on the value all the same, from which co-simulation may
-    estimate the acceleration: what is declared holds for every setting of the parameters.
+    A position depends on the value, a rate also on the speed, an acceleration on all three. The acceleration of a
+    quantity that is linear in the value does not depend on the speed, but it still depends on the value, from which
+    co-simulation may estimate it: declared dependencies hold for all settings of the parameters.
     """
     names: list[str] = []
     for k in drivers:
@@ -291,7 +315,7 @@ def _input_names(
 def _initial_names(
     plan: SolvePlan, drivers: tuple[int, ...], order: int, linear_in: tuple[str, ...] = (), *, tolerance: bool = False
 ) -> tuple[str, ...]:
-    """The same at initialization, where parameters are known quantities too: the law's constants may drive."""
+    """Return the dependencies at initialization, when parameters, such as the law's constants, count as inputs too."""
     if not drivers:
         return ()
     prefixes = tuple(f"{plan.drivers[k].name}." for k in drivers)
@@ -345,19 +369,19 @@ def _errors(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
     for order, suffix in enumerate(("q", "qd", "qdd")):
         text = (
             f"Estimated error of {suffix}: the largest among the outputs, lengths relative to the mechanism's size; "
-            f"{UNKNOWN_ERROR:g} where there is no estimate"
+            f"{UNKNOWN_ERROR:g} if there is no estimate"
         )
         yield _solver_output(plan, every, f"solver.error_{suffix}", text, order, minimum=0.0, maximum=UNKNOWN_ERROR)
 
 
 def _watches(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
     for name in plan.watch_names:
-        text = f"Residual of row {name}, set aside as redundant, relative to the mechanism's size"
+        text = f"Residual of redundant row {name}, relative to the mechanism's size"
         yield _solver_output(plan, every, f"watch.{name}", text)
 
 
 def _driven(plan: SolvePlan) -> Iterator[Variable]:
-    """What drives in effect: the inputs, with estimates for rates not wired, or the law."""
+    """Yield the driver values in effect: of the law, or of the inputs, with estimates for rates that are not wired."""
     for driver in plan.drivers:
         for order, name in enumerate(driver.inputs):
             yield Variable(
@@ -403,7 +427,7 @@ def _parameters(plan: SolvePlan) -> Iterator[Variable]:
 
 
 def _fixed(plan: SolvePlan) -> Iterator[Variable]:
-    """Coordinates that the joints fix: constants, or what follows from parameters."""
+    """Yield the coordinates that the joints fix: constants, or values that follow from parameters."""
     for name, value in plan.fixed.items():
         owner, _, coordinate = name.rpartition(".")
         parameters = plan.parameters_of(name)
@@ -412,7 +436,7 @@ def _fixed(plan: SolvePlan) -> Iterator[Variable]:
             "Real",
             "calculatedParameter" if parameters else "local",
             "fixed" if parameters else "constant",
-            f"{owner}: {coordinate}, which the joints fix",
+            f"{owner}: {coordinate}, fixed by the joints",
             initial="calculated" if parameters else "exact",
             unit=unit_of(quantity_of(name), plan.mechanism.length_unit),
             start=None if parameters else value,
@@ -425,7 +449,7 @@ def _counts(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
         plan,
         every,
         "solver.status",
-        "How far the numbers can be trusted: 0 to 2 hold numbers, 3 to 5 do not",
+        "Quality of the sample: the outputs are valid for 0 to 2, of the last good pose for 3 to 5",
         kind="Enumeration",
         minimum=min(Status),
         maximum=max(Status),
@@ -434,6 +458,6 @@ def _counts(plan: SolvePlan, every: tuple[int, ...]) -> Iterator[Variable]:
 
 
 def _ok(plan: SolvePlan, every: tuple[int, ...]) -> Variable:
-    """The twin of solver.status for hosts that do not read enumerations."""
-    text = "true: solver.status is 0 to 2, the outputs hold; false: it is 3 to 5, the outputs are of the last good pose"
+    """Return solver.ok, which repeats solver.status for hosts that do not read enumerations."""
+    text = "true: solver.status is 0 to 2, the outputs are valid; false: it is 3 to 5, they are of the last good pose"
     return _solver_output(plan, every, "solver.ok", text, kind="Boolean")

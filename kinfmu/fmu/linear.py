@@ -1,4 +1,4 @@
-"""What an output is linear in: inputs that move it by a factor of parameters and constants alone."""
+"""Inputs in which an output is linear, with a factor that depends on parameters and constants alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kinfmu.plan.trace import is_parameter
 
 
 class _Dependence(NamedTuple):
-    """Inputs behind a number: those with a factor of parameters and constants, and those with any other."""
+    """Inputs that a number depends on: with a factor of parameters and constants, and in any other way."""
 
     linear: frozenset[str]
     other: frozenset[str]
@@ -24,10 +24,10 @@ _NONE = _Dependence(frozenset(), frozenset())
 
 
 def linear_inputs(plan: SolvePlan) -> dict[str, tuple[str, ...]]:
-    """Of each output of a plan the driver values that it is linear in, in their order.
+    """Return, for each output of a plan, the driver values in which it is linear, in their order.
 
-    y = sum_k f_k u_k + rest, where f_k depends on parameters and constants alone and the rest on other inputs. What
-    Newton solves for counts as linear in nothing, though it may happen to be.
+    y = sum_k f_k u_k + rest, where f_k depends on parameters and constants alone and the rest on other inputs. Unknowns
+    of Newton's method count as linear in no input, even if they are.
     """
     inputs = tuple(driver.inputs[0] for driver in plan.drivers)
     known = {name: _Dependence(frozenset((name,)), frozenset()) for name in inputs}
@@ -40,7 +40,7 @@ def linear_inputs(plan: SolvePlan) -> dict[str, tuple[str, ...]]:
 
 
 def _of(node: Node, known: dict[str, _Dependence]) -> _Dependence:
-    """Of one formula, from what is known of its symbols."""
+    """Return the dependence of a formula, from those of its symbols."""
     of: dict[Node, _Dependence] = {}
     for one in reachable([node]):  # arguments first
         if one.op == "symbol":

@@ -1,17 +1,17 @@
-"""The python flavour: an FMU around pythonfmu's binaries that carries its own solver as Python source.
+"""The python flavour: an FMU around pythonfmu's binaries that contains the solver as Python source.
 
     modelDescription.xml
     documentation/index.html
-    binaries/<platform>/<identifier>.so|dll       pythonfmu's, as they are
+    binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
-    resources/<package>_slave.py                  the class, with its model and layout
-    resources/<package>/solver/                   the run time, with the emitted model beside it
-    resources/<package>/{fmu,pythonfmu}/          the slave; pythonfmu's own base class
+    resources/<package>_slave.py                  the slave class, with its model and layout
+    resources/<package>/solver/                   the solver, and the emitted model
+    resources/<package>/{fmu,pythonfmu}/          the base classes of the slave: kinfmu's and pythonfmu's
     resources/mechanism.toml
 
-Hosts keep imported modules for the life of the process, and pythonfmu runs a slave's module twice. So every module
-carries the mechanism's name and a hash of the content in its name, does nothing when imported, and nothing is taken
-from a package that the host may hold in another version: `kinfmu` and `pythonfmu` go in under the package's own name.
+Hosts keep imported modules for the life of the process, and pythonfmu runs a slave's module twice. So the name of every
+module contains the mechanism's name and a hash of the content, and importing it has no effects. The host may hold other
+versions of `kinfmu` and `pythonfmu`, so copies of both are inside, under the name of the package.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from kinfmu.plan import SolvePlan
 CAPABILITIES = {
     "needsExecutionTool": True,  # Python, in the process of the host
     "canHandleVariableCommunicationStepSize": True,
-    "canInterpolateInputs": False,  # pythonfmu's binary refuses input derivatives
+    "canInterpolateInputs": False,  # pythonfmu's binary rejects input derivatives
     "canBeInstantiatedOnlyOncePerProcess": False,
     "canNotUseMemoryManagementFunctions": True,
     "canGetAndSetFMUstate": True,
     "canSerializeFMUstate": True,
-    "providesDirectionalDerivative": False,  # as does it for derivatives of any kind
+    "providesDirectionalDerivative": False,  # pythonfmu's binary rejects all derivatives
 }
 RUN_TIME = ("slave.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
@@ -79,17 +79,30 @@ class Slave(MechanismSlave):
 
 
 def archive(plan: SolvePlan, drive: Drive, version: str) -> bytes:
-    """The FMU of a plan as the bytes of its zip archive; the same plan gives the same bytes."""
+    """Return the FMU of a plan; the same plan gives the same bytes.
+
+    Args:
+        plan: Plan of the mechanism.
+        drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
+        version: Version of kinfmu.
+
+    Returns:
+        Bytes of the zip archive.
+
+    Raises:
+        FmuError: If pythonfmu is installed without its binaries.
+
+    """
     variables = interface(plan, drive)
     contents = _contents(plan, variables, version)
     return zipped(_named(contents, variables, version, digest(contents)))
 
 
 def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, bytes]:
-    """Every file, by its path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
+    """Return every file by path in the FMU, still under the names `kinfmu` and `pythonfmu` and without a token."""
     import pythonfmu
 
-    solver, room = files("kinfmu.solver.python"), files("kinfmu.fmu")
+    solver, fmu = files("kinfmu.solver.python"), files("kinfmu.fmu")
     base = files(pythonfmu)
     contents = {
         "modelDescription.xml": _description(variables, version, guid=""),
@@ -101,7 +114,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
         "kinfmu/solver/model.py": emit(plan).encode(),
         "kinfmu_slave.py": _entry(variables, token="").encode(),
     }
-    contents |= {f"kinfmu/fmu/{name}": room.joinpath(name).read_bytes() for name in RUN_TIME}
+    contents |= {f"kinfmu/fmu/{name}": fmu.joinpath(name).read_bytes() for name in RUN_TIME}
     contents |= {f"kinfmu/solver/{f.name}": f.read_bytes() for f in solver.iterdir() if f.name.endswith(".py")}
     contents |= {f"kinfmu/pythonfmu/{name}": base.joinpath(name).read_bytes() for name in BASE_CLASS}
     contents |= {f"binaries/{name}": data for name, data in _binaries(variables.name).items()}
@@ -110,7 +123,7 @@ def _contents(plan: SolvePlan, variables: Interface, version: str) -> dict[str, 
 
 
 def _documents() -> dict[str, bytes]:
-    """What the FMU needs from outside, and the licences of what is in it."""
+    """Return the documents: requirements of the FMU, and the licences of its contents."""
     return {
         "documentation/externalDependencies.txt": EXTERNAL_DEPENDENCIES.encode(),
         "documentation/licenses/license.txt": documentation.licence("pythonfmu, in pythonfmu.txt").encode(),
@@ -121,7 +134,7 @@ def _documents() -> dict[str, bytes]:
 
 
 def _binaries(identifier: str) -> dict[str, bytes]:
-    """pythonfmu's binaries by platform, under the name of the FMU's model identifier."""
+    """Return pythonfmu's binaries by platform, under the FMU's model identifier."""
     import pythonfmu
 
     found = {}
@@ -157,7 +170,7 @@ def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
 
 
 def _named(contents: Mapping[str, bytes], variables: Interface, version: str, digits: str) -> dict[str, bytes]:
-    """The files under their final names, modules checked to import nothing but themselves and the standard library."""
+    """Return the files under their final names; check that modules import only each other and the standard library."""
     package = f"kinfmu_{variables.name}_{digits[:12]}"
     guid = token(digits)
     named = {"modelDescription.xml": _description(variables, version, guid)}
@@ -175,7 +188,7 @@ def _named(contents: Mapping[str, bytes], variables: Interface, version: str, di
 
 
 def _renamed(source: str, package: str) -> str:
-    """A module whose imports from kinfmu and pythonfmu come from `package`."""
+    """Return a module with its imports from kinfmu and pythonfmu changed to imports from `package`."""
     source = re.sub(r"^(\s*)from kinfmu\.solver\.python(?=[.\s])", r"\1from kinfmu.solver", source, flags=re.MULTILINE)
     source = re.sub(r"^(\s*)from kinfmu(?=[.\s])", rf"\1from {package}", source, flags=re.MULTILINE)
     return re.sub(r"^(\s*)from pythonfmu(?=[.\s])", rf"\1from {package}.pythonfmu", source, flags=re.MULTILINE)

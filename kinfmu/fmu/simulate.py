@@ -1,6 +1,6 @@
-"""Simulate an FMU through fmpy's low-level calls, and keep what it says as a Run.
+"""Simulate an FMU through fmpy's low-level calls, and return its samples as a Run.
 
-fmpy's own `simulate_fmu` records the outputs of u(t - h) at t and gives up without a word where a step is Discard; this
+fmpy's own `simulate_fmu` records the outputs of u(t - h) at t, and ends without a message if a step is discarded. This
 loop sets at t_k, gets, records, then steps.
 """
 
@@ -36,7 +36,7 @@ from kinfmu.units import quantity_in
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-LAST_STEP = 1e-6  # of a step: what is left before `stop` and shorter than this is rounding, not a step
+LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 
 
 def simulate(
@@ -53,29 +53,42 @@ def simulate(
     sink: Sink | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
-    """Step an FMU that kinfmu built from start to stop, both included, and return the Run.
+    """Step an FMU that kinfmu built from start to stop, both included.
 
-    start, stop, step: [s]; where not given those of the FMU's default experiment, but start and stop of the first and
-    the last row where there are inputs; samples at t_k = start + k step, a last shorter step ends at stop. inputs: a
-    CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit, or a mapping
-    of arrays by name; linear between rows. Inputs drive then, unless parameters say otherwise. parameters: by name,
-    such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}. wrap: angles among the inputs are followed the short way
-    where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. channels: what to keep of every
-    sample, such as ["q", "qd"] or ["-error", "-margin"], as kinfmu.run.channels tells; the FMU is not asked
-    for the rest. rate: samples to keep in a second of the run, all if None. sink: takes the run while it goes on, such
-    as kinfmu.log.McapLog("run.mcap"), or any other kinfmu.Sink. progress: called with (samples done, samples in all).
+    Samples are at t_k = start + k step; a shorter last step ends at stop. If a pose cannot be reached, the run ends:
+    its last sample has the status and no numbers, and an event of level "error" states driver, value and limit.
 
-    Ctrl-C ends the run, too; what was reached is kept, with an event that says so. Before the first sample it raises
-    KeyboardInterrupt, and the sink is left alone. SIGTERM and SIGHUP do the same and then what they always do.
+    Ctrl-C also ends the run and adds an event. Before the first sample it raises KeyboardInterrupt, and the sink is not
+    called. SIGTERM and SIGHUP do the same, and then have their usual effect.
 
-    What is probably not meant (inputs that nothing drives, angles that jump by more than half a turn, radians that look
-    like degrees) is told by events of level "warning" and "info".
+    Probable mistakes (inputs that no column drives, angles that jump by more than half a turn, radians that look like
+    degrees) are reported by events of level "warning" and "info".
 
-    Where a pose cannot be reached the run ends: its last sample carries the status and holds no numbers, and an event
-    of level "error" names driver, value and limit.
+    Args:
+        fmu_path: File of the FMU.
+        start: Start time [s]. Default: of the FMU's default experiment; with inputs, of their first row.
+        stop: Stop time [s]. Default: of the FMU's default experiment; with inputs, of their last row.
+        step: Step [s]. Default: of the FMU's default experiment.
+        inputs: CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit,
+            or a mapping of arrays by name; linear between rows. With inputs, `driven_by_time` is false by default.
+        parameters: Values by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}.
+        wrap: True: angles among the inputs that jump by a turn, such as from 2 pi to 0, are unwrapped. False: such a
+            jump is a turn back.
+        channels: Channels to record of every sample, such as ["q", "qd"] or ["-error", "-margin"]: see
+            kinfmu.run.channels. Others are not read from the FMU. Default: all.
+        rate: Number of samples to record per second of the run. Default: all.
+        sink: Sink that gets the run while it is simulated, such as kinfmu.log.McapLog("run.mcap"), or any other
+            kinfmu.Sink.
+        progress: Called with (samples done, number of samples).
 
-    Raises a RequestError for times, inputs, parameters and channels that cannot be meant; an FmuError for what is no
-    FMU of kinfmu, for faulty tables of inputs, and for parameters that the mechanism cannot have.
+    Returns:
+        The run.
+
+    Raises:
+        RequestError: If times, inputs, parameters or channels are not valid.
+        FmuError: If the file is not an FMU of kinfmu, a table of inputs is faulty, or the mechanism has no solution
+            with the parameters.
+
     """
     if isinstance(fmu_path, Mechanism):
         raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")
@@ -120,7 +133,7 @@ def simulate(
 
 
 def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> Mechanism:
-    """The mechanism as it moves: with the values that the FMU is given, where it can have them."""
+    """Return the mechanism with the parameters that are set in the FMU, if they are valid."""
     mechanism = toml_file.parse(mechanism_text, where)
     own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
     values = {name: value for name, value in settings.items() if name in own}
@@ -131,7 +144,7 @@ def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], whe
 
 
 def _times(span: RunSettings | InputTable, start: float | None, stop: float | None, step: float) -> NDArray[np.float64]:
-    """(n,) t_k = start + k step up to stop, which is always the last; start and stop of `span` where not given."""
+    """Return t_k = start + k step (n,), of which stop is the last; start and stop default to those of `span`."""
     first = span.start if start is None else float(start)
     last = span.stop if stop is None else float(stop)
     h = float(step)
@@ -153,7 +166,7 @@ def _times(span: RunSettings | InputTable, start: float | None, stop: float | No
 def _parameters(
     interface: Interface, parameters: Mapping[str, float | str | bool], *, has_inputs: bool, where: str
 ) -> dict[str, float | bool | str]:
-    """The parameters to set, checked: inputs that are given shall drive unless the caller says otherwise."""
+    """Return the checked parameters to set; with inputs, `driven_by_time` is false by default."""
     known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
     chosen: dict[str, float | bool | str] = {}
     for name, value in parameters.items():
@@ -181,7 +194,7 @@ def _parameters(
 
 
 def _rates(value: float | str | bool, where: str) -> str:
-    """The parameter `rates`, by its name or its number, as a name."""
+    """Return the name of a value of the parameter `rates`, given as name or number."""
     names = {mode.name.lower(): mode for mode in Rates}
     for name, mode in names.items():
         if str(value).lower() == name or (not isinstance(value, str) and value == mode):
@@ -190,7 +203,7 @@ def _rates(value: float | str | bool, where: str) -> str:
 
 
 def _check_range(variable: Variable, value: float, where: str) -> None:
-    """Raise a RequestError for a value beyond the least or the greatest that the variable declares."""
+    """Raise a RequestError for a value outside the range that the variable declares."""
     low, high = variable.minimum, variable.maximum
     if (low is not None and value < low) or (high is not None and value > high):
         ends = {"at least": low, "at most": high}
@@ -206,9 +219,9 @@ def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | s
 def _initialize(
     slave: Slave, parameters: Mapping[str, float | bool | str], t: NDArray[np.float64], complaint: Callable[[], str]
 ) -> None:
-    """Set the parameters and initialize; FmuError if one is refused or if they cannot be had.
+    """Set the parameters and initialize; raise an FmuError for refused parameters and for those with no solution.
 
-    FMUs of the python flavour cannot answer Error there: what they tell is what counts.
+    FMUs of the python flavour cannot return Error here: their messages of level error count.
     """
     from fmpy.fmi1 import FMICallException
 
@@ -234,7 +247,7 @@ def _estimates(
     table: InputTable | None,
     first: NDArray[np.float64],
 ) -> BlockEstimates | None:
-    """What computes margins and errors of many samples; None where errors of estimated speeds count too.
+    """Return what computes margins and errors of many samples, or None if errors of estimated rates count too.
 
     first: inputs at the first sample.
     """
@@ -258,14 +271,15 @@ def _step_through(
     progress: Callable[[int, int], None] | None,
     signals: list[int],
 ) -> None:
-    """The loop: set at t_k, get, record if the sample is kept or there are no numbers, step.
+    """Run the loop: set at t_k, get, record if the sample is kept or holds no numbers, step.
 
-    kept: samples to record; inputs: the k inputs to set; rows: (n, k) their values; signals: those that end the run.
+    kept: indices of samples to record; inputs: value references of the k inputs to set; rows: (n, k) their values;
+    signals: those that came, which end the run.
     """
     kept_at = np.zeros(len(t), bool)
     kept_at[kept] = True
     is_kept: Any = kept_at.data
-    times = t.data  # items of a memoryview are Python's own numbers, which is faster
+    times = t.data  # items of a memoryview are Python numbers, which are faster
     last = len(t) - 1
     set_inputs = slave.setter(inputs, rows) if inputs else None
     for k, time in enumerate(times):
@@ -284,9 +298,9 @@ def _step_through(
         if k == last:
             return
         end = times[k + 1]
-        samples.now = time if inputs else end  # what a step tells is of its inputs, or of where time drives to
+        samples.now = time if inputs else end  # messages of a step are about its inputs, or the time it goes to
         if not slave.step(time, end - time):
-            if slave.counts()[0] > Status.BRIDGED:  # what the step asked for lies out of reach
+            if slave.counts()[0] > Status.BRIDGED:  # the step goes to an unreachable pose
                 samples.read(end, slave)
             return
 

@@ -1,9 +1,9 @@
-"""The slave of a python FMU. It travels inside the FMU, beside `solver/`: standard library and pythonfmu's base class.
+"""The slave of a python FMU. The FMU has a copy, so it imports only the standard library and pythonfmu's base class.
 
-An exception that leaves a slave is Fatal in pythonfmu and by FMI's rules ends every instance of the host. So nothing
-here raises: what cannot be done is logged and the next doStep is Discard. The rest is pythonfmu's binary: it keeps the
-last successful time, answers fmi2Terminated with true from the first Discard on (a slave has no say in it; going on is
-possible all the same), shows messages only to hosts that instantiate with loggingOn, and does not compare the guid.
+An exception that leaves a slave is Fatal in pythonfmu, and by FMI's rules it ends every instance of the host. So
+nothing here raises: errors are logged and the next doStep returns Discard. pythonfmu's binary does the rest: it keeps
+the last successful time, returns true for fmi2Terminated after the first Discard (a slave cannot change this, but the
+host may continue), passes messages only to hosts that instantiate with loggingOn, and does not compare the guid.
 """
 
 from __future__ import annotations
@@ -31,23 +31,22 @@ from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Places
 from kinfmu.solver.python import Pose, Status, UnsolvableModel, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
-MOST_FETCHES = 256  # lists of value references remembered; a host that reads at random must not fill the memory
+MOST_FETCHES = 256  # lists of value references kept, so that a host that reads at random does not fill the memory
 _COUNTS = {
     "solver.status": "status",
     "solver.iterations": "iterations",
     "rates": "rates",
-}  # attributes of a pose, or rates
-SAME_TIME = 1e-9  # of a step: hosts add up time with rounding errors, which move no pose
+}  # attribute of a pose by variable, or "rates"
+SAME_TIME = 1e-9  # of a step: rounding errors of times that hosts add up
 LATE = 1e-3  # of a step: a sum of a million steps may end this late
 ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
 
 
 class Shown:
-    """A pose that is shown, with what has been computed of it so far.
+    """The pose that outputs are read from, with what has been computed from it so far.
 
-    drive: u, ud, udd of the drivers; stale: a pose that could not be reached was asked for, and this is the last good
-    one.
+    drive: u, ud, udd of the drivers; stale: true for the last good pose, in place of an unreachable requested one.
     """
 
     __slots__ = ("accelerations", "drive", "errors", "pose", "rates", "stale", "values")
@@ -63,25 +62,25 @@ class Shown:
 
 
 def _numbers(values: Sequence[float], like: Sequence[float]) -> Row:
-    """As many numbers as there are in `like`; ValueError or TypeError if they are not."""
+    """Return as many numbers as there are in `like`; raise a ValueError or TypeError for anything else."""
     return tuple([float(value) for value, _ in zip(values, like, strict=True)])
 
 
 class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
     """A mechanism as an FMI 2.0 co-simulation slave.
 
-    The protocol: a set marks; a get solves from the *committed* pose and caches; doStep commits the pose and appends
-    (communication point, driver values). Trial values never influence a result, an unchanged input costs no solve,
-    velocity and acceleration are computed when they are first read.
+    The protocol: a set clears the cache; a get solves from the *committed* pose and caches; doStep commits the pose and
+    appends (communication point, driver values) to the history. So trial values never influence a result, an unchanged
+    input is not solved again, and velocity and acceleration are computed when they are first read.
 
-    A leaf gives `model` (the emitted module) and `layout`.
+    A subclass defines `model` (the emitted module) and `layout`.
     """
 
     model: ClassVar[Any]
     layout: ClassVar[Layout]
 
     def __init_subclass__(cls) -> None:
-        """Give the leaf the methods of a step as its own: the C side looks them up by name, base after base."""
+        """Copy the methods of a step into the subclass: pythonfmu's binary looks them up by name, class by class."""
         super().__init_subclass__()
         for name in ("set_real", "do_step", "get_real"):
             setattr(cls, name, getattr(cls, name))
@@ -104,7 +103,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._last_counted: list[int] = []  # of the last get_integer, and what it reads of a pose
         self._counted: list[str] = []
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
-        self._unbound = False  # parameters were set and not yet bound
+        self._unbound = False  # parameters were set and are not yet bound
 
         self._initialized = False
         self._running = False  # from the end of initialization to terminate
@@ -112,8 +111,8 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._time = self.layout.start_time  # the communication point, or the point that a failed step asked for
         self._stop_time = sys.float_info.max  # of the experiment, if the host gave one
         self._touched = False  # something was set since the last commit
-        self._wired: set[int] = set()  # places among the inputs of the rates that are inputs, not estimates
-        self._refused: dict[str, str] = {}  # by variable: why a value was not taken; the next doStep is Discard
+        self._wired: set[int] = set()  # places of the inputs that are used as rates, in place of estimates
+        self._refused: dict[str, str] = {}  # by variable: why a value was refused; the next doStep is Discard
         self._stray_reported = False  # the host was warned that inputs have no effect
 
         self._committed: Pose = self._solver.anchor
@@ -122,16 +121,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
         self._forget()
 
-    # What is asked for, and what is cached of it
+    # The requested pose and its cache
 
     def _forget(self) -> None:
-        """The driver values may have changed: solve again when something is read."""
+        """Clear the cache, since driver values may have changed: the next get solves."""
         self._pose: Pose | None = None
         self._shown: Shown | None = None
-        self._motion: Row | None = None  # values, rates and accelerations in one row: what most hosts read
+        self._motion: Row | None = None  # values, rates and accelerations in one row, which most hosts read
 
     def _driven(self) -> tuple[Row, Row, Row]:
-        """u, ud, udd of the drivers for what is asked: by the law at the current time, or by the inputs."""
+        """Return the requested u, ud, udd: by the law at the current time, or by the inputs."""
         if self._driven_by_time:
             return self._solver.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
         t, u = self._moment()
@@ -140,7 +139,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return u, *estimated_rates(self._history, t, u)
 
     def _law(self, t: float) -> Row:
-        """u by the laws; no numbers where rates are beyond LARGEST: no pose belongs to it."""
+        """Return u by the laws, or NaN if a rate exceeds LARGEST: there is no pose then."""
         u, ud, udd = self._solver.model.drive(t, self._constants)
         for rate in ud + udd:
             if not -LARGEST <= rate <= LARGEST:
@@ -148,14 +147,14 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return u  # type: ignore[no-any-return]
 
     def _moment(self) -> Sample:
-        """The time and u of what the inputs ask for."""
+        """Return the time and u that the inputs request."""
         history = self._history
         if self._touched or not history:
             return self._time, self._wanted()
-        return history[-1]  # nothing set since the commit: still the committed sample, at the time of its doStep
+        return history[-1]  # no set since the commit: the committed sample, at the time of its doStep
 
     def _by_inputs(self, inputs: Sequence[float], t: float, u: Row) -> tuple[Row, Row, Row]:
-        """u, ud, udd at time t, with estimates for the rates that are not wired."""
+        """Return u, ud, udd at time t, with estimates for rates that are not wired."""
         wired = self._wired
         if not wired:
             return u, *estimated_rates(self._history, t, u)
@@ -167,7 +166,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return u, ud, udd
 
     def _committed_drive(self) -> tuple[Row, Row, Row]:
-        """u, ud, udd at the last commit, where the last good values stem from; at rest in the anchor before it."""
+        """Return u, ud, udd at the last commit, of the last good values; before it, those of the anchor at rest."""
         if not self._history:
             rest = (0.0,) * len(self._committed.u)
             return self._committed.u, rest, rest
@@ -177,12 +176,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return self._by_inputs(self._committed_inputs, t, u)
 
     def _wanted(self) -> Row:
-        """u by the inputs."""
+        """Return u by the inputs."""
         inputs = self._inputs
-        return (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])  # one driver, as a rule: no slice
+        return (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])  # most mechanisms have one driver: no slice
 
-    def _asked(self) -> Pose:
-        """The pose asked for, good or not: followed from the committed one."""
+    def _requested(self) -> Pose:
+        """Return the requested pose, good or not, solved from the committed one."""
         pose = self._pose
         if pose is None:
             if self._unbound:
@@ -192,26 +191,26 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return pose
 
     def _look(self) -> Shown:
-        """What is shown: the pose asked for, or the last good one."""
+        """Return the pose that outputs are read from: the requested one if it is good, else the last good one."""
         shown = self._shown
         if shown is None:
-            pose = self._pose or self._asked()
+            pose = self._pose or self._requested()
             stale = pose.status > LAST_GOOD
             shown = self._shown = Shown(self._committed if stale else pose, stale)
         return shown
 
     def _drive(self, shown: Shown) -> tuple[Row, Row, Row]:
-        """u, ud, udd of what is shown."""
+        """Return u, ud, udd of the shown pose."""
         drive = shown.drive
         if drive is None:
-            if self._motion is not None and not shown.stale:  # read before, as a rule
+            if self._motion is not None and not shown.stale:  # mostly it was read before
                 drive = self._motion_drive
             else:
                 drive = self._committed_drive() if shown.stale else self._driven()
             shown.drive = drive
         return drive
 
-    # Parts of the list of variables, each computed when first read
+    # Parts of the list of variables, each computed when it is first read
 
     def _read_inputs(self) -> Row:
         return tuple(self._inputs)
@@ -236,11 +235,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return shown.accelerations
 
     def _read_motion(self) -> Row:
-        """Values, rates and accelerations in one row: what they share is computed once."""
+        """Return values, rates and accelerations in one row: common subexpressions are computed once."""
         row = self._motion
         if row is None:
-            pose, shown = self._pose or self._asked(), self._shown
-            if shown is None and pose.status <= LAST_GOOD:  # read first and alone, as a rule
+            pose, shown = self._pose or self._requested(), self._shown
+            if shown is None and pose.status <= LAST_GOOD:  # mostly it is read first and alone
                 drive = self._motion_drive = self._driven()
                 row = self._solver.motion(pose, drive[1], drive[2])
             else:
@@ -254,10 +253,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return row
 
     def _read_residual(self) -> Row:
-        return (self._asked().residual,)
+        return (self._requested().residual,)
 
     def _read_margin(self) -> Row:
-        return (self._solver.margin(self._asked()),)  # a stage of its own: it costs more than a pose
+        return (self._solver.margin(self._requested()),)  # not computed with the pose: it takes longer than a pose
 
     def _read_errors(self) -> Row:
         shown = self._look()
@@ -269,7 +268,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return shown.errors
 
     def _errors_of_drive(self) -> tuple[Row, Row]:
-        """How far ud and udd may be off: those estimated from samples, that is; the others are what was asked for."""
+        """Return the errors of ud and udd: those of estimates from samples; inputs have none."""
         speeds, accelerations = errors_of_estimated_rates(self._history, *self._moment())
         wired = self._wired
         return (
@@ -297,11 +296,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return self._parameters
 
     def _read_fixed(self) -> Row:
-        self._asked()  # binds parameters
+        self._requested()  # binds parameters
         return tuple(self._solver.model.FIXED.values())
 
     def _plan_fetch(self, vrs: tuple[int, ...]) -> Fetch:
-        """Work out how a list of Real value references is read, and remember it."""
+        """Return how a list of Real value references is read, and keep it."""
         for vr in vrs:
             if self._references.real(vr)[0] is None:
                 self.log(f"value reference {vr} is not a Real variable of this FMU", Fmi2Status.error)
@@ -337,7 +336,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if "" in self._counted:
                 for vr in (vr for vr, name in zip(vrs, self._counted, strict=True) if not name):
                     self.log(f"value reference {vr} is not an Integer variable of this FMU", Fmi2Status.error)
-            pose = self._pose or self._asked()
+            pose = self._pose or self._requested()
             return [
                 self._rates if name == "rates" else int(getattr(pose, name)) if name else 0 for name in self._counted
             ]
@@ -351,7 +350,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             name = self._references.name(vr)
             try:
                 if name == "solver.ok":
-                    values.append(bool(self._asked().status <= LAST_GOOD))
+                    values.append(bool(self._requested().status <= LAST_GOOD))
                 elif name == "driven_by_time":
                     values.append(self._driven_by_time)
                 else:
@@ -368,14 +367,16 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             known = self._references.name(vr) == "solver.message"
             if not known:
                 self.log(f"value reference {vr} is not a String variable of this FMU", Fmi2Status.error)
-            values.append(self._asked().message if known else "")
+            values.append(self._requested().message if known else "")
         return values
 
     # Set
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         inputs = self._inputs
-        if len(vrs) == 1 and vrs[0] == 1 and not (self._driven_by_time or self._refused):  # the one driver's value
+        if (
+            len(vrs) == 1 and vrs[0] == 1 and not (self._driven_by_time or self._refused)
+        ):  # the value of the only driver
             value = values[0]
             if -LARGEST <= value <= LARGEST:
                 if value != inputs[0]:
@@ -399,12 +400,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
                     self._wired.add(k)
             if self._refused:
                 self._refused.pop(self._references.name(vr), None)
-        if not self._touched:  # from now on the rates are those at the current time, not at the commit
+        if not self._touched:  # from here the rates are those at the current time, not at the commit
             self._touched = True
             self._shown = self._motion = None
 
     def _set_other_real(self, vr: int, value: float) -> None:
-        """Parameters, which are set rarely, and what is refused."""
+        """Set a parameter, which is rare, or refuse a value."""
         part, place = self._references.real(vr)
         kind = "" if part is None else self.layout.parts[part].name
         name = self._references.name(vr)
@@ -478,12 +479,12 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             self._refuse(self._references.name(vr) or f"value reference {vr}", "is not a String that can be set")
 
     def _refuse(self, name: str, why: str) -> None:
-        """A value was not taken: say so now, and let the next doStep be Discard (a setter cannot return Error)."""
+        """Report that a value is refused; the next doStep returns Discard, since a setter cannot return Error."""
         self._refused[name] = f"{name} {why}"
         self.log(self._refused[name], Fmi2Status.error)
 
     def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, *rest: Any, **more: Any) -> None:
-        """Log a text: in FMI 2.0 a message is a format, in which #r1# is replaced by a variable, so double % and #."""
+        """Log a text with % and # doubled: in FMI 2.0 a message is a format, and #r1# stands for a variable."""
         super().log(msg.replace("%", "%%").replace("#", "##"), status, *rest, **more)
 
     def _report_defect(self, error: Exception) -> None:
@@ -505,7 +506,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             self._initialized = self._running = True
             if self._unbound:
                 self._bind()
-            pose = self._asked()
+            pose = self._requested()
             if not pose.good and not isinstance(self._solver, UnsolvableModel):
                 self.log(f"initialization fails: at t = {self._time:g} s: {pose.message}", Fmi2Status.error)
         except Exception as error:  # an exception here would be Fatal for the host
@@ -515,7 +516,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self._running = False
 
     def _bind(self) -> None:
-        """Bind the parameters: their anchor is reached by continuation, or every pose fails and says why."""
+        """Bind the parameters: continuation reaches the anchor, or every pose fails with the reason."""
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.anchor
@@ -540,11 +541,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             if pose.status > LAST_GOOD:
                 return self._discard(pose, current_time)
             if not self._touched or current_time != self._time:
-                self._shown = self._motion = None  # inputs are held, or clocks differ: estimates see another time
+                self._shown = self._motion = None  # the time of the rates changes: inputs are held, or clocks differ
             history = self._history
             if len(history) == KEPT and history[-1][0] < current_time - SAME_TIME * step_size - ROUNDING * abs(
                 current_time
-            ):  # _commit, without what is rare
+            ):  # the frequent case of _commit
                 self._history = (history[1], history[2], history[3], (current_time, pose.u))
                 self._committed = pose
                 self._touched = False
@@ -559,7 +560,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
             return False
 
     def _no_step(self, current_time: float, step_size: float) -> str:
-        """Return why a step is refused, or an empty text."""
+        """Return why a step is invalid, or an empty text."""
         if not self._running:
             return "doStep before the end of initialization, or after terminate"
         if not (math.isfinite(current_time + step_size) and step_size >= 0.0):
@@ -574,7 +575,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         return ""
 
     def _step(self, current_time: float, step_size: float) -> bool:
-        """A step when time drives, which commits the poses at both its ends; or none, when a value was refused."""
+        """Do a step when time drives, from the pose at its start; or discard it after a refused value."""
         if self._inputs != self._input_starts and self._driven_by_time and not self._stray_reported:
             self._warn_of_inputs()
         if self._refused:
@@ -605,7 +606,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self.log(text, Fmi2Status.warning)
 
     def _at_start_of_step(self, current_time: float, step_size: float) -> Pose:
-        """The pose at the communication point when time drives: the committed one unless the host or a set moved it."""
+        """Return the pose at the start of a step when time drives: the committed one, unless it has changed."""
         if self._history and not self._touched and abs(current_time - self._history[-1][0]) <= SAME_TIME * step_size:
             return self._committed
         return self._solver.solve(self._committed, self._law(current_time))
@@ -613,7 +614,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _commit(self, pose: Pose, t: float, step_size: float) -> None:
         history = self._history
         same = t - SAME_TIME * step_size - ROUNDING * abs(t)
-        while history and history[-1][0] >= same:  # the host went back, or stayed
+        while history and history[-1][0] >= same:  # the host repeats a step, or goes back
             history = history[:-1]
         self._history = (*history[1 - KEPT :], (t, pose.u))
         self._committed = pose
@@ -624,7 +625,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
         self.log(f"at t = {t:g} s: {pose.message}", Fmi2Status.discard)
         return False
 
-    # State: everything that a result depends on, as JSON
+    # State: all that results depend on, as JSON
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
@@ -685,7 +686,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        """The state as JSON after its SHA-256."""
+        """Return the state as JSON, after its SHA-256."""
         data = json.dumps(state).encode()
         return sha256(data).digest() + data
 
@@ -693,7 +694,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         data = bytes(state[DIGEST:])
         if len(state) < DIGEST or sha256(data).digest() != state[:DIGEST]:
-            return {}  # refused when it is set: an exception here would be Fatal for the host
+            return {}  # setting it is refused; an exception here would be Fatal for the host
         return json.loads(data)  # type: ignore[no-any-return]  # written by _fmu_state_to_bytes
 
 

@@ -45,7 +45,7 @@ def pendulum(built: Callable[..., Path]) -> Path:
 
 @pytest.fixture
 def start(built: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
-    """`start(name, drive)`: a slave, initialized at time 0 unless told otherwise; freed in the end."""
+    """`start(name, drive)`: a slave, by default initialized at time 0; freed at the end."""
     hosts: list[Host] = []
 
     def get(name: str = "fourbar", drive: Drive = "inputs", *, initialize: bool = True) -> Host:

@@ -1,4 +1,4 @@
-"""The flavour that people get who name none: native where it can be built, and told which."""
+"""The default flavour: native where a compiler is found; the command reports which one and why."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ module = import_module("kinfmu.fmu.build")
 
 @pytest.fixture(autouse=True)
 def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """As outside of the tests, but compiled quickly and in a folder of its own."""
+    """Restore the defaults that other tests change; compile without optimization, into a folder of each test."""
     monkeypatch.setattr(module, "default_flavour", default_flavour)
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "cache"))
     for one in (compiler, import_module("kinfmu.fmu.native.archive")):
@@ -43,18 +43,18 @@ def _is_native(path: Path) -> bool:
         return "sources/model.c" in zipped.namelist()
 
 
-def test_with_a_compiler_it_is_native_and_the_command_tells_for_which_platforms(tmp_path: Path) -> None:
+def test_with_a_compiler_it_is_native_and_the_command_states_the_platforms(tmp_path: Path) -> None:
     assert default_flavour() == "native"
     result = CliRunner().invoke(main, ["build", "fourbar"])
     assert result.exit_code == 0, result.output
-    told = rf"fourbar\.fmu: \d+ kB, native FMU for {host().name}, FMI 2\.0 co-simulation and model exchange, "
-    assert re.match(told, result.stdout)
+    line = rf"fourbar\.fmu: \d+ kB, native FMU for {host().name}, FMI 2\.0 co-simulation and model exchange, "
+    assert re.match(line, result.stdout)
     assert _is_native(tmp_path / "fourbar.fmu")
     assert _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "again.fmu"))
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_it_is_python_and_the_command_tells_why(tmp_path: Path) -> None:
+def test_without_a_compiler_it_is_python_and_the_command_states_why(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["build", "fourbar"])
     assert result.exit_code == 0, result.output
     assert ", python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, " in result.stdout
@@ -67,13 +67,13 @@ def test_without_a_compiler_it_is_python_and_the_command_tells_why(tmp_path: Pat
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_what_only_native_fmus_have_is_refused_without_a_compiler(tmp_path: Path) -> None:
+def test_fmi_3_is_refused_without_a_compiler(tmp_path: Path) -> None:
     assert default_flavour(3) == default_flavour(2, "all") == "native"
     with pytest.raises(CompilerError, match="no C compiler"):
         kinfmu.build(kinfmu.load("fourbar"), tmp_path / "three.fmu", fmi=3)
 
 
-def test_the_python_flavour_stays_a_choice_and_platforms_without_a_name_get_it(
+def test_the_python_flavour_can_be_chosen_and_is_the_default_on_unknown_platforms(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert not _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "py.fmu", flavour="python"))

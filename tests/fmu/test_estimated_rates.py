@@ -1,4 +1,4 @@
-"""With only the angle wired, speed and acceleration are estimated: how fast the error falls with the step."""
+"""Speed and acceleration estimated from the angle: the order of the error in the step."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ coefficients = st.floats(-5.0, 5.0)
 
 
 @given(times, times, coefficients, coefficients, coefficients)
-def test_parabola_is_met_exactly_on_any_grid(h1: float, h2: float, a: float, b: float, c: float) -> None:
+def test_estimates_of_a_parabola_are_exact_on_any_grid(h1: float, h2: float, a: float, b: float, c: float) -> None:
     t = (0.0, h1, h1 + h2)
     u = [a + b * x + c * x * x for x in t]
     (speed,), (acceleration,) = estimated_rates([(t[0], (u[0],)), (t[1], (u[1],))], t[2], (u[2],))
@@ -93,13 +93,13 @@ def test_parabola_is_met_exactly_on_any_grid(h1: float, h2: float, a: float, b: 
     assert acceleration == pytest.approx(2 * c, abs=1e-7)
 
 
-def test_one_sample_gives_rest_two_give_a_slope_and_samples_of_the_future_do_not_count() -> None:
+def test_one_sample_gives_rest_two_give_a_slope_and_later_samples_do_not_count() -> None:
     assert estimated_rates([], 1.0, (3.0,)) == ((0.0,), (0.0,))
     assert estimated_rates([(0.5, (2.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
     assert estimated_rates([(0.5, (2.0,)), (1.0, (9.0,))], 1.0, (3.0,)) == ((2.0,), (0.0,))
 
 
-def _beside_their_estimates(host: Host, h: float, *, wired: tuple[str, ...] = ()) -> list[list[float]]:
+def _errors_and_estimates(host: Host, h: float, *, wired: tuple[str, ...] = ()) -> list[list[float]]:
     """True and estimated errors of qd and qdd at each sample of u = 1 + 0.3 sin 2 t, read before and after a step."""
     rows = []
     for k in range(40):
@@ -116,21 +116,21 @@ def _beside_their_estimates(host: Host, h: float, *, wired: tuple[str, ...] = ()
     return rows
 
 
-def test_error_estimates_hold_what_the_estimated_rates_are_off_by(start: Callable[..., Host]) -> None:
-    rows = _beside_their_estimates(start(), 0.01)
+def test_error_estimates_bound_the_errors_of_estimated_rates(start: Callable[..., Host]) -> None:
+    rows = _errors_and_estimates(start(), 0.01)
     assert [row[2] for row in rows[:4]] == [UNKNOWN_ERROR] * 4  # two samples, before and after their steps
     assert [row[3] for row in rows[:6]] == [UNKNOWN_ERROR] * 6
     assert all(row[2] < 1.0 for row in rows[4:])
     assert all(row[3] < 1.0 for row in rows[6:])
-    good = [(true, told) for row in rows for true, told in zip(row[:2], row[2:], strict=True) if told < UNKNOWN_ERROR]
-    assert sum(true <= told for true, told in good) >= 0.99 * len(good)
-    assert sorted(told / true for true, told in good)[len(good) // 2] < 10.0
+    pairs = [pair for row in rows for pair in zip(row[:2], row[2:], strict=True) if pair[1] < UNKNOWN_ERROR]
+    assert sum(error <= estimate for error, estimate in pairs) >= 0.99 * len(pairs)
+    assert sorted(estimate / error for error, estimate in pairs)[len(pairs) // 2] < 10.0
 
 
-def test_wired_rates_leave_the_errors_of_the_others_alone(start: Callable[..., Host]) -> None:
-    exact = _beside_their_estimates(start(), 0.01, wired=("crank_speed", "crank_acceleration"))
+def test_wired_rates_have_no_error_and_do_not_change_those_of_other_rates(start: Callable[..., Host]) -> None:
+    exact = _errors_and_estimates(start(), 0.01, wired=("crank_speed", "crank_acceleration"))
     assert all(max(row) < 1e-12 for row in exact[2:])  # an acceleration of 0 does not count as wired
-    with_speed = _beside_their_estimates(start(), 0.01, wired=("crank_speed",))
+    with_speed = _errors_and_estimates(start(), 0.01, wired=("crank_speed",))
     assert all(row[2] < 1e-12 for row in with_speed)
     assert all(1e-4 < row[3] < 1.0 for row in with_speed[6:])
 
@@ -140,7 +140,7 @@ def test_errors_of_estimated_rates_are_the_next_term() -> None:
     before = samples[:3]
     (speed,), (acceleration,) = estimated_rates(before, *samples[3])
     (speed_error,), (acceleration_error,) = errors_of_estimated_rates(before, *samples[3])
-    assert speed_error == pytest.approx(2.0 * abs(speed - 48.0))  # twice what a cubic tells
+    assert speed_error == pytest.approx(2.0 * abs(speed - 48.0))  # twice the error of a cubic
     assert acceleration_error == pytest.approx(2.0 * abs(acceleration - 24.0))
     assert errors_of_estimated_rates(samples[1:3], *samples[3])[1] == (math.inf,)
     assert errors_of_estimated_rates(samples[2:3], *samples[3]) == ((math.inf,), (math.inf,))

@@ -1,4 +1,4 @@
-"""Parameters of a mechanism at run time: the same as a file with those numbers, or refused with the row and the gap."""
+"""Parameters of a mechanism at run time: equal to a file with those numbers, or refused with the row and the gap."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_other_lengths_agree_with_the_oracle() -> None:
     np.testing.assert_allclose(run["rocker.alpha"], exact.qdd[:, 2].astype(float), rtol=0, atol=1e-11)
 
 
-def test_parameters_take_units_and_law_constants_stand_beside_them() -> None:
+def test_parameters_take_units_and_law_constants_are_set_the_same_way() -> None:
     run = kinfmu.solve(linkage(), [0.0, 1.0], parameters={"coupler": "3100 mm", "crank.speed": 2.0})
     assert run["crank.phi"].tolist() == [1.0, 3.0]
     np.testing.assert_allclose(
@@ -147,23 +147,23 @@ def geared() -> Mechanism:
     )
 
 
-def test_numbers_that_a_file_would_be_refused_for_are_refused_at_run_time(tmp_path: Path) -> None:
+def test_numbers_that_are_invalid_in_a_file_are_refused_at_run_time(tmp_path: Path) -> None:
     mechanism = geared()
     fmu = kinfmu.build(mechanism, tmp_path)
-    for name, value, told in (
-        ("rod", -3.5, "[joints.rod] length = -3.5 must be positive"),  # d.d = L^2 would not mind
+    for name, value, reason in (
+        ("rod", -3.5, "[joints.rod] length = -3.5 must be positive"),  # d.d = L^2 also holds for -L
         ("teeth", 0.0, "[joints.mesh] ratio = 0 must be other than 0"),
         ("pace", -2.0, "[drivers.crank] duration = -0.5 must be positive"),
         ("pace", 0.0, "what follows from them is no finite number"),
     ):
         with pytest.raises(FmuError) as refusal:
             kinfmu.simulate(fmu, parameters={name: value})
-        assert str(refusal.value) == f"parameters {name} = {value:g}: {told}"
+        assert str(refusal.value) == f"parameters {name} = {value:g}: {reason}"
         with pytest.raises(MechanismError):
             kinfmu.solve(mechanism, parameters={name: value})
 
 
-def test_lengths_of_zero_that_leave_rows_dependent_are_told(tmp_path: Path) -> None:
+def test_lengths_of_zero_that_make_rows_dependent_are_refused(tmp_path: Path) -> None:
     lengths = {"ground": 2.0, "crank": 1.0, "coupler": 2.0, "rocker": 1.0}
     parallelogram = linkage(lengths)
     third = Body("third", {"G": (0, 0), "T": ("crank", 0)}, (1, 0, 1.0))
@@ -189,7 +189,7 @@ def test_lengths_of_zero_that_leave_rows_dependent_are_told(tmp_path: Path) -> N
         kinfmu.solve(changed, parameters={"crank": 0.0})
 
 
-def test_a_name_that_is_no_parameter_is_told(fmu: Path) -> None:
+def test_a_name_that_is_not_a_parameter_is_refused(fmu: Path) -> None:
     with pytest.raises(KinfmuError, match="'copler' is not known; did you mean 'coupler'"):
         kinfmu.solve(linkage(), parameters={"copler": 3.0})
     with pytest.raises(KinfmuError, match="'copler' is no parameter of this FMU; did you mean 'coupler'"):
@@ -273,11 +273,11 @@ def test_a_cam_whose_lift_would_not_close_after_a_turn_is_refused_at_run_time(tm
     np.testing.assert_allclose(
         kinfmu.simulate(fmu, parameters=both).values, kinfmu.solve(mechanism, parameters=both).values, atol=1e-12
     )
-    for settings, told in (
+    for settings, reason in (
         ({"rise": both["rise"]}, "durations in all over a turn, less 1, = 0.1111111111"),
         ({"drop": 9.0}, "rises in all over their size = 0.0743"),
     ):
-        with pytest.raises(FmuError, match=rf"\[joints.lift\] law: {re.escape(told)}.* must be 0$"):
+        with pytest.raises(FmuError, match=rf"\[joints.lift\] law: {re.escape(reason)}.* must be 0$"):
             kinfmu.simulate(fmu, parameters=settings)
         with pytest.raises(MechanismError, match="add up to"):
             kinfmu.solve(mechanism, parameters=settings)

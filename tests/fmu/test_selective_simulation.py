@@ -84,7 +84,7 @@ def test_wrong_channels_and_rates_are_told(fourbar: Path) -> None:
 
 
 class Listing:
-    """A sink that lists its calls, and fails when it gets so many pieces."""
+    """A sink that lists its calls, and fails after `most` of them."""
 
     def __init__(self, most: int = 1000) -> None:
         self.calls: list[str] = []
@@ -98,7 +98,7 @@ class Listing:
         self.calls.append("add")
         self.rows += len(run)
         if len(self.calls) > self.most:
-            raise OSError("no more room")
+            raise OSError("disk full")
 
     def end(self, run: Run, reason: str) -> None:
         self.calls.append(f"end {len(run)} {reason}")
@@ -116,12 +116,12 @@ def test_a_sink_gets_every_sample_once_in_pieces_of_a_mebibyte(fourbar: Path) ->
 
 def test_a_sink_that_fails_ends_the_run_and_is_not_called_again(fourbar: Path) -> None:
     sink = Listing(most=2)
-    with pytest.raises(OSError, match="no more room"):
+    with pytest.raises(OSError, match="disk full"):
         simulate(fourbar, step=0.03, sink=sink)
     assert sink.calls == ["begin 0", "add", "add"]
 
 
-def test_a_sink_is_told_why_a_run_ends(fourbar: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sink_gets_the_reason_why_a_run_ends(fourbar: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object) -> bool:
         raise RuntimeError("the FMU is gone")
 

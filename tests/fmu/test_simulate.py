@@ -1,4 +1,4 @@
-"""`simulate`: a Run from nothing but the FMU, and what happens where it cannot go on."""
+"""`simulate`: a Run from an FMU alone, and runs that end early."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kinfmu.run import Run
 from kinfmu.solver.python.status import Status
 
 
-def test_fourbar_meets_its_closed_form_at_every_second_both_ends_included(fourbar: Path) -> None:
+def test_fourbar_equals_its_closed_form_at_every_sample(fourbar: Path) -> None:
     run = simulate(fourbar)
     phi, w = np.radians(run.t), np.radians(1.0)
     c, s, o = np.cos(phi), np.sin(phi), 0.0 * phi
@@ -47,17 +47,17 @@ def test_run_carries_the_mechanism_fixed_coordinates_driver_values_and_who_made_
     assert run["A.x"] == pytest.approx(2 + np.cos(run["crank.phi"]))
 
 
-def test_last_sample_is_at_stop_even_if_no_step_leads_there(fourbar: Path) -> None:
+def test_last_sample_is_at_stop_even_if_the_range_is_no_multiple_of_the_step(fourbar: Path) -> None:
     assert list(simulate(fourbar, stop=1.0, step=0.3).t) == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.0])
     assert simulate(fourbar, stop=0.7, step=0.1).t[-1] == 0.7
     assert len(simulate(fourbar, stop=0.7, step=0.1)) == 8
     assert len(simulate(fourbar, start=3.0, stop=3.0)) == 1
 
 
-def test_progress_is_told_after_every_sample(fourbar: Path) -> None:
-    told: list[tuple[int, int]] = []
-    simulate(fourbar, stop=3.0, progress=lambda done, total: told.append((done, total)))
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+def test_progress_is_called_after_every_sample(fourbar: Path) -> None:
+    calls: list[tuple[int, int]] = []
+    simulate(fourbar, stop=3.0, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_law_past_the_limit_ends_the_run_with_a_sample_without_numbers_and_an_event(pendulum: Path) -> None:
@@ -76,7 +76,7 @@ def test_law_past_the_limit_ends_the_run_with_a_sample_without_numbers_and_an_ev
 
 
 @pytest.mark.parametrize("stop", [0.7, 1.0])  # the sample that fails is the last one, or not
-def test_inputs_past_the_limit_end_the_run_at_the_sample_that_asked_for_it(pendulum: Path, stop: float) -> None:
+def test_inputs_past_the_limit_end_the_run_at_the_first_sample_beyond_it(pendulum: Path, stop: float) -> None:
     run = simulate(pendulum, stop=stop, step=0.1, inputs={"time": [0.0, 1.0], "crank_angle": [5.0, 7.0]})
     assert run.t[-1] == pytest.approx(0.7)
     assert run.status[-1] == Status.OUTSIDE
@@ -86,7 +86,7 @@ def test_inputs_past_the_limit_end_the_run_at_the_sample_that_asked_for_it(pendu
     assert "360 deg" in event.text
 
 
-def test_csv_inputs_drive_rows_are_met_exactly_and_what_lies_between_is_linear(fourbar: Path, tmp_path: Path) -> None:
+def test_csv_inputs_are_exact_at_rows_and_linear_between_them(fourbar: Path, tmp_path: Path) -> None:
     table = tmp_path / "crank.csv"
     table.write_text("time, crank_angle, crank_speed\n0, 0.1, 2\n\n1, 0.7, 3\n3, 1.5, 4\n")
     run = simulate(fourbar, stop=3.0, step=0.5, inputs=table)
@@ -109,18 +109,21 @@ def test_columns_of_a_csv_may_name_their_units(fourbar: Path, tmp_path: Path, de
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time,crank_angel\n0,1\n", r"'crank_angel' is no input of this FMU; did you mean 'crank_angle'\?"),
+        ("time,crank_angel\n0,1\n", r"'crank_angel' is not an input of this FMU; did you mean 'crank_angle'\?"),
         ("crank_angle\n0\n", "the column 'time' is missing"),
         (
             "time,crank_angle (deg)\n0,1\n",
-            r"'crank_angle \(deg\)' is no input .*; did you mean 'crank_angle \[deg\]'\?",
+            r"'crank_angle \(deg\)' is not an input .*; did you mean 'crank_angle \[deg\]'\?",
         ),
-        ("time crank_angle\n0 1\n", "is no input of this FMU; columns are parted by commas, semicolons or tabs"),
-        ("0,1\n1,2\n", "'0' is no input of this FMU; the first line must name the columns; columns: time, crank_angle"),
-        ("tine,crank_angle\n0,1\n", r"'tine' is no input of this FMU; did you mean 'time'\?"),
+        ("time crank_angle\n0 1\n", "is not an input of this FMU; separate columns by commas, semicolons or tabs"),
+        (
+            "0,1\n1,2\n",
+            "'0' is not an input of this FMU; the first line must name the columns; columns: time, crank_angle",
+        ),
+        ("tine,crank_angle\n0,1\n", r"'tine' is not an input of this FMU; did you mean 'time'\?"),
         ("time;crank_angle\n0;1,5\n", "line 2: crank_angle = '1,5' is not a number; decimals are written with a point"),
-        ("time\n0\n", "no input beside 'time'; inputs: crank_angle, crank_speed, crank_acceleration"),
-        ("time,time,crank_angle\n0,0,0\n", "the column 'time' is there twice"),
+        ("time\n0\n", "the only column is 'time'; inputs: crank_angle, crank_speed, crank_acceleration"),
+        ("time,time,crank_angle\n0,0,0\n", "column 'time' occurs twice"),
         ("time,crank_angle\n0,1\n1,1\n1,2\n", "line 4: time = 1 s does not lie after 1 s; time must increase"),
         ("time,crank_angle\n0,1\n5,nan\n", "line 3: crank_angle = nan is not a finite number"),
         ("time,crank_angle\n0,1\n5,x\n", "line 3: crank_angle = 'x' is not a number"),
@@ -182,7 +185,7 @@ def test_faults_of_a_call_are_named(fourbar: Path, arguments: dict[str, object],
         simulate(fourbar, **arguments)  # type: ignore[arg-type]
 
 
-def test_what_is_no_fmu_is_refused(tmp_path: Path) -> None:
+def test_files_that_are_not_fmus_are_refused(tmp_path: Path) -> None:
     text, empty = tmp_path / "text.fmu", tmp_path / "empty.fmu"
     text.write_text("no archive")
     with zipfile.ZipFile(empty, "w") as zipped:
@@ -198,7 +201,7 @@ def test_what_is_no_fmu_is_refused(tmp_path: Path) -> None:
 def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     pendulum: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "ä +% b"  # pythonfmu's binary knows no quoted sign but a blank
+    folder = tmp_path / "ä +% b"  # pythonfmu's binary unquotes blanks only
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     before = list(sys.path)
@@ -210,7 +213,7 @@ def test_nothing_is_left_in_temporary_folder_or_path_or_terminal(
     assert capfd.readouterr() == ("", "")
 
 
-def test_fmu_driven_by_inputs_stays_at_its_start_without_any_and_says_so(built: Callable[..., Path]) -> None:
+def test_fmu_driven_by_inputs_stays_at_its_start_without_inputs_and_warns(built: Callable[..., Path]) -> None:
     run = simulate(built("double_pendulum", "inputs"), stop=0.3, step=0.1)
     assert run["upper.phi"] == pytest.approx(np.full(4, np.radians(300.0)))
     assert run["upper.omega"] == pytest.approx(np.zeros(4))
@@ -230,7 +233,7 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_the_run_and_keeps_what_was_reached(fourbar: Path) -> None:
+def test_ctrl_c_ends_the_run_and_keeps_its_samples(fourbar: Path) -> None:
     def press(done: int, _count: int) -> None:
         if done == 20:
             signal.raise_signal(signal.SIGINT)
@@ -260,7 +263,7 @@ class Watching:
         self.calls.append("end")
 
 
-def test_ctrl_c_before_the_first_sample_is_raised_and_leaves_the_sink_alone(
+def test_ctrl_c_before_the_first_sample_is_raised_and_the_sink_is_not_called(
     fourbar: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Samples, "read_fixed", lambda *_: signal.raise_signal(signal.SIGINT))

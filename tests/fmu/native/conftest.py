@@ -19,7 +19,7 @@ Start = Callable[..., Host]
 
 @pytest.fixture(scope="package", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compiled libraries stay inside the tests, and are compiled quickly."""
+    """Compile libraries without optimization, into a cache of the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
         for module in (compiler, import_module("kinfmu.fmu.native.archive")):
@@ -52,7 +52,7 @@ def built_native(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 @pytest.fixture
 def start(built_native: Build, fmi: int, tmp_path: Path) -> Iterator[Start]:
-    """`start(name, drive)`: an instance, initialized at time 0 unless told otherwise; freed in the end."""
+    """`start(name, drive)`: an instance, by default initialized at time 0; freed at the end."""
     hosts: list[Host] = []
 
     def get(

@@ -17,14 +17,14 @@ from kinfmu.fmu.slaves import fmi2_callbacks
 OK, WARNING, DISCARD, ERROR = range(4)
 TERMINATED, LAST_SUCCESSFUL_TIME = 3, 2
 CLASSES = {(2, False): FMU2Slave, (2, True): FMU2Model, (3, False): FMU3Slave, (3, True): FMU3Model}
-WORDS = {  # what fmpy calls things in each version
+WORDS = {  # fmpy's names of types in each version
     2: {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer"},
     3: {"Real": "Float64", "Integer": "Int32", "Enumeration": "Int64"},
 }
 
 
 class Host:
-    """One instance of a native FMU. messages: what it told, as (status, text)."""
+    """One instance of a native FMU. messages: what it logged, as (status, text)."""
 
     def __init__(self, path: Path, folder: Path, *, model_exchange: bool = False) -> None:
         if not folder.exists():

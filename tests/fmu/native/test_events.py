@@ -35,7 +35,7 @@ def named(name: str, *laws: Law) -> Mechanism:
 
 
 def next_event(host: Host) -> float | None:
-    """What the update of discrete states tells of the next event."""
+    """Return the time of the next event, from the update of discrete states."""
     if host.fmi == 2:
         *_, defined, time = host.fmu.newDiscreteStates()
     else:
@@ -44,7 +44,7 @@ def next_event(host: Host) -> float | None:
 
 
 def at_event(host: Host, time: float) -> float | None:
-    """Go to an event and through it; the next one."""
+    """Handle the event at a time; return the time of the next one."""
     host.fmu.setTime(time)
     assert answer(host.fmu.completedIntegratorStep) == OK
     host.fmu.enterEventMode()

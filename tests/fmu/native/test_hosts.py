@@ -229,7 +229,7 @@ def test_what_a_host_does_at_a_limit_is_what_the_page_says(
     if host == "libcosimpy":  # it stops, and shows the last good sample
         assert not rows[past, 0].any()
         assert rows[past, 1].all()
-    else:  # it goes on: only solver.ok tells that the numbers are old
+    else:  # it continues: only solver.ok shows that the numbers are old
         assert rows[past, 0].all()
         assert not rows[past, 1].any()
     np.testing.assert_allclose(rows[past, 2], values[9], rtol=0, atol=1e-12)

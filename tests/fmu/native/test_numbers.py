@@ -90,5 +90,5 @@ def test_fmpy_ends_past_a_limit_and_its_recorder_holds_the_rows(
     assert names["kept"]
     times = names["rows"]["time"].tolist()  # an event, such as a new status at the limit, is recorded twice
     assert times == [0.0, 0.5, 1.0, 1.5, 2.0, *([2.0] if kind == "ModelExchange" else [])]
-    told = "at t = 2.5 s: crank = 6.544985 rad (375 deg) cannot be reached: the limit is crank = 6.2831853072 rad"
-    assert told in capfd.readouterr().out
+    message = "at t = 2.5 s: crank = 6.544985 rad (375 deg) cannot be reached: the limit is crank = 6.2831853072 rad"
+    assert message in capfd.readouterr().out
