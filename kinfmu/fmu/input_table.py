@@ -238,7 +238,7 @@ def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], place: Call
 
 
 def input_notes(interface: Interface, table: InputTable, start: float | None, stop: float | None) -> Iterator[Event]:
-    """Events about a table of inputs, for a run whose ends are `start` and `stop` [s] if the caller said any."""
+    """Yield events about probable mistakes in a table of inputs; start and stop: of the run [s], if given."""
     yield from _span(interface.experiment, table, start, stop)
     for variable in interface.part("inputs")[::3]:
         if variable.unit == "rad" and variable.name in table.names:
@@ -246,7 +246,7 @@ def input_notes(interface: Interface, table: InputTable, start: float | None, st
 
 
 def undriven(interface: Interface, table: InputTable | None, t: float) -> Iterator[Event]:
-    """A warning at time t [s] for a run by inputs if those of some drivers are not given: they stay as they start."""
+    """Yield a warning at time t [s] if inputs of some drivers are not given: these keep their start values."""
     given = () if table is None else table.names
     still = [variable for variable in interface.part("inputs")[::3] if variable.name not in given]
     if still:
@@ -257,18 +257,18 @@ def undriven(interface: Interface, table: InputTable | None, t: float) -> Iterat
 
 
 def _span(experiment: RunSettings, table: InputTable, start: float | None, stop: float | None) -> Iterator[Event]:
-    """A note if the run has ends of the table that are not those of the model."""
+    """Yield a note if start or stop of the run are those of the table and differ from those of the model."""
     if (start is None and table.start != experiment.start) or (stop is None and table.stop != experiment.stop):
         first, last = table.start if start is None else start, table.stop if stop is None else stop
         rows = "as" if start is None and stop is None else "one end as"
-        alone = "; a second row would hold the values until then" if table.start == table.stop else ""
+        alone = "; add a second row to hold the values until a later time" if table.start == table.stop else ""
         yield Event(
             first, "info", f"the run goes from {first:g} to {last:g} s, {rows} the rows of {table.source}{alone}"
         )
 
 
 def _unlikely(name: str, table: InputTable) -> Iterator[Event]:
-    """A note of an angle without a unit that looks like degrees, else a warning of jumps by more than half a turn."""
+    """Yield a note if an angle without a unit looks like degrees, else a warning if it jumps by over half a turn."""
     angles = table.values[:, table.names.index(name)]
     low, high = float(angles.min()), float(angles.max())
     long = np.flatnonzero(is_long(np.diff(angles)))
@@ -277,7 +277,7 @@ def _unlikely(name: str, table: InputTable) -> Iterator[Event]:
             table.start,
             "info",
             f"{table.source}: {name} has no unit, so it is in rad: {low:g} to {high:g} rad, {in_turns(high - low)}; "
-            f"'{name} [deg]' in the header says degrees",
+            f"for degrees write '{name} [deg]' in the header",
         )
     elif len(long):
         k = int(long[0])
@@ -287,5 +287,5 @@ def _unlikely(name: str, table: InputTable) -> Iterator[Event]:
             float(table.t[k + 1]),
             "warning",
             f"{table.source}: {name} jumps by {jump:.6g} deg from {table.t[k]:g} to {table.t[k + 1]:g} s{others}; "
-            "followed as given; --wrap follows wrapped angles, from 360 to 0 deg, say, the short way",
+            "used as given; --wrap unwraps angles that jump, such as from 360 to 0 deg",
         )

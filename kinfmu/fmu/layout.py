@@ -1,4 +1,4 @@
-"""What a slave must know of its interface, and how lists of it are read. Travels inside the FMU: stdlib only."""
+"""The interface as a slave needs it, and how its lists are read. The FMU has a copy: standard library only."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ UNKNOWN_ERROR = 1e30  # of solver.error_q, _qd, _qdd: an error without an estima
 
 
 class PartLayout(NamedTuple):
-    """Variables that are computed together: their names, and start values where they have some."""
+    """Variables that are computed together: their names, and start values if they have some."""
 
     name: str
     variables: tuple[str, ...]
@@ -19,7 +19,7 @@ class PartLayout(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """What a slave must know of its interface: variables in order of value references, and the content token."""
+    """The interface of a slave: variables in order of value references, and the token of the FMU."""
 
     token: str
     start_time: float  # [s]
@@ -27,7 +27,7 @@ class Layout(NamedTuple):
 
 
 class Places:
-    """Where the variable of a value reference is found: value references count the variables of a layout from 1."""
+    """Part and place of the variable of a value reference; value references count the variables from 1."""
 
     _NOT_REAL = ("counts", "ok", "drive", "rate_source", "message")
 
@@ -36,7 +36,7 @@ class Places:
         self.layout = layout
 
     def real(self, vr: int) -> tuple[int, int] | tuple[None, int]:
-        """Part and place of a Real variable, (None, 0) if the value reference is none of those."""
+        """Return part and place of a Real variable, or (None, 0) if the value reference is of no Real variable."""
         if 1 <= vr <= len(self._places):
             part, place = self._places[vr - 1]
             if self.layout.parts[part].name not in self._NOT_REAL:
@@ -44,7 +44,7 @@ class Places:
         return None, 0
 
     def name(self, vr: int) -> str:
-        """Name of the variable, empty if there is none."""
+        """Return the name of the variable, or an empty text."""
         if 1 <= vr <= len(self._places):
             part, place = self._places[vr - 1]
             return self.layout.parts[part].variables[place]
@@ -52,14 +52,14 @@ class Places:
 
 
 Row = tuple[float, ...]
-Reader = Callable[[], Row]  # reads a part of the list of variables
+Reader = Callable[[], Row]  # reads the variables of a part
 
 NOT_A_NUMBER = math.nan
-MOTION = "values", "rates", "accelerations"  # parts that one reader, "motion", reads in one go
+MOTION = "values", "rates", "accelerations"  # parts that the reader "motion" reads together
 
 
 class Fetch(NamedTuple):
-    """How to read one list of Real variables: read one part and the others into a row, pick these places."""
+    """How to read a list of Real variables: read the parts into a row, then pick places of the row."""
 
     read: Reader
     others: tuple[Reader, ...]
@@ -67,9 +67,13 @@ class Fetch(NamedTuple):
 
 
 def plan_fetch(references: Places, vrs: Sequence[int], reader: Callable[[str], Reader]) -> Fetch:
-    """How these value references are read; those that are no Real variable give NaN.
+    """Return how to read a list of value references; those of no Real variable give NaN.
 
-    reader: gives what reads a part, or "motion", by its name.
+    Args:
+        references: Part and place by value reference.
+        vrs: Value references.
+        reader: Returns the function that reads a part, by its name, or "motion".
+
     """
     layout = references.layout
     places = [references.real(vr) for vr in vrs]
@@ -87,7 +91,7 @@ def plan_fetch(references: Places, vrs: Sequence[int], reader: Callable[[str], R
 
 
 def _joined(names: list[str]) -> list[str]:
-    """The parts' names, with "motion" in the place of those that it reads in one go."""
+    """Return the parts' names, with "motion" in place of those that it reads together."""
     count = len(MOTION)
     for k in range(len(names)):
         if tuple(names[k : k + count]) == MOTION:
@@ -100,7 +104,7 @@ def _no_number() -> Row:
 
 
 def _picker(indices: list[int], width: int) -> Callable[[Row], Sequence[float]] | None:
-    """Pick these places of a row of that width: a slice if they are neighbours, None if they are all."""
+    """Return what picks places of a row of that width: a slice for neighbours, None for the whole row."""
     if indices == list(range(width)):
         return None
     if not indices:

@@ -309,10 +309,10 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasatt
 
 
 class Interruption:
-    """Notes Ctrl-C, SIGTERM and SIGHUP in a `with` block; true once one came.
+    """Record of Ctrl-C, SIGTERM and SIGHUP during a `with` block; true once one came.
 
     A KeyboardInterrupt inside an FMU's Python would reach the host as fmi2Fatal. Ignored signals stay ignored. Outside
-    the main thread, where Python does not deliver signals, nothing is changed.
+    the main thread, where Python does not deliver signals, it has no effect.
     """
 
     def __init__(self) -> None:
@@ -342,7 +342,7 @@ class Interruption:
         self.came.append(number)
 
     def deliver(self) -> None:
-        """Do now what SIGTERM or SIGHUP do, if one came: end the process, as a rule."""
+        """Raise SIGTERM or SIGHUP again, if one came: by default it ends the process."""
         for number in self.came:
             if number in ENDING:
                 signal.raise_signal(number)

@@ -699,9 +699,9 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no t
 
 
 def hold(namespace: dict[str, Any]) -> None:
-    """Take a reference to a module's namespace for good.
+    """Take a permanent reference to a module's namespace.
 
-    pythonfmu 0.7 runs the slave's module once an instance and each time releases a reference to its namespace that it
-    does not own: without this, the third instance of a process finds the namespace freed and crashes.
+    pythonfmu 0.7 runs the slave's module once per instance, and each time releases a reference to its namespace that it
+    does not own: without this, the third instance of a process would find the namespace freed and crash.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))

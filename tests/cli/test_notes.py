@@ -42,7 +42,8 @@ def test_a_run_takes_its_ends_from_the_rows_of_its_input(notes: Callable[..., li
     assert notes("simulate", "fourbar", "--input", "in.csv", "--start", 3, "--stop", 4) == []
     (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n2,30\n")
     assert notes("simulate", "fourbar", "--input", "in.csv") == [
-        "note: the run goes from 2 to 2 s, as the rows of in.csv; a second row would hold the values until then"
+        "note: the run goes from 2 to 2 s, as the rows of in.csv; "
+        "add a second row to hold the values until a later time"
     ]
 
 
@@ -86,8 +87,8 @@ def test_an_input_that_jumps_by_a_turn_is_warned_of_unless_wrap_follows_it(
     (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n0,340\n10,350\n20,0\n30,10\n")
     call = ("simulate", "fourbar", "--input", "in.csv", "--stop", 30)
     assert notes(*call) == [
-        "warning: in.csv: crank_angle jumps by -350 deg from 10 to 20 s; followed as given; --wrap follows wrapped "
-        "angles, from 360 to 0 deg, say, the short way"
+        "warning: in.csv: crank_angle jumps by -350 deg from 10 to 20 s; used as given; --wrap unwraps "
+        "angles that jump, such as from 360 to 0 deg"
     ]
     assert notes(*call, "--wrap") == []
     speed = log.read(tmp_path / "logs" / "fourbar.mcap")["crank.omega"]
@@ -98,7 +99,7 @@ def test_every_jump_is_counted_and_half_a_turn_is_none(notes: Callable[..., list
     (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n0,0\n60,180\n120,361\n180,0\n")
     (told,) = notes("simulate", "fourbar", "--input", "in.csv")
     assert told.startswith(
-        "warning: in.csv: crank_angle jumps by 181 deg from 60 to 120 s, and 1 more such jump; followed"
+        "warning: in.csv: crank_angle jumps by 181 deg from 60 to 120 s, and 1 more such jump; used as given"
     )
 
 
@@ -107,8 +108,8 @@ def test_angles_of_an_input_without_unit_that_look_like_degrees_are_told(
 ) -> None:
     (tmp_path / "in.csv").write_text("time,crank_angle\n0,0\n180,360\n")
     assert notes("simulate", "fourbar", "--input", "in.csv") == [
-        "note: in.csv: crank_angle has no unit, so it is in rad: 0 to 360 rad, 57.3 turns; 'crank_angle [deg]' in the "
-        "header says degrees"
+        "note: in.csv: crank_angle has no unit, so it is in rad: 0 to 360 rad, 57.3 turns; "
+        "for degrees write 'crank_angle [deg]' in the header"
     ]
 
 
