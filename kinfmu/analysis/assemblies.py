@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kinfmu.analysis.written import degrees, written
 from kinfmu.codegen.python import load_model
-from kinfmu.equations.assembly import SINGULAR, Assembled, assemble, start_targets
+from kinfmu.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
 from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, listed
@@ -206,7 +206,7 @@ def _undecided(plan: SolvePlan, poses: Sequence[FloatArray], *, is_at_start: boo
 
 def _is_at_start(mechanism: Mechanism, plan: SolvePlan) -> bool:
     """True if a plan's drivers stand where the start poses of the mechanism put them, or its laws."""
-    targets = start_targets(System(localized(mechanism)[0]))
+    targets = start_values(System(localized(mechanism)[0])).u
     return bool(np.abs(plan.anchor.u - targets).max(initial=0.0) <= _SAME)
 
 
@@ -268,9 +268,10 @@ def _leads_to(mechanism: Mechanism, plan: SolvePlan, start: Mapping[str, Start],
     bodies = [replace(body, start=start.get(body.name, body.start)) for body in mechanism.bodies]
     system = System(localized(replace(mechanism, bodies=tuple(bodies)))[0])
     try:
-        if assemble(system) is None:
+        assembly = find_assembly(system)
+        if assembly.pose is None:
             return False
-        assembled = find_anchor(system)
+        assembled = find_anchor(system, assembly)
     except KinfmuError:
         return False
     return _distance(plan, _moved_to(system, assembled, plan.anchor.u), pose) <= _SAME
@@ -329,7 +330,7 @@ def _thrown_together(mechanism: Mechanism) -> FloatArray | None:
     system = System(localized(mechanism)[0])
     if len(system.coordinates) > _LARGE:
         return None
-    u, rng = start_targets(system), np.random.default_rng(_SEED)
+    u, rng = start_values(system).u, np.random.default_rng(_SEED)
     ground = next(body for body in system.mechanism.bodies if body.is_ground)
     middle = np.mean([*ground.points.values()] or [Point(0.0, 0.0)], axis=0)
     centre = np.tile([*middle, 0.0], len(system.coordinates) // 3)

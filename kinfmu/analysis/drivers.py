@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinfmu.drivers import AngleDriver, CoordinateDriver, Driver, RelativeAngleDriver, SlideDriver
-from kinfmu.equations.assembly import rough_start
 from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy
@@ -73,7 +72,7 @@ def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None
     """
     if len(system.coordinates) > _LARGE:
         return None
-    poses = motion_samples(Part(system, redundancy.kept), rough_start(system), _SAMPLES)
+    poses = motion_samples(Part(system, redundancy.kept), redundancy.assembly.start.q, _SAMPLES)
     if not poses:
         return None
     gradients = [system.scaled_jacobian(pose) for pose in poses]

@@ -11,8 +11,7 @@ import numpy as np
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.written import written
 from kinfmu.drivers import AngleDriver, DistanceDriver
-from kinfmu.equations.assembly import start_values
-from kinfmu.equations.start_poses import start_from_poses
+from kinfmu.equations.start_poses import StartValues, start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam
@@ -99,9 +98,8 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
             yield f"[run] at t = {event.t:.6g} s: {event.text}"
 
 
-def start_notes(system: System) -> Iterator[str]:
+def start_notes(system: System, values: StartValues) -> Iterator[str]:
     """Yield one line if the mechanism was assembled at the start of the laws in place of the start poses' values."""
-    values = start_values(system)
     if not values.is_moved:
         return
     given, unit = start_from_poses(system).u, system.mechanism.length_unit

@@ -134,7 +134,7 @@ def check(mechanism: Mechanism) -> Report:
         loops = find_named(mechanism, redundancy, ())
         problem = better_told(problem, redundancy, advice)
         return Report(mechanism, redundancy, problem, None, (), loops, advice, tuple(notes))
-    notes += start_notes(system)
+    notes += start_notes(system, redundancy.assembly.start)
     ways = []
     for number, driver in enumerate(mechanism.drivers):
         try:

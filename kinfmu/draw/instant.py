@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.draw.motion import told_value
 from kinfmu.draw.view import clearest, is_clear
-from kinfmu.equations.assembly import assemble, rough_start, start_targets
+from kinfmu.equations.assembly import find_assembly
 from kinfmu.equations.closing import CLOSED, close
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import System
@@ -113,11 +113,11 @@ def _standing(mechanism: Mechanism, problem: KinfmuError) -> Instant:
     """The start pose alone, of all rows or, where drivers contradict, of the joints."""
     local, origin = localized(mechanism)
     system = System(local)
-    assembled = assemble(system)
+    start, assembled = find_assembly(system)
     if assembled is not None:
         q = assembled.q
     else:
-        q, gap = close(Part(system, range(system.joint_row_count)), rough_start(system), start_targets(system))
+        q, gap = close(Part(system, range(system.joint_row_count)), start.q, start.u)
         if gap > CLOSED:
             raise problem
     return Instant(mechanism, _by_body(mechanism, q, origin), {driver.name: 1.0 for driver in mechanism.drivers})

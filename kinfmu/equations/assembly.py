@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -32,47 +31,71 @@ _SPREAD = 0.3  # [rad, sizes]; how far they lie from the start pose
 _NEARLY = 0.01  # residual of a pose that may close beside the start
 
 
-def rough_start(system: System) -> FloatArray:
-    """Return the rough pose from which the mechanism is assembled, (n,): what the file leaves out is 0."""
-    return start_values(system).q
+class Assembled(NamedTuple):
+    """A closed pose: coordinates q (n,), driver values u (d,), and its margin.
 
-
-def start_targets(system: System) -> FloatArray:
-    """Return the driver values at which the mechanism is assembled, (d,)."""
-    return start_values(system).u
-
-
-def start_values(system: System) -> StartValues:
-    """Return the rough pose and the driver values at which a mechanism is assembled.
-
-    The driver's value decides. Driven angles of the start poses are moved by whole turns to the start of the laws. From
-    there the pose is followed to the start of the laws: if it does not close, or a limit lies between, the mechanism is
-    assembled at the start of the laws.
+    margin: the smallest over the blocks of smallest over largest singular value of the scaled Jacobian; 0 at a singular
+    pose.
     """
-    given = start_from_poses(system)
-    return _decided(system)[0] if given.is_followed else given
+
+    q: FloatArray
+    u: FloatArray
+    margin: float
 
 
-@lru_cache(maxsize=4)
-def _decided(system: System) -> tuple[StartValues, Assembled | None]:
-    """Return the start values of a mechanism whose start poses and laws give different ones, and the assembled pose."""
+class Assembly(NamedTuple):
+    """Where a mechanism starts: the rough pose and driver values, and the closed pose found from them (None: none)."""
+
+    start: StartValues
+    pose: Assembled | None
+
+
+def find_assembly(system: System) -> Assembly:
+    """Return the start values of a mechanism and its assembled pose.
+
+    The start poses' driver values are tried first (driven angles moved by whole turns to the start of the laws). From
+    there the pose is followed to the start of the laws. If the pose does not close, or a limit lies between, the
+    mechanism is assembled at the start of the laws.
+
+    Args:
+        system: The equations of the mechanism.
+
+    Returns:
+        The start values and the closed pose nearest to them. If that pose is singular or nearly so, the most regular
+        one of it and of poses a little beside it.
+
+    Raises:
+        AssemblyError: The mechanism has more than MOST_DENSE coordinates and does not assemble block by block.
+
+    """
     given, law = start_from_poses(system), law_targets(system)
     found = _assembled(system, given)
-    if len(system.coordinates) > MOST_DENSE:
-        return given, found
+    if not given.is_followed or len(system.coordinates) > MOST_DENSE:
+        return Assembly(given, found)
     if found is not None:
         q, u = followed(system, found.q, found.u, law)
         if np.array_equal(u, law):
             if not SINGULAR < margin(system, q) <= comfortable(system):
-                return given, found
+                return Assembly(given, found)
             # Between two limits close to each other the last step may skip what no pose closes.
             near = StartValues(q, law, is_followed=True)
-            return near, _assembled(system, near)
+            return Assembly(near, _assembled(system, near))
     if found is None and len(system.rows) > len(system.coordinates):
-        return given, None  # contradictory joints may close at isolated poses by chance
+        return Assembly(given, None)  # contradictory joints may close at isolated poses by chance
     moved = StartValues(with_angles(system, given.q, law - given.u), law, is_followed=True, is_moved=True)
     there = _assembled(system, moved)
-    return (moved, there) if there is not None and there.margin > SINGULAR else (given, found)
+    return Assembly(moved, there) if there is not None and there.margin > SINGULAR else Assembly(given, found)
+
+
+def assemble(system: System) -> Assembled | None:
+    """Return the pose of `find_assembly`."""
+    return find_assembly(system).pose
+
+
+def start_values(system: System) -> StartValues:
+    """Return the start values of `find_assembly`; nothing is assembled if start poses and laws agree."""
+    given = start_from_poses(system)
+    return find_assembly(system).start if given.is_followed else given
 
 
 def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
@@ -81,26 +104,12 @@ def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
     return np.array_equal(u, target)
 
 
-class Assembled(NamedTuple):
-    """A closed pose: coordinates q (n,), driver values u (d,), and how far from singular it is."""
-
-    q: FloatArray
-    u: FloatArray
-    margin: float  # the smallest over the blocks of smallest over largest singular value of the scaled Jacobian
-
-
-def assemble(system: System) -> Assembled | None:
-    """The start pose, closed; if it is singular or nearly so, the most regular of it and the poses a little beside it.
-
-    Block by block where rows and coordinates allow an order; all rows at once where they do not, or where a block is
-    open or singular. None if the rows, all together, do not close near the start pose.
-    """
-    values = start_values(system)
-    return _decided(system)[1] if values.is_followed else _assembled(system, values)
-
-
 def _assembled(system: System, start: StartValues) -> Assembled | None:
-    """Return what `assemble` does, from a rough pose and driver values."""
+    """Return the closed pose nearest to a rough pose at its driver values.
+
+    Block by block where rows and coordinates allow an order; all rows at once where they do not, or where a block does
+    not close or is singular. None if the rows, all together, do not close near the rough pose.
+    """
     u = start.u
     order = in_order(system)
     found, trouble = _assembled_in_order(system, u, start.q, order)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import assemble, comfortable, rough_start
+from kinfmu.equations.assembly import Assembly, comfortable, find_assembly
 from kinfmu.equations.closing import dependent_rows, motion_samples
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System, length_of
@@ -48,12 +48,14 @@ class DependentRow:
 class Redundancy:
     """What the joint rows leave: mobility = coordinates - independent rows; rows set aside, by index into System.rows.
 
-    kept: independent joint rows; dependent: those set aside, redundant or inconsistent.
+    kept: independent joint rows; dependent: those set aside, redundant or inconsistent; assembly: the start of the
+    mechanism with which the rows were judged, which the plan's anchor is taken from.
     """
 
     mobility: int
     kept: tuple[int, ...]
     dependent: tuple[DependentRow, ...]
+    assembly: Assembly
 
     @property
     def redundant(self) -> tuple[DependentRow, ...]:
@@ -71,11 +73,12 @@ def find_redundancy(system: System) -> Redundancy:
     that the others leave. A loss of rank at one pose only is a singular point and does not count. Haug (1989) judges
     rank at one pose; along the motion, a parallel third crank shows as redundant and a stretched linkage does not.
     """
-    assembled = assemble(system)
+    assembly = find_assembly(system)
+    assembled = assembly.pose
     free, joint_rows = len(system.coordinates), range(system.joint_row_count)
     if assembled is not None and assembled.margin > comfortable(system) and len(system.rows) == free:
-        return Redundancy(free - len(joint_rows), tuple(joint_rows), ())  # regular with its drivers: all independent
-    start = rough_start(system) if assembled is None else assembled.q
+        return Redundancy(free - len(joint_rows), tuple(joint_rows), (), assembly)  # regular with its drivers
+    start = assembly.start.q if assembled is None else assembled.q
     suspects = _suspects(system, None if assembled is None else assembled.q)
     kept = list(joint_rows)
     dependent: list[DependentRow] = []
@@ -95,7 +98,7 @@ def find_redundancy(system: System) -> Redundancy:
         gap, tolerance = gaps[(len(gaps) - 1) // 2], _tolerance(system, index)
         implied_by = _implied_by(system, poses, index, rows)
         dependent.insert(0, DependentRow(system.rows[index], index, implied_by, gap, tolerance, abs(gap) <= tolerance))
-    return Redundancy(free - len(kept), tuple(kept), tuple(dependent))
+    return Redundancy(free - len(kept), tuple(kept), tuple(dependent), assembly)
 
 
 def _tolerance(system: System, index: int) -> float:

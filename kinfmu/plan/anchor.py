@@ -6,22 +6,23 @@ import math
 
 import numpy as np
 
-from kinfmu.equations.assembly import SINGULAR, Assembled, assemble, closes_beside, rough_start, start_targets
+from kinfmu.equations.assembly import SINGULAR, Assembled, Assembly, closes_beside
 from kinfmu.equations.closing import branches, close, margin
 from kinfmu.equations.part import Part
+from kinfmu.equations.start_poses import StartValues
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
 
 
-def find_anchor(system: System) -> Assembled:
+def find_anchor(system: System, assembly: Assembly) -> Assembled:
     """The start pose closed, or a pose beside it if it is singular.
 
     Raises AssemblyError with the widest gap if the mechanism does not close, AmbiguousStartError if the start pose is
     singular and several branches leave it, MobilityError if it is singular everywhere.
     """
-    found = assemble(system)
+    start, found = assembly
     if found is None:
-        raise _does_not_close(system)
+        raise _does_not_close(system, start)
     if found.margin <= SINGULAR:
         names = listed(driver.name for driver in system.mechanism.drivers)
         if not closes_beside(system, found):
@@ -32,21 +33,20 @@ def find_anchor(system: System) -> Assembled:
         raise MobilityError(
             f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too"
         )
-    targets = start_targets(system)
-    if np.array_equal(found.u, targets):
+    if np.array_equal(found.u, start.u):
         return found  # the start pose itself
-    start, _ = close(system, rough_start(system), targets)
-    if margin(system, start) <= SINGULAR:
-        leaving = branches(system, start, found.u)
+    closed, _ = close(system, start.q, start.u)
+    if margin(system, closed) <= SINGULAR:
+        leaving = branches(system, closed, found.u)
         if len(leaving) > 1:
-            raise _ambiguous(system, found, leaving)
+            raise _ambiguous(system, start, found, leaving)
     return found
 
 
-def _does_not_close(system: System) -> AssemblyError:
+def _does_not_close(system: System, start: StartValues) -> AssemblyError:
     """The joint that is open widest where all give way alike, with its gap once the others are closed."""
-    u = start_targets(system)
-    pose, _ = close(system, rough_start(system), u)
+    u = start.u
+    pose, _ = close(system, start.q, u)
     widest = system.rows[int(system.relative_gaps(system.residual(pose, u)).argmax())].owner
     others = [k for k, row in enumerate(system.rows) if row.owner != widest]
     pose, _ = close(Part(system, others), pose, u)
@@ -64,13 +64,13 @@ def _does_not_close(system: System) -> AssemblyError:
     )
 
 
-def _ambiguous(system: System, found: Assembled, leaving: list[FloatArray]) -> AmbiguousStartError:
+def _ambiguous(system: System, start: StartValues, found: Assembled, leaving: list[FloatArray]) -> AmbiguousStartError:
     spread = np.ptp(np.array(leaving) / system.column_scales, axis=0)
     tell = int(spread.argmax())
     name, unit = system.coordinates[tell], system.mechanism.length_unit
     values = " or ".join(_value(branch[tell], is_angle=name.endswith(".phi"), unit=unit) for branch in leaving)
     return AmbiguousStartError(
-        f"the start pose is singular ({_at(system, start_targets(system))}) and {len(leaving)} branches leave it: at "
+        f"the start pose is singular ({_at(system, start.u)}) and {len(leaving)} branches leave it: at "
         f"{_at(system, found.u)} {name} can be {values}; give a start pose beside it, on the branch that is meant",
         branches=leaving,
     )

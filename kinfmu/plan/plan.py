@@ -8,11 +8,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 from kinfmu.drivers import Driver
-from kinfmu.equations.assembly import Assembled, rough_start, start_targets
+from kinfmu.equations.assembly import Assembled
 from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy, find_redundancy
+from kinfmu.equations.start_poses import StartValues
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, RequestError, listed, suggestion
 from kinfmu.measures import DistanceBetween
@@ -246,8 +247,8 @@ def plan_from(
     local = system.mechanism
     refuse_inconsistent(system, redundancy)
     refuse_mobility(system, redundancy)
-    refuse_negative_distances(system)
-    anchor = find_anchor(system)
+    refuse_negative_distances(system, redundancy.assembly.start)
+    anchor = find_anchor(system, redundancy.assembly)
     tracer = Tracer(local)
     set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy, anchor.q)
@@ -327,9 +328,9 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
     )
 
 
-def refuse_negative_distances(system: System) -> None:
+def refuse_negative_distances(system: System, start: StartValues) -> None:
     """Raise an AssemblyError if a driver starts at a distance below 0."""
-    for driver, value in zip(system.mechanism.drivers, start_targets(system), strict=True):
+    for driver, value in zip(system.mechanism.drivers, start.u, strict=True):
         if isinstance(driver.measured(), DistanceBetween) and value < 0.0:
             unit = system.mechanism.length_unit
             raise AssemblyError(
@@ -340,7 +341,8 @@ def refuse_negative_distances(system: System) -> None:
 def _loose(system: System, redundancy: Redundancy) -> list[str]:
     """Bodies that joints and drivers together do not hold."""
     rows = [*redundancy.kept, *range(system.joint_row_count, len(system.rows))]
-    pose = next(iter(motion_samples(Part(system, redundancy.kept), rough_start(system), 1)), rough_start(system))
+    start = redundancy.assembly.start.q
+    pose = next(iter(motion_samples(Part(system, redundancy.kept), start, 1)), start)
     free = null_space(system.scaled_jacobian(pose)[rows])
     moves = {
         name.partition(".")[0] for name, way in zip(system.coordinates, free, strict=True) if abs(way).max() > 1e-6

@@ -127,10 +127,13 @@ def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
     """
     if len(u) == len(names) == 1:
         return names[0]
-    moved = np.flatnonzero(np.ptp(u, axis=0) > 0.0)
-    steps = np.diff(u[:, moved], axis=0)
-    goes_one_way = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
-    return names[moved[0]] if len(moved) == 1 and goes_one_way else SAMPLE
+    moved = [k for k, column in enumerate(u.T) if column.min() < column.max()]
+    return names[moved[0]] if len(moved) == 1 and _is_monotonic(u[:, moved[0]]) else SAMPLE
+
+
+def _is_monotonic(values: FloatArray) -> bool:
+    before, after = values[:-1], values[1:]
+    return bool((before < after).all() if values[0] < values[-1] else (before > after).all())
 
 
 def _driver(name: str) -> tuple[str, str]:

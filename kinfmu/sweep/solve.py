@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
@@ -210,20 +211,26 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
 def _with_values(driven: Driven) -> Driven:
     """Return what laws drive; NaN where a law has no value, or has rates whose squares no float holds."""
     u, ud, udd = driven
+    if _is_within(ud, LARGEST_RATE) and _is_within(udd, LARGEST_RATE):
+        return driven
     has_value = (np.abs(ud) <= LARGEST_RATE) & (np.abs(udd) <= LARGEST_RATE)
-    return driven if has_value.all() else (np.where(has_value, u, np.nan), ud, udd)
+    return np.where(has_value, u, np.nan), ud, udd
 
 
 def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:
     """Raise a RequestError for a speed or an acceleration of a driver whose square no float holds."""
     for order in (1, 2):
-        sizes = np.abs(driven[order])
-        if (sizes > LARGEST_RATE).any():
-            sample, number = np.argwhere(sizes > LARGEST_RATE)[0]
+        if not _is_within(driven[order], LARGEST_RATE):
+            sample, number = np.argwhere(np.abs(driven[order]) > LARGEST_RATE)[0]
             raise RequestError(
                 f"{plan.drivers[number].inputs[order]} = {driven[order][sample, number]:.6g} at sample {sample}: "
                 f"the largest value is {LARGEST_RATE:g}"
             )
+
+
+def _is_within(values: FloatArray, largest: float) -> bool:
+    """Return True if all values are numbers of at most this size; no temporary arrays are made."""
+    return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
 
 
 def _column(name: str, values: ArrayLike) -> FloatArray:
@@ -233,7 +240,7 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
         raise RequestError(f"{name} must be numbers") from None
     if column.ndim != 1:
         raise RequestError(f"{name} must be one-dimensional, not of shape {column.shape}")
-    if not np.isfinite(column).all():
+    if not _is_within(column, sys.float_info.max):
         raise RequestError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
     return column
 

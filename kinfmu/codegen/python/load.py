@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 import linecache
+import weakref
 from types import ModuleType
 from typing import Any
 
 from kinfmu.codegen.python.emit import emit
 from kinfmu.plan import SolvePlan
 
+_modules: dict[int, ModuleType] = {}  # by id of their plans: plans of equal text may differ in units and origin
+
 
 def load_model(plan: SolvePlan) -> Any:
-    """The generated model of a plan with its parameters as written, ready for a Solver."""
+    """Return the generated model of a plan with its parameters as written, ready for a Solver."""
     module = load_module(plan)
     return module.bound(tuple(value for _, value in module.PARAMETERS)) if plan.parameters else module
 
 
 def load_module(plan: SolvePlan) -> ModuleType:
-    """The generated module of a plan; its source shows in tracebacks.
+    """Return the generated module of a plan, compiled once per plan; its source is in tracebacks.
 
-    Without parameters it is a model itself; with parameters its function `bound` gives one.
+    Without parameters the module is a model itself; with parameters its function `bound` returns one.
     """
+    module = _modules.get(id(plan))
+    if module is None:
+        module = _modules[id(plan)] = _compiled(plan)
+        weakref.finalize(plan, _modules.pop, id(plan))
+    return module
+
+
+def _compiled(plan: SolvePlan) -> ModuleType:
     source = emit(plan)
     name = f"kinfmu.solver.python.model_{plan.mechanism.name}"  # beside `linear`, as in an FMU
     model = ModuleType(name)
