@@ -1,1 +1,1 @@
-"""Code generation: the one SolvePlan printed as Python and as C."""
+"""Code generation: one SolvePlan printed as Python and as C."""

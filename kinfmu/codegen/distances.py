@@ -1,4 +1,4 @@
-"""Rows of drivers that drive a distance: d.d - u^2, whose target must not be negative and has no slope at 0."""
+"""Rows of drivers of distances: d.d - u^2, whose target must not be negative and has no slope at 0."""
 
 from __future__ import annotations
 

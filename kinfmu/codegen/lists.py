@@ -1,4 +1,4 @@
-"""Where every number of a plan stands when coordinates are kept in lists: in Python's loops, in C, and in C's lanes.
+"""Places of a plan's numbers in lists of coordinates: used by Python's loops, by C, and by C's lanes.
 
 The lists hold the unknowns first, in the order of z, then the coordinates that are given outright, then the drivers: x
 their positions, x1 their rates, x2 their accelerations.
@@ -6,7 +6,7 @@ their positions, x1 their rates, x2 their accelerations.
 
 from __future__ import annotations
 
-from kinfmu.codegen.alike import Run, runs_of
+from kinfmu.codegen.kinds import UnitRun, runs_of
 from kinfmu.equations.graph import Node
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
@@ -31,11 +31,11 @@ def parametric(plan: SolvePlan) -> tuple[set[Node], list[Node]]:
 
 
 class Lists:
-    """The lists of a plan and what their numbers are made by.
+    """The lists of a plan, and the runs of units that fill them.
 
-    runs: its blocks as runs of alike units; order: names in the lists, `place` the place of each; given_outright: how
-    many coordinates need no solving; parameters, derived: places of the parameters by their symbols, and of what
-    depends on them alone.
+    runs: its blocks as runs of units; order: names in the lists, `place` the place of each; given_outright: how many
+    coordinates need no solving; parameters, derived: places of the parameters by their symbols, and of the nodes that
+    depend on them alone.
     """
 
     def __init__(self, plan: SolvePlan) -> None:
@@ -52,19 +52,19 @@ class Lists:
         self.derived = {node: k for k, node in enumerate(derived)}
 
     def rate_of(self, name: str, order: int) -> str:
-        """Name of a derivative of a coordinate or of a driver's value."""
+        """Return the name of a derivative of a coordinate or of a driver's value."""
         return self._rates[name][order] if name in self._rates else derivative_name(name, order)
 
-    def numbered(self) -> list[tuple[int, Run]]:
-        """The runs with their numbers, from 1."""
+    def numbered(self) -> list[tuple[int, UnitRun]]:
+        """Return the runs with their numbers, from 1."""
         return list(enumerate(self.runs, start=1))
 
-    def stands(self, order: int) -> dict[str, int]:
-        """Place in its list of each symbol of an order."""
+    def places(self, order: int) -> dict[str, int]:
+        """Return the place in its list of each symbol of an order."""
         return {self.rate_of(name, order): k for name, k in self.place.items()}
 
     def outputs(self, order: int) -> list[tuple[Node, int | None]]:
-        """Each output of an order with its place in the list, None for a formula."""
-        stands = self.stands(order)
+        """Return each output of an order with its place in the list, None for a formula."""
+        places = self.places(order)
         nodes: list[Node] = [motion[1:][order] for motion in self.plan.outputs_motion]
-        return [(node, stands.get(node.name) if node.op == "symbol" else None) for node in nodes]
+        return [(node, places.get(node.name) if node.op == "symbol" else None) for node in nodes]

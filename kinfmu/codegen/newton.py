@@ -1,4 +1,4 @@
-"""What Newton's loop is in every language: when it ends, and the solves of one and two unknowns, unrolled.
+"""Newton's loop in every language: when it ends, and the solves of one and two unknowns, unrolled.
 
 The expressions are plain arithmetic on names and mean the same in Python and in C.
 """
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from kinfmu.plan import Block
 
-ROUND_OFF = 4e-16  # residual relative to the size below which Newton has nothing left to gain at regular poses
+ROUND_OFF = 4e-16  # residual relative to the size below which more steps gain nothing at regular poses
 SETTLED = 1e-13  # residual from which Newton may stop when it no longer falls fourfold
 ITERATIONS = 12
 
@@ -17,12 +17,12 @@ Rows = Sequence[Sequence[str]]
 
 
 def is_small(block: Block) -> bool:
-    """True for a square block of one or two unknowns, whose solves are unrolled."""
+    """Return True for a square block of one or two unknowns, whose solves are unrolled."""
     return len(block.unknowns) <= 2 and len(block.residuals) == len(block.unknowns)
 
 
 def determinant(jacobian: Rows) -> str:
-    """det J of one or two unknowns."""
+    """Return det J of one or two unknowns."""
     if len(jacobian) == 1:
         return jacobian[0][0]
     (a, b), (c, d) = jacobian
@@ -30,7 +30,7 @@ def determinant(jacobian: Rows) -> str:
 
 
 def solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
-    """J^-1 r of one or two unknowns."""
+    """Return J^-1 r of one or two unknowns."""
     if len(r) == 1:
         return [f"{r[0]} / {det}"]
     (a, b), (c, d) = jacobian
@@ -41,7 +41,7 @@ def solution(jacobian: Rows, r: Sequence[str], det: str) -> list[str]:
 
 
 def opposite_solution(jacobian: Rows, r: Sequence[str], by_det: str) -> list[str]:
-    """-J^-1 r of one or two unknowns; by_det: '/ det' or '* per_det', which is known before r and lets nothing wait."""
+    """Return -J^-1 r of one or two unknowns; by_det: '/ det', or '* per_det', which is computed before r is known."""
     if len(r) == 1:
         return [f"-{r[0]} {by_det}"]
     (a, b), (c, d) = jacobian
@@ -52,7 +52,7 @@ def opposite_solution(jacobian: Rows, r: Sequence[str], by_det: str) -> list[str
 
 
 def square(r: Sequence[str], scales: Sequence[float]) -> str:
-    """Sum of the squared residuals relative to the size: cheaper than the largest, and no NaN hides in it."""
+    """Return the sum of the squared residuals relative to the size: cheaper than the largest, and NaN if one is."""
     if len(set(scales)) == 1:
         total = " + ".join(f"{name} * {name}" for name in r)
         return total if scales[0] == 1.0 else f"({total}) * {scales[0] ** -2!r}"

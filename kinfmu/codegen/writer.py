@@ -1,4 +1,4 @@
-"""Statements for nodes: what is used once stands where it is used, what is used again gets a name."""
+"""Statements for nodes: a node used once is written inline, a node used again gets a name."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _LONGEST_INLINE = 72  # characters; longer expressions get a name
 
 @lru_cache(maxsize=1 << 16)
 def identifier(name: str) -> str:
-    """'coupler_phi' of 'coupler.phi'."""
+    """Return 'coupler_phi' for 'coupler.phi'."""
     return re.sub(r"\W", "_", name)
 
 
 class Names:
     """Names of nodes in one generated module: symbols under their own, intermediate values numbered in order.
 
-    curves: names of the constants that hold the data of curves; functions: names of functions that are called otherwise
-    than sin, cos and so on, and under "sincos" the one that tells both at once: f(x, &sine, &cosine).
+    curves: names of the constants that hold the data of curves; functions: names of functions called in place of sin,
+    cos and so on; "sincos" is the one that computes both at once: f(x, &sine, &cosine).
     """
 
     def __init__(
@@ -44,32 +44,32 @@ class Names:
         if node.op == "symbol":
             return identifier(node.name)
         if node not in self._numbered:
-            spoken = f"{node.op}_{identifier(node.args[0].name)}" if node.args[0].op == "symbol" else ""
-            if node.op in ("sin", "cos") and spoken and spoken not in self._reserved:
-                self._numbered[node] = spoken
+            readable = f"{node.op}_{identifier(node.args[0].name)}" if node.args[0].op == "symbol" else ""
+            if node.op in ("sin", "cos") and readable and readable not in self._reserved:
+                self._numbered[node] = readable
             else:
                 self._count += 1
                 self._numbered[node] = f"t{self._count}"
         return self._numbered[node]
 
     def assign(self, node: Node, name: str) -> None:
-        """Give a node the name of the coordinate that it is; a node that is two coordinates keeps the first."""
+        """Name a node after the coordinate that it is; a node that is two coordinates keeps the first name."""
         if node.op not in ("symbol", "constant"):
             self._numbered.setdefault(node, identifier(name))
 
 
 class Writer:
-    """Writes the statements of one function, given which nodes are known when it starts."""
+    """The writer of one function's statements, given which nodes are known when it starts."""
 
     def __init__(self, names: Names, known: Iterable[Node], keep: Iterable[Node] = ()) -> None:
         self.names = names
         self.known = set(known)  # already held in variables
-        self.keep = set(keep)  # named even if used once, because somebody else needs them
-        self.used: dict[Node, None] = {}  # known nodes that were referred to, in order
+        self.keep = set(keep)  # named even if used once, because other functions read them
+        self.used: dict[Node, None] = {}  # known nodes that the statements read, in order
         self._known_at_start = frozenset(self.known)
 
     def statements(self, targets: Sequence[Node]) -> list[str]:
-        """Assignments after which every target can be referred to by `expression`."""
+        """Return assignments after which `expression` can return every target."""
         new = [node for node in self._reachable(targets) if node.args and node not in self.known]
         uses = Counter(arg for node in new for arg in node.args)
         uses.update(targets)
@@ -78,7 +78,7 @@ class Writer:
         text: dict[Node, tuple[str, int]] = {}
         others = self._others(new)
         for node in new:
-            if node in self.known:  # it came with the other one of its angle
+            if node in self.known:  # computed together with the other one of its angle
                 text[node] = (self.names.of(node), _ATOM)
                 continue
             if node in others:
@@ -94,7 +94,7 @@ class Writer:
         return lines
 
     def _others(self, new: Sequence[Node]) -> dict[Node, Node]:
-        """Of sines and cosines the other one of the same angle, where one call tells both."""
+        """Return for sines and cosines the other one of the same angle, if one call computes both."""
         if "sincos" not in self.names.functions:
             return {}
         found = {(node.op, node.args[0]): node for node in new if node.op in ("sin", "cos")}
@@ -102,7 +102,7 @@ class Writer:
         return {node: other for node, other in pairs if other is not None}
 
     def _pair(self, node: Node, other: Node, text: dict[Node, tuple[str, int]]) -> str:
-        """The statement that gives both their values."""
+        """Return the statement that computes both."""
         sine, cosine = (node, other) if node.op == "sin" else (other, node)
         for one in (sine, cosine):
             self.known.add(one)
@@ -111,7 +111,7 @@ class Writer:
         return f"{self.names.functions['sincos']}({angle}, &{self.names.of(sine)}, &{self.names.of(cosine)})"
 
     def independent(self, targets: Sequence[Node], moving: Iterable[Node]) -> list[Node]:
-        """The largest parts of the targets that do not depend on the symbols `moving`: what a loop need not repeat."""
+        """Return the largest parts of the targets without the symbols `moving`, which a loop need not repeat."""
         moves: set[Node] = set(moving)
         parts: dict[Node, None] = {}
         for node in self._reachable(targets):
@@ -121,11 +121,11 @@ class Writer:
         return [part for part in parts if part not in moves and part not in self.known]
 
     def expression(self, node: Node) -> str:
-        """A target as an expression, after its statements."""
+        """Return a target as an expression, after its statements."""
         return self._reference(node, self._inline)[0]
 
     def _reachable(self, targets: Sequence[Node]) -> list[Node]:
-        """Nodes behind the targets, not looking behind what is known."""
+        """Return the nodes that the targets are made of; known nodes are not expanded."""
         found: dict[int, Node] = {}
         stack = list(targets)
         while stack:

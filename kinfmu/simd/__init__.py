@@ -1,4 +1,4 @@
-"""Sweeps side by side: an optional accelerator, which solves many samples at once in the lanes of vector registers."""
+"""Sweep of many samples at once in the lanes of vector registers: an optional accelerator of the native engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The functions of a kind of units for many samples side by side, each a loop over the lanes.
+"""The functions of a kind of units for many samples side by side; each is a loop over the lanes.
 
 Intermediate numbers stay in registers. Newton corrects a good prediction once; the sines and cosines of the unknowns
 that come with it are rotated by the correction.
@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Sequence
 
-from kinfmu.codegen.alike import Kind, positions
 from kinfmu.codegen.c.text import assigned, declared
 from kinfmu.codegen.c.units import places, row_type
+from kinfmu.codegen.kinds import Kind, positions
 from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.newton import determinant, opposite_solution, solution, square
 from kinfmu.codegen.writer import Names, Writer, identifier
@@ -21,7 +21,7 @@ from kinfmu.plan.trace import is_parameter
 from kinfmu.units import derivative_name
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
-LISTED = {"sin": "sine", "cos": "cosine"}  # lists of what comes with the prediction
+LISTED = {"sin": "sine", "cos": "cosine"}  # lists of the predicted sines and cosines
 
 
 class LaneUnit:
@@ -29,9 +29,9 @@ class LaneUnit:
 
         position(model, row, lanes, hold, factor)   Newton's correction, what it leaves, and what follows
         motion(model, row, lanes, hold)             rates and accelerations
-        position_given, motion_given                the same of a block that is held
+        position_given, motion_given                the same for a block whose motion is given
 
-    turned: names of coordinates whose sine and cosine come with the prediction.
+    turned: names of the coordinates whose sines and cosines are predicted.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class LaneUnit:
                 self.names.assign(motion[0], name)
         self.positions = reachable([node for group in positions(kind.blocks) for node in group])
         self.predicted = {node for node in self.positions if is_turned(node, turned)}
-        self.turning = [  # unknown angles with the nodes of sine and cosine, of which the formulas hold one at least
+        self.turning = [  # unknown angles with the nodes of sine and cosine; the formulas hold at least one of these
             (node.name, node.graph.function("sin", node), node.graph.function("cos", node))
             for node in self.positions
             if node.op == "symbol" and kind.solved and node.name in kind.solved.unknowns and node.name in turned
@@ -58,16 +58,16 @@ class LaneUnit:
         self.where = places(kind)
         self.hold: dict[Node | None, int] = {}  # None: the determinant of the block that is solved
 
-    def handed_on(self, node: Node | None) -> int:
-        """Place of a node among the numbers that later functions take from here, from now on if not before."""
+    def cached(self, node: Node | None) -> int:
+        """Return the place of a node among the numbers that a unit keeps for later functions; add it if it is new."""
         return self.hold.setdefault(node, len(self.hold))
 
-    def room(self) -> int:
-        """How many numbers a unit hands on."""
+    def cache_size(self) -> int:
+        """Return how many numbers a unit keeps."""
         return len(self.hold)
 
     def source(self) -> list[str]:
-        motion = self._motion("motion", held=False)  # says what is handed on
+        motion = self._motion("motion", held=False)  # before the position, which keeps what the motion reads
         if self.kind.solved is None:
             return [*row_type(self.kind), "", *self._position("position", held=False), *motion]
         return [
@@ -93,9 +93,9 @@ class LaneUnit:
             lines += [f"sine_{field}[i] = {self.names.of(sine)};", f"cosine_{field}[i] = {self.names.of(cosine)};"]
         found = [*corrected, *(name for block in self.kind.blocks for name, _ in block.assigned)]
         lines += [f"x_{self.where[name][1]}[i] = {identifier(name)};" for name in found]
-        handed_on = {node: k for node, k in self.hold.items() if node is not None}
-        lines += [f"{line};" for line in writer.statements(list(handed_on))]
-        lines += [f"hold[{k}][i] = {writer.expression(node)};" for node, k in handed_on.items()]
+        held_nodes = {node: k for node, k in self.hold.items() if node is not None}
+        lines += [f"{line};" for line in writer.statements(list(held_nodes))]
+        lines += [f"hold[{k}][i] = {writer.expression(node)};" for node, k in held_nodes.items()]
         used = dict.fromkeys([*(node for turn in turning for node in turn[1:]), *writer.used])
         predicted = [f"{identifier(name)} = z_{self.where[name][1]}[i];" for name in corrected]
         factor = " const double factor" if corrected else ""
@@ -119,7 +119,7 @@ class LaneUnit:
         return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
 
     def _loads(self, nodes: Iterable[Node], found: Collection[str]) -> list[str]:
-        """Assignments of what statements use and have not found themselves."""
+        """Return assignments of what the statements read and do not compute."""
         lines = []
         for node in nodes:
             if node in self.derived:
@@ -129,7 +129,7 @@ class LaneUnit:
             elif node.op != "symbol" and node in self.assigned:
                 source = f"x_{self.where[self.assigned[node]][1]}[i]"
             elif node.op != "symbol":
-                source = f"hold[{self.handed_on(node)}][i]"
+                source = f"hold[{self.cached(node)}][i]"
             elif node.name in found:
                 continue
             elif is_parameter(node):
@@ -171,7 +171,7 @@ class LaneUnit:
         return lines
 
     def _newton(self, writer: Writer, block: Block) -> list[str]:
-        """A correction of the prediction, and the residual that it leaves."""
+        """Return statements of one correction of the prediction and of the residual after it."""
         entries = [entry for row in block.jacobian for entry in row]
         unknowns = [
             node
@@ -202,33 +202,33 @@ class LaneUnit:
             *lines,
             *evaluated,
             f"det = {determinant(jacobian)};",
-            f"hold[{self.handed_on(None)}][i] = det;",
+            f"hold[{self.cached(None)}][i] = det;",
             "size = fabs(det * factor);",
             "lanes->margin[i] = size < lanes->margin[i] ? size : lanes->margin[i];",
             *self._left(r, block),
         ]
 
     def _closing(self, writer: Writer, block: Block) -> list[str]:
-        """The residual of unknowns that are given."""
+        """Return statements of the residual of unknowns that are given."""
         r, evaluated = self._residuals(writer, block, ())
         return [*evaluated, *self._left(r, block)]
 
     def _residuals(self, writer: Writer, block: Block, entries: Sequence[Node]) -> tuple[list[str], list[str]]:
-        """Names of the residuals, and the statements that compute them and what entries of the Jacobian need."""
+        """Return names of the residuals, and the statements that compute them and the entries of the Jacobian."""
         r = [f"r{k}" for k in range(len(block.residuals))]
         lines = [f"{line};" for line in writer.statements([*block.residuals, *entries])]
         lines += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
         return r, lines
 
     def _left(self, r: Sequence[str], block: Block) -> list[str]:
-        """What residuals count among those of all blocks."""
+        """Return statements that add the residuals of a block to those of all blocks."""
         return [
             f"size = {square(r, block.row_scales)};",
             "lanes->error[i] = size > lanes->error[i] || size != size ? size : lanes->error[i]; /* a NaN stays */",
         ]
 
     def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
-        """The linear solve of a block for its rates (order 1), and after them its accelerations (2)."""
+        """Return the linear solve of a block for its rates (order 1) or, after them, its accelerations (2)."""
         right = (block.velocity, block.acceleration)[order - 1]
         many = len(block.unknowns) > 1  # the determinant of one unknown is its Jacobian
         entries = [entry for row in block.jacobian for entry in row if many]
@@ -236,7 +236,7 @@ class LaneUnit:
         b = [f"b{k}" for k in range(len(right))]
         lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
         if order == 1:
-            lines.append(f"per_det = 1.0 / hold[{self.handed_on(None)}][i];")
+            lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i];")
         z = [identifier(derivative_name(name, order)) for name in block.unknowns]
         jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
         values = opposite_solution(jacobian, b, "* per_det")
@@ -244,12 +244,12 @@ class LaneUnit:
 
 
 def is_turned(node: Node, angles: Collection[str]) -> bool:
-    """True for the sine or cosine of one of these angles."""
+    """Return True for the sine or cosine of one of these angles."""
     return node.op in LISTED and node.args[0].op == "symbol" and node.args[0].name in angles
 
 
 def through(lines: Sequence[str]) -> list[str]:
-    """Statements for each lane."""
+    """Return the statements in a loop over the lanes."""
     if not lines:
         return ["    (void)i;"]
     return [

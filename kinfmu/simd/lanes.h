@@ -1,7 +1,7 @@
 /* Lanes: many samples side by side, one in each lane of the processor's vectors.
  *
- * A batch of samples is predicted, corrected by Newton and checked; what does not pass the check is left to the solver,
- * sample by sample. x, x1, x2 are those of kinfmu.h, with a number for each lane.
+ * A batch of samples is predicted, corrected by Newton and checked; samples that fail the check are left to the solver,
+ * one by one. x, x1, x2 are those of kinfmu.h, with a number for each lane.
  */
 #ifndef KF_LANES_H
 #define KF_LANES_H
@@ -23,8 +23,8 @@
 #define KF_LANES (KF_COORDINATES <= 64 ? 64 : 32) /* as many as the first caches hold */
 #define KF_VECTOR 8 /* lanes that are predicted at once, and may be past the last one */
 
-/* z, sine, cosine: predicted unknowns, and sine and cosine of angles, which are corrected where they stand. hold: what units
- * hand on. rows: room for KF_LANES rows of a table.
+/* z, sine, cosine: predicted unknowns, and sine and cosine of angles, which are corrected in place. hold: the stage cache.
+ * rows: KF_LANES rows of a table.
  */
 typedef struct {
     double x[KF_COORDINATES][KF_LANES], x1[KF_COORDINATES][KF_LANES], x2[KF_COORDINATES][KF_LANES];
@@ -40,8 +40,8 @@ typedef struct {
     double rows[KF_ROOM(KF_OUTPUTS) * KF_LANES];
 } kf_lanes;
 
-/* Generated. Where sine and cosine of each coordinate stand among those of unknown angles and, last, of the driver's; -1:
- * they are not predicted.
+/* Generated. Place of each coordinate's sine and cosine among those of the unknown angles and, last, of the driver's angle;
+ * -1: they are not predicted.
  */
 extern const int kf_lane_angles[KF_COORDINATES];
 

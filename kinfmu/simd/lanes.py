@@ -1,8 +1,7 @@
 """lanes.c: the formulas of a plan for many samples side by side, free of branches.
 
-A unit's position is one loop over the lanes; its rates and accelerations are another, which is left out where nobody
-asks for them. In a window around a singular point the blocks that are held take position and derivatives as they are
-given.
+A unit's position is one loop over the lanes; its rates and accelerations are another, which is left out where they are
+not wanted. In a window around a singular point some blocks are held: their positions and derivatives are given.
 """
 
 from __future__ import annotations
@@ -10,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from kinfmu.codegen.alike import Kind
-from kinfmu.codegen.c.stage_cache import HandedOn
+from kinfmu.codegen.c.stage_cache import StageCache
 from kinfmu.codegen.c.stages import block_of, index
 from kinfmu.codegen.c.text import array, indented, repeated
 from kinfmu.codegen.c.units import rows_of
+from kinfmu.codegen.kinds import Kind
 from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.newton import is_small
 from kinfmu.codegen.writer import Names, Writer
@@ -27,7 +26,7 @@ _BRANCHING = ("curve", "atan2", "floor")
 
 
 def has_lanes(plan: SolvePlan) -> bool:
-    """True if a plan can be solved side by side: one driver, blocks of one or two unknowns, no piecewise functions."""
+    """Return True if lanes can solve a plan: one driver, blocks of one or two unknowns, no piecewise functions."""
     solved = (block for block in plan.blocks if block.unknowns)
     rows = [node for block in plan.blocks for node in (*block.residuals, *(m[0] for _, m in block.assigned))]
     plain = not any(node.op in _BRANCHING for node in reachable(rows))
@@ -41,11 +40,11 @@ def sources(plan: SolvePlan) -> dict[str, str]:
 
 
 def emit_lanes(plan: SolvePlan) -> dict[str, str]:
-    """Texts of lane_sizes.h and, if the plan has lanes, of lanes.c, by file name."""
+    """Return the texts of lane_sizes.h and, if the plan has lanes, of lanes.c, by file name."""
     if not has_lanes(plan):
         return {"lane_sizes.h": _sizes(0, 0, 0)}
     lanes = _Lanes(plan)
-    return {"lane_sizes.h": _sizes(1, len(lanes.handed_on), int(repeats(plan))), "lanes.c": lanes.source()}
+    return {"lane_sizes.h": _sizes(1, len(lanes.stage_cache), int(repeats(plan))), "lanes.c": lanes.source()}
 
 
 def _sizes(has: int, hold: int, is_repeated: int) -> str:
@@ -61,15 +60,16 @@ class _Lanes(Lists):
             label: LaneUnit(kind, self.parameters, self.derived, plan.size, self._turned(kind))
             for label, kind in self.kinds.items()
         }
-        self.handed_on = HandedOn(self, self.units)
-        readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # they say what is handed on
+        self.stage_cache = StageCache(self, self.units)
+        readers = [self._formulas(k) for k in range(3)] + [self._watches()]  # first: they fill the stage cache
         units = [line for unit in self.units.values() for line in unit.source()]
         self.functions = [*units, *(line for k, run in self.numbered() for line in rows_of(k, run, self.place))]
-        self.functions += self.handed_on.placed(line for lines in readers for line in lines)
+        self.functions += self.stage_cache.placed(line for lines in readers for line in lines)
 
     def _angles(self) -> dict[str, int]:
-        """Coordinates whose sine and cosine come with the prediction, with their place there: unknown angles, then the
-        driver's angle and what is equal to it.
+        """Return the coordinates whose sines and cosines are predicted, with their places among these.
+
+        These are the unknown angles, then the driver's angle and all angles equal to it.
         """
         angles = {name: k for k, name in enumerate(self.plan.unknowns) if name.endswith(".phi")}
         (driver,) = self.plan.drivers
@@ -83,7 +83,7 @@ class _Lanes(Lists):
         return angles
 
     def _turned(self, kind: Kind) -> set[str]:
-        """Names in a kind of coordinates whose sine and cosine come with the prediction, in all units of the kind."""
+        """Return the coordinates of a kind whose sines and cosines are predicted in all its units."""
         members = [member for run in self.runs if run.kind is kind for member in run.members]
         own = {
             name for k, name in enumerate(kind.coordinates) if all(member.own[k] in self.angles for member in members)
@@ -143,11 +143,11 @@ class _Lanes(Lists):
         ]
 
     def _calls(self, stage: str) -> list[str]:
-        """Calls of all units' functions of a stage, one after another."""
+        """Return the calls of a stage's functions, unit after unit."""
         lines = []
         for number, run in self.numbered():
             label, k = run.kind.label, index(run)
-            arguments = f"model, &run_{number}[{k}], lanes, lanes->hold + {self.handed_on.start(number, k)}"
+            arguments = f"model, &run_{number}[{k}], lanes, lanes->hold + {self.stage_cache.start(number, k)}"
             if run.kind.solved:
                 block = block_of(run)
                 factor = f", kf_determinant_factors[{block}]" if stage == "position" else ""
@@ -164,16 +164,16 @@ class _Lanes(Lists):
         return lines
 
     def _loop(self, name: str, lines: Sequence[str], writer: Writer) -> list[str]:
-        """A function that goes through the lanes."""
-        where = {name: f"{LISTS[k]}[{at}]" for k in range(3) for name, at in self.stands(k).items()}
+        """Return a function that loops over the lanes."""
+        where = {name: f"{LISTS[k]}[{at}]" for k in range(3) for name, at in self.places(k).items()}
         loads = []
         for node in writer.used:
             if node in self.derived:
                 source = f"model->derived[{self.derived[node]}]"
             elif is_turned(node, self.angles):
                 source = f"lanes->{LISTED[node.op]}[{self.place[node.args[0].name]}][i]"
-            elif node in self.handed_on.nodes:
-                source = f"lanes->hold[{self.handed_on.place(node)}][i]"
+            elif node in self.stage_cache.nodes:
+                source = f"lanes->hold[{self.stage_cache.place(node)}][i]"
             elif is_parameter(node):
                 source = f"model->parameters[{self.parameters[node.name]}]"
             else:
@@ -191,35 +191,36 @@ class _Lanes(Lists):
         ]
 
     def _formulas(self, order: int) -> list[str]:
-        """The outputs that are formulas; those that are coordinates are taken from where they stand."""
+        """Return the function of the outputs that are formulas; the others are read from the lists of coordinates."""
         targets = [(k, node) for k, (node, place) in enumerate(self.outputs(order)) if place is None]
-        lines, writer = self._written([node for _, node in targets])
+        lines, writer = self._statements([node for _, node in targets])
         lines += [f"lanes->outputs[{order}][{k}][i] = {writer.expression(node)};" for k, node in targets]
         return self._loop(("outputs", "rates", "accelerations")[order], lines, writer)
 
     def _watches(self) -> list[str]:
         targets = [node for _, node in self.plan.watches]
-        lines, writer = self._written(targets)
+        lines, writer = self._statements(targets)
         lines += [f"lanes->watches[{k}][i] = {writer.expression(node)};" for k, node in enumerate(targets)]
         return self._loop("watches", lines, writer)
 
-    def _written(self, targets: Sequence[Node]) -> tuple[list[str], Writer]:
-        """Statements for targets, given what the units compute and what comes with the prediction."""
+    def _statements(self, targets: Sequence[Node]) -> tuple[list[str], Writer]:
+        """Return statements for the targets; what the units compute and what is predicted is known."""
         turned = [node for node in reachable(targets) if is_turned(node, self.angles)]
-        writer = Writer(self.names, [*self.derived, *self.handed_on.nodes, *turned])
+        writer = Writer(self.names, [*self.derived, *self.stage_cache.nodes, *turned])
         return [f"{line};" for line in writer.statements(targets)], writer
 
 
 def repeats(plan: SolvePlan) -> bool:
-    """True if a whole turn of any angle changes nothing: all stand in sines and cosines, but where one is another.
+    """Return True if a whole turn of any angle changes nothing.
 
-    A gear or a coupling of angles tells how often they have turned: such a plan is not taken to repeat.
+    That holds if angles occur in sines and cosines only, or are equal to other angles up to a constant. A plan with a
+    gear or a coupling of angles does not repeat: its poses depend on the number of turns.
     """
     angles = {name for block in plan.blocks for name in block.coordinates if name.endswith(".phi")}
     angles |= {driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"}
 
     def is_turned(node: Node) -> bool:
-        """An angle, and no more than constants added to it."""
+        """Return True for an angle to which at most constants are added."""
         while node.op in ("+", "-") and node.args[1].constant is not None:
             node = node.args[0]
         while node.op == "+" and node.args[0].constant is not None:

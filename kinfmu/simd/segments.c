@@ -1,4 +1,4 @@
-/* Segments: what is known of the motion between nodes. See segments.h. */
+/* Segments: polynomials of the motion between nodes. See segments.h. */
 #include "segments.h"
 
 #include <stdlib.h>
@@ -61,7 +61,7 @@ static void read_bridge(kf_window *window, const kf_bridge *bridge, const kf_spa
     }
 }
 
-/* Windows of the bridges that a pose has met on its way. */
+/* Add the windows of the bridges on the path of a pose. */
 static void collect(kf_segments *segments, const kf_solver *solver, const kf_pose *pose)
 {
     const kf_singularity_map *const map = &KF_POOL(solver)->maps[pose->map < 0 ? 0 : pose->map];
@@ -134,7 +134,7 @@ static void join(const kf_node *a, const kf_node *middle, const kf_node *b, doub
 }
 
 /* Follow nodes from the anchor in one direction, up to segment `last` or as far as poses can be reached: true if all can.
- * nodes: room for four; the first and the last one stand there afterwards.
+ * nodes: an array of four; afterwards its first and last items are the first and last nodes.
  */
 static bool lay(kf_segments *segments, kf_follower *follower, int64_t last, kf_node nodes[4])
 {
@@ -158,7 +158,7 @@ static bool lay(kf_segments *segments, kf_follower *follower, int64_t last, kf_n
     return true;
 }
 
-static bool make_room(kf_segments *segments, int64_t first, int64_t last)
+static bool allocate(kf_segments *segments, int64_t first, int64_t last)
 {
     segments->first = first;
     segments->count = last - first;
@@ -168,7 +168,7 @@ static bool make_room(kf_segments *segments, int64_t first, int64_t last)
     return segments->segments != NULL;
 }
 
-/* True if the mechanism is after a turn of the driver as it was before, but for whole turns of its angles. */
+/* True if the mechanism is after a turn of the driver as before, but for whole turns of its angles. */
 static bool is_repeated(kf_segments *segments, const kf_node *a, const kf_node *b)
 {
     int k;
@@ -226,12 +226,12 @@ bool kf_segments_lay(kf_segments *segments, kf_follower *follower, int64_t count
     low = (low - kf_anchor_u[0]) / width;
     high = (high - kf_anchor_u[0]) / width;
     segments->repeats = KF_REPEATS && kf_driver_is_angle[0] && high - low > SEGMENTS && done
-        && make_room(segments, 0, SEGMENTS) && lay(segments, follower, SEGMENTS, nodes)
+        && allocate(segments, 0, SEGMENTS) && lay(segments, follower, SEGMENTS, nodes)
         && is_repeated(segments, &nodes[0], &nodes[3]);
     if (done && !segments->repeats) {
         low = floor(fmax(low, -most));
         high = ceil(fmin(high, most));
-        done = make_room(segments, (int64_t)low, (int64_t)(high > low ? high : low + 1.0));
+        done = allocate(segments, (int64_t)low, (int64_t)(high > low ? high : low + 1.0));
         if (done) {
             lay(segments, follower, (int64_t)high, nodes);
             lay(segments, follower, (int64_t)low, nodes);
@@ -252,7 +252,7 @@ double kf_turns_after(const kf_segments *segments, double u)
     return segments->repeats && fabs(u) < KF_FARTHEST * kf_reach[0] ? floor((u - kf_anchor_u[0]) / TURN) : 0.0;
 }
 
-/* Lanes from..to (excluded), all in one segment, KF_VECTOR at a time; those past the last one are written over. */
+/* Predict lanes from..to (excluded), all in one segment, KF_VECTOR at a time; lanes past the last one are overwritten. */
 static void predict_within(const kf_segments *segments, const kf_segment *segment, double turns, const double *u, int from,
                            int to, kf_lanes *lanes)
 {
@@ -321,7 +321,7 @@ void kf_predict(const kf_segments *segments, const double *u, kf_lanes *lanes, i
         own[i] = 0.0;
     }
     number[KF_LANES] = NAN;
-    for (i = 0; i < KF_LANES; ++i) { /* without a branch that would often be foreseen wrongly */
+    for (i = 0; i < KF_LANES; ++i) { /* without a branch, which would often be mispredicted */
         ends[pieces] = i + 1;
         pieces += number[i] != number[i + 1];
     }

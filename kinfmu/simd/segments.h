@@ -1,12 +1,12 @@
-/* Segments: what is known of the motion between nodes, by which samples are predicted.
+/* Segments: polynomials of the motion between nodes, by which samples are predicted.
  *
  * With one driver the motion is a function of the driver value, as far as the branch of the anchor reaches. Poses at equal
  * distances, the nodes, are followed from the anchor once. Three of them in a row are a segment: within it the polynomial
- * through values, slopes and curvatures of the unknowns predicts every sample. Around singular points the windows of bridges
- * do.
+ * through values, slopes and curvatures of the unknowns predicts every sample. Around singular points, the windows of
+ * bridges predict.
  *
- * Where the driver is an angle, all angles stand in sines and cosines, and the mechanism is after one turn as it was but for
- * whole turns of its angles, the nodes of one turn serve all.
+ * If the driver is an angle, all angles occur in sines and cosines only, and the mechanism is after one turn as before but
+ * for whole turns of its angles, the nodes of one turn serve all turns.
  */
 #ifndef KF_SEGMENTS_H
 #define KF_SEGMENTS_H
@@ -19,7 +19,7 @@
 #define KF_TERMS 9         /* of a segment's polynomials: three nodes with three conditions */
 #define KF_WINDOW_TERMS 12 /* of a window's: four nodes */
 #define KF_WINDOWS 64      /* the first ones; samples in others are solved alone */
-#define KF_FARTHEST 1e5    /* [rad, sizes]: beyond, the rounding of the angle is lost in lanes */
+#define KF_FARTHEST 1e5    /* [rad, sizes]: lanes do not resolve the rounding of larger angles */
 
 /* Unknowns are base + c[0] x + c[1] x^2 ... with x from -1 to 1, and x = 0 at the centre. sine, cosine: of the angles there,
  * that of the driver last. is_steep: the angle changes by more than pi/4.
@@ -41,8 +41,8 @@ typedef struct {
     bool held[KF_ROOM(KF_BLOCKS)];
 } kf_window;
 
-/* From number `first` on, in steps of `width` from the anchor; those of one turn if the mechanism repeats, and `raised` tells
- * by how many turns the unknowns grow in one.
+/* From number `first` on, in steps of `width` from the anchor; those of one turn if the mechanism repeats; raised: turns by
+ * which the unknowns grow in one turn.
  */
 typedef struct {
     kf_segment *segments;
@@ -54,7 +54,7 @@ typedef struct {
     int window_count;
 } kf_segments;
 
-/* Lay segments for driver values (count) from the anchor of the follower's solver; false if there is no memory. */
+/* Compute segments for driver values (count) from the anchor of the follower's solver; false if there is no memory. */
 bool kf_segments_lay(kf_segments *segments, kf_follower *follower, int64_t count, const double *u);
 void kf_segments_free(kf_segments *segments);
 

@@ -6,18 +6,18 @@
 #include "sweeping.h"
 #include "internal.h"
 
-#define SURE 0.05           /* determinant from which samples may be solved here: it leaves nine digits of qdd */
-#define MOST_MOVED 1e-3     /* correction beyond which one does not arrive, nor rotations do */
-#define CLOSED 1e-30        /* squared residual of what has arrived, for angles of some radians */
+#define SURE 0.05           /* determinant from which lanes may solve samples: nine digits of qdd remain */
+#define MOST_MOVED 1e-3     /* largest correction for which one Newton step and the rotations suffice */
+#define CLOSED 1e-30        /* squared residual of a closed pose, for angles of some radians */
 #define SOME 40.0           /* [rad^2, sizes^2]; those of a turn, squared */
-#define SETTLED 1e-7        /* second correction up to which a residual is what rounding of far angles leaves */
-#define BRIDGED 1e-24       /* squared residual of what closes in a window */
-#define MOST_CACHED 4000000 /* [bytes] of tables up to which they go through the caches */
-#define FEWEST 8            /* samples in a window that are worth lanes */
+#define SETTLED 1e-7        /* second correction up to which the residual is rounding of large angles */
+#define BRIDGED 1e-24       /* squared residual of a closed pose in a window */
+#define MOST_CACHED 4000000 /* [bytes] largest tables written through the caches */
+#define FEWEST 8            /* samples in a window from which lanes are used */
 
 #if KF_HAS_LANES
 
-/* Room for lanes; false if there is no memory. */
+/* Allocate the lanes; false if there is no memory. */
 bool kf_lanes_made(kf_sweep *sweep)
 {
     kf_lanes *const lanes = sweep->lanes = sweep->lanes == NULL ? calloc(1, sizeof *lanes) : sweep->lanes;
@@ -30,13 +30,13 @@ bool kf_lanes_made(kf_sweep *sweep)
     return lanes != NULL;
 }
 
-/* Columns that are streamed: outcomes, residuals, then those of the tables. */
+/* The streamed column of an output: after outcomes and residuals. */
 static kf_column *column_of(kf_sweep *sweep, int order, int output)
 {
     return &sweep->columns[2 + order * KF_OUTPUTS + output];
 }
 
-/* Numbers of eight bytes to their place in the caller's arrays; column: NULL if they go through the caches. */
+/* Write numbers of eight bytes to the caller's arrays; column: NULL to write through the caches. */
 static void write(kf_column *column, void *to, const void *from, int count, bool is_first)
 {
     if (column != NULL) {
@@ -52,7 +52,7 @@ static bool is_by_samples(const kf_table *table)
     return table->column == 1 && table->row == KF_OUTPUTS;
 }
 
-/* Numbers that lanes will need soon, on their way from memory. */
+/* Prefetch numbers that lanes will need soon. */
 static void fetch(const double *from)
 {
 #if defined(__GNUC__)
@@ -65,8 +65,8 @@ static void fetch(const double *from)
 #endif
 }
 
-/* Where an output of lanes stands. */
-static const double *standing(const kf_lanes *lanes, int order, int output)
+/* The lanes of an output. */
+static const double *output_lanes(const kf_lanes *lanes, int order, int output)
 {
     static const int *const places[3] = {kf_outputs_places, kf_rates_places, kf_accelerations_places};
     const int place = places[order][output];
@@ -88,7 +88,7 @@ static void fill(kf_sweep *sweep, const kf_job *job, int order, int64_t start, b
     to = table->start + (ptrdiff_t)start * table->row;
     if (is_by_samples(table)) {
         for (k = 0; k < KF_OUTPUTS; ++k) {
-            const double *const from = standing(lanes, order, k);
+            const double *const from = output_lanes(lanes, order, k);
             for (i = 0; i < KF_LANES; ++i) {
                 rows[i * KF_OUTPUTS + k] = from[i];
             }
@@ -97,7 +97,7 @@ static void fill(kf_sweep *sweep, const kf_job *job, int order, int64_t start, b
         return;
     }
     for (k = 0; k < KF_OUTPUTS; ++k, to += table->column) {
-        const double *const from = standing(lanes, order, k);
+        const double *const from = output_lanes(lanes, order, k);
         if (table->row == 1) {
             write(streams ? column_of(sweep, order, k) : NULL, to, from, KF_LANES, start == 0);
             continue;
@@ -108,7 +108,7 @@ static void fill(kf_sweep *sweep, const kf_job *job, int order, int64_t start, b
     }
 }
 
-/* True if tables are larger than the caches, and numbers in them stand where numbers may be streamed to. */
+/* True if tables are larger than the caches, and aligned so that numbers may be streamed to them. */
 static bool does_stream(const kf_job *job)
 {
     bool is_aligned = true;
@@ -119,7 +119,7 @@ static bool does_stream(const kf_job *job)
     return is_aligned && job->count * (int64_t)sizeof(double) * (3 * KF_OUTPUTS) > MOST_CACHED;
 }
 
-/* What was streamed stands in the arrays, up to sample `end`. */
+/* Complete what was streamed, up to sample `end`. */
 static void finish(kf_sweep *sweep, const kf_job *job, int64_t end)
 {
     int k, order;
@@ -143,14 +143,14 @@ static bool has_motion(const kf_job *job)
     return job->tables[1].start != NULL || job->tables[2].start != NULL;
 }
 
-/* What a residual's square may be at most, however far the driver is. */
+/* The largest squared residual, for every driver value. */
 static double square_of_tolerance(const kf_sweep *sweep)
 {
     const double tolerance = sweep->follower.solver.tolerance;
     return tolerance * tolerance;
 }
 
-/* Correct and check what is predicted at driver values u: how many passes it took. alone[i]: in doubt. */
+/* Correct and check the predictions at driver values u; returns the number of passes. alone[i]: for the solver. */
 static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
 {
     const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
@@ -175,7 +175,7 @@ static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
         if (open == 0 || passes == 2) {
             return passes;
         }
-        for (k = 0; k < KF_UNKNOWNS; ++k) { /* once more for all if one of them has not arrived */
+        for (k = 0; k < KF_UNKNOWNS; ++k) { /* once more for all if one has not converged */
             memcpy(lanes->z[k], lanes->x[k], sizeof lanes->x[k]);
         }
     }
@@ -241,7 +241,7 @@ bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start)
     return true;
 }
 
-/* Samples in a window, KF_LANES at most; those that do not close are kept for later. */
+/* Solve samples in a window, KF_LANES at most; those that do not close are left for later. */
 static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *window, const kf_left *samples, int count)
 {
     const double per_square = 1.0 / (kf_reach[0] * kf_reach[0]);
@@ -272,13 +272,13 @@ static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *windo
             is_good = is_good && fabs(lanes->watches[k][i]) <= tolerance;
         }
         if (!is_good) {
-            sweep->alone.samples[sweep->alone.count++] = samples[i]; /* where it or one before it stood */
+            sweep->alone.samples[sweep->alone.count++] = samples[i]; /* in its own place or an earlier one */
             continue;
         }
         for (order = 0; order < 3; ++order) {
             const kf_table *const table = &job->tables[order];
             for (j = 0; j < KF_OUTPUTS && table->start != NULL; ++j) {
-                table->start[(ptrdiff_t)sample * table->row + j * table->column] = standing(lanes, order, j)[i];
+                table->start[(ptrdiff_t)sample * table->row + j * table->column] = output_lanes(lanes, order, j)[i];
             }
         }
         job->outcomes[sample] = (kf_outcome){KF_BRIDGED, 1};
@@ -289,7 +289,7 @@ static void solve_in_window(kf_sweep *sweep, kf_job *job, const kf_window *windo
     }
 }
 
-/* Those of the samples left that lie in windows of bridges, side by side. */
+/* Solve in lanes the samples left that lie in windows of bridges. */
 void kf_in_windows(kf_sweep *sweep, kf_job *job)
 {
     kf_list *const alone = &sweep->alone;

@@ -1,4 +1,4 @@
-/* Streaming: numbers written past the caches, where tables are larger than these and would be fetched only to be overwritten. */
+/* Streaming: numbers written past the caches, for tables larger than these, which would be fetched only to be overwritten. */
 #ifndef KF_STREAM_H
 #define KF_STREAM_H
 
@@ -14,7 +14,7 @@
 
 #define KF_LINE 8 /* numbers in a line of the caches */
 
-/* A line of numbers to a place that is aligned to it. */
+/* Write a line of numbers to an aligned place. */
 static inline void kf_stream_line(double *to, const double *from)
 {
 #if defined(__AVX512F__)
@@ -32,18 +32,18 @@ static inline void kf_stream_line(double *to, const double *from)
 #endif
 }
 
-/* A column that is streamed piece after piece: what came last, of which up to a line is still to be written. */
+/* A column that is streamed piece after piece: its last numbers, of which less than a line is still to be written. */
 typedef struct {
     double last[KF_LINE];
 } kf_column;
 
-/* The numbers between the line that `to` stands in and `to`. */
+/* How many numbers of its cache line are before `to`. */
 static inline int kf_odd(const void *to)
 {
     return (int)((uintptr_t)to / sizeof(double) % KF_LINE);
 }
 
-/* The next piece of a column: whole lines, the first one with what the last piece left. count: of whole lines too. */
+/* Write the next piece of a column in whole lines, the first with what the last piece left. count: of whole lines too. */
 static inline void kf_stream(kf_column *column, double *to, const double *from, int count, bool is_first)
 {
     const int odd = kf_odd(to), lead = odd == 0 ? 0 : KF_LINE - odd;
@@ -62,14 +62,14 @@ static inline void kf_stream(kf_column *column, double *to, const double *from, 
     memcpy(column->last, from + count - KF_LINE, sizeof column->last);
 }
 
-/* What the last piece left, up to where the next one would stand. */
+/* Write what the last piece left, up to the place of the next one. */
 static inline void kf_stream_rest(const kf_column *column, void *to)
 {
     const int odd = kf_odd(to);
     memcpy((double *)to - odd, column->last + KF_LINE - odd, (size_t)odd * sizeof(double));
 }
 
-/* What was streamed stands before what is written from now on. */
+/* Order the streamed writes before all later ones. */
 static inline void kf_stream_end(void)
 {
 #if defined(__AVX512F__) || defined(__AVX__) || defined(__SSE2__)

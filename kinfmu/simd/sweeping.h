@@ -1,4 +1,4 @@
-/* What the files of a sweep know of each other; nothing here is for others. */
+/* Declarations shared by the files of a sweep, and by no others. */
 #ifndef KF_SWEEPING_H
 #define KF_SWEEPING_H
 
@@ -6,7 +6,7 @@
 #include "stream.h"
 #include "sweep.h"
 
-/* A sample that is left for later: at driver value u, `turns` before where it lies. */
+/* A sample left for later; u: its driver value less `turns` turns. */
 typedef struct {
     double u, turns;
     int64_t sample;
@@ -14,7 +14,7 @@ typedef struct {
 
 typedef struct {
     kf_left *samples;
-    int64_t count, room;
+    int64_t count, capacity;
 } kf_list;
 
 struct kf_sweep {

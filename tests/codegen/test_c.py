@@ -196,7 +196,7 @@ def fresh(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 def test_without_a_compiler_one_line_says_what_would_bring_one(fresh: Callable[[str], None], tmp_path: Path) -> None:
     fresh(str(tmp_path))
-    with pytest.raises(CompilerError, match=r"no C compiler: neither cc, gcc nor clang is there; pip install 'kinfmu"):
+    with pytest.raises(CompilerError, match=r"no C compiler: cc, gcc and clang are not found; pip install 'kinfmu"):
         compiler.command()
     compiler.command.cache_clear()
 

@@ -33,7 +33,7 @@ def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     def command() -> tuple[str, ...]:
-        raise CompilerError("no C compiler: neither cc, gcc nor clang is there")
+        raise CompilerError("no C compiler: cc, gcc and clang are not found")
 
     monkeypatch.setattr(compiler, "command", command)
 
@@ -60,7 +60,7 @@ def test_without_a_compiler_it_is_python_and_the_command_states_why(tmp_path: Pa
     assert ", python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, " in result.stdout
     assert result.stderr == (
         "a native FMU, which every host can load, is not possible here: "
-        "no C compiler: neither cc, gcc nor clang is there\n"
+        "no C compiler: cc, gcc and clang are not found\n"
     )
     assert not _is_native(tmp_path / "fourbar.fmu")
     assert not _is_native(kinfmu.build(kinfmu.load("fourbar"), tmp_path / "again.fmu"))

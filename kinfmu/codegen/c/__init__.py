@@ -1,4 +1,4 @@
-"""C source from the plan: the model of a mechanism, and the run time that is the same for every mechanism."""
+"""C source from a plan: the model of a mechanism, with the run time common to all mechanisms."""
 
 from __future__ import annotations
 

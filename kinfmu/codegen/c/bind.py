@@ -7,12 +7,12 @@ from kinfmu.codegen.c.text import FUNCTIONS, function, string
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.solver.python.continuation import NO_NUMBER
 
-_BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room)"
+_BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"
 _HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
 
 
 def bind(parts: Parts) -> list[str]:
-    """The function: true if all that follows from the parameters is finite and the plan's conditions hold."""
+    """Return kf_bind: true if all that follows from the parameters is finite and the plan's conditions hold."""
     derived, conditions = parts.derived, parts.plan.conditions
     writer = Writer(parts.names, (), derived)
     known = [f"{line};" for line in writer.statements([*derived, *(condition.node for condition in conditions)])]
@@ -30,15 +30,15 @@ def bind(parts: Parts) -> list[str]:
         terms.insert(0, "total")
     if terms:
         lines += _refused_unless(f"{' + '.join(terms)} < INFINITY", string(NO_NUMBER))
-    for number, (name, _, meant) in zip(numbers, conditions, strict=True):
-        told = string(f"{name.replace('%', '%%')} = %.15g must be {meant}")
-        lines += _refused_unless(_HOLDS[meant].format(number), f"{told}, {number}")
+    for number, (name, _, required) in zip(numbers, conditions, strict=True):
+        message = string(f"{name.replace('%', '%%')} = %.15g must be {required}")
+        lines += _refused_unless(_HOLDS[required].format(number), f"{message}, {number}")
     variables = ("double total = 0.0;", "int k;") if derived else ()
-    return function(_BIND, [*lines, "return true;"], ("model", "parameters", "why", "room"), variables)
+    return function(_BIND, [*lines, "return true;"], ("model", "parameters", "why", "size"), variables)
 
 
-def _refused_unless(condition: str, told: str) -> list[str]:
-    return [f"if (!({condition})) {{", f"    snprintf(why, room, {told});", "    return false;", "}"]
+def _refused_unless(condition: str, message: str) -> list[str]:
+    return [f"if (!({condition})) {{", f"    snprintf(why, size, {message});", "    return false;", "}"]
 
 
 _DRIVE = """\

@@ -34,17 +34,17 @@ _ZIG = (sys.executable, "-m", "ziglang", "cc")
 
 
 def sources(names: Sequence[str]) -> dict[str, str]:
-    """Texts of files of the run time, by name."""
+    """Return the texts of files of the run time, by name."""
     return {name: (RUNTIME / name).read_text("utf-8") for name in names}
 
 
 def runtime() -> dict[str, str]:
-    """Texts of all files of the run time, by name."""
+    """Return the texts of all files of the run time, by name."""
     return sources(sorted(path.name for path in RUNTIME.iterdir() if path.suffix in (".c", ".h")))
 
 
 def units(files: Mapping[str, str]) -> list[str]:
-    """Names of the C files to be compiled, in order: all but headers and what another one includes."""
+    """Return the names of the C files to compile, in order: all but headers and files that another one includes."""
     included = {name for text in files.values() for name in _included(text)}
     return sorted(name for name in files if name.endswith(".c") and name not in included)
 
@@ -52,17 +52,28 @@ def units(files: Mapping[str, str]) -> list[str]:
 def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
     """Return a shared library of C files (and the headers that they include), by name; compile it if it is not cached.
 
-    target: a platform in zig's words, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
-    CompilerError if there is no compiler, if it fails, or if the cache cannot be used.
+    Args:
+        files: Texts by file name.
+        flags: Flags of the compiler, after FLAGS.
+        target: A platform as zig names it, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
+
+    Returns:
+        The path of the library in the cache.
+
+    Raises:
+        CompilerError: There is no compiler, it fails, or the cache cannot be used.
+
     """
     build = _Build(files, flags, target)
     return library_cache.find(build.key, build.suffix) or library_cache.store(build.key, build.suffix, build.compile())
 
 
 def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> bytes:
-    """Return the content of such a library, also where the cache cannot be used.
+    """Return the content of a library as `shared_library` compiles it, also if the cache cannot be used.
 
-    CompilerError if there is no compiler, or if it fails.
+    Raises:
+        CompilerError: There is no compiler, or it fails.
+
     """
     build = _Build(files, flags, target)
     with suppress(CompilerError, OSError):
@@ -76,7 +87,12 @@ def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), ta
 
 
 def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
-    """Load a shared library of C files. CompilerError as in shared_library, or if the system refuses to load it."""
+    """Load a shared library of C files.
+
+    Raises:
+        CompilerError: As in `shared_library`, or the system refuses to load it.
+
+    """
     path = shared_library(files, flags)
     try:
         return ctypes.CDLL(str(path))
@@ -87,7 +103,7 @@ def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
 
 
 class _Build:
-    """What is compiled, by which compiler with which flags; key: what identifies the result."""
+    """Files, compiler and flags of one compilation; key: identifies the result."""
 
     def __init__(self, files: Mapping[str, str], flags: Sequence[str], target: str | None) -> None:
         self._files = files
@@ -110,20 +126,25 @@ class _Build:
 
 
 def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
-    """Run a compiler on C files; CompilerError with its first complaint if it fails."""
+    """Run a compiler on C files.
+
+    Raises:
+        CompilerError: It fails; the message has its first error.
+
+    """
     with tempfile.TemporaryDirectory() as scratch:
         for name, text in files.items():
             (Path(scratch) / name).write_text(text, "utf-8", newline="\n")
         names = units(files)
         libraries = [] if os.name == "nt" else ["-lm"]
-        if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles side by side itself
+        if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles in parallel itself
             _run([[*compiler, *flags, "-c", *share] for share in _shares(files, names, os.cpu_count() or 1)], scratch)
             names = [f"{name.removesuffix('.c')}.o" for name in names]
         _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
 
 
 def _shares(files: Mapping[str, str], names: Sequence[str], count: int) -> list[list[str]]:
-    """C files in so many shares, or fewer, of about the same length: the longest first, each to the shortest share."""
+    """Return C files in at most `count` shares of about equal length: the longest first, each to the shortest share."""
     whole = {name: _length(files, name) for name in names}
     shares: list[list[str]] = [[] for _ in range(min(count, len(names)))]
     for name in sorted(names, key=lambda name: (-whole[name], name)):
@@ -132,47 +153,57 @@ def _shares(files: Mapping[str, str], names: Sequence[str], count: int) -> list[
 
 
 def _length(files: Mapping[str, str], name: str) -> int:
-    """Of a C file with what it includes of other C files."""
+    """Return the length of a C file with the C files that it includes."""
     return len(files[name]) + sum(_length(files, one) for one in _included(files[name]))
 
 
 def _included(text: str) -> list[str]:
-    """The C files that a C file includes."""
+    """Return the C files that a C file includes."""
     return re.findall(r'^#include "(\w+\.c)"', text, re.MULTILINE)
 
 
 def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
-    """Run compilers side by side; CompilerError with the first complaint if one fails."""
+    """Run compilers in parallel; raise a CompilerError with the first error if one fails."""
     running = [
         subprocess.Popen(  # noqa: S603  a compiler that we looked up, on sources of our own
             command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8"
         )
         for command in commands
     ]
-    told = [process.communicate()[1] for process in running]
-    for process, command, text in zip(running, commands, told, strict=True):
+    outputs = [process.communicate()[1] for process in running]
+    for process, command, text in zip(running, commands, outputs, strict=True):
         if process.returncode != 0:
-            lines = text.splitlines() or ["no word of why"]
+            lines = text.splitlines() or ["it gives no reason"]
             complaint = next((line for line in lines if "error" in line), lines[0])
             raise CompilerError(f"{command[0]} cannot compile the generated C: {complaint}")
 
 
 @cache
 def command() -> tuple[str, ...]:
-    """What CC names, cc, gcc, clang, or zig's from the extra `native`; CompilerError if none is there."""
-    named = os.environ.get("CC")
-    for name in [named] if named else ["cc", "gcc", "clang"]:
+    """Return the compiler: what CC names, else cc, gcc, clang, or zig's from the extra `native`.
+
+    Raises:
+        CompilerError: None is found.
+
+    """
+    wanted = os.environ.get("CC")
+    for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
         found = shutil.which(name)
         if found:
             return (found,)
     if find_spec("ziglang") is not None:
         return _ZIG
-    looked = f"CC names {named!r}, which is not there" if named else "neither cc, gcc nor clang is there"
-    raise CompilerError(f"no C compiler: {looked}; pip install 'kinfmu[native]' brings one")
+    reason = f"CC names {wanted!r}, which is not found" if wanted else "cc, gcc and clang are not found"
+    raise CompilerError(f"no C compiler: {reason}; pip install 'kinfmu[native]' brings one")
 
 
 def zig(target: str) -> tuple[str, ...]:
-    """Zig's compiler for a platform; CompilerError if it is not installed."""
+    """Return zig's compiler for a platform.
+
+    Raises:
+        CompilerError: Zig is not installed.
+
+    """
     if find_spec("ziglang") is None:
         raise CompilerError("compiling for other platforms needs ziglang; pip install 'kinfmu[native]'")
     return (*_ZIG, "-target", target)
@@ -194,7 +225,7 @@ def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
 
 @cache
 def _processor() -> str:
-    """What -march=native compiles for: the processor's features where the system tells them."""
+    """Return what -march=native compiles for: the processor's features where the system lists them."""
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     except OSError:

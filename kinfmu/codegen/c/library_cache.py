@@ -32,8 +32,13 @@ for _flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # those tha
 
 
 def find(key: str, suffix: str) -> Path | None:
-    """Return the stored library of a key, checked, or None. CompilerError if the folder is not private."""
-    with _refused() as folder:
+    """Return the stored library of a key, checked, or None.
+
+    Raises:
+        CompilerError: The folder is not private.
+
+    """
+    with _private_folder() as folder:
         for path in sorted(folder.glob(f"{key}-*{suffix}")):
             if _is_intact(path, path.name.removeprefix(f"{key}-").removesuffix(suffix)):
                 return path
@@ -43,8 +48,13 @@ def find(key: str, suffix: str) -> Path | None:
 
 
 def store(key: str, suffix: str, data: bytes) -> Path:
-    """Write a library and return its path. CompilerError if the folder is not private or cannot be written."""
-    with _refused() as folder:
+    """Write a library and return its path.
+
+    Raises:
+        CompilerError: The folder is not private or cannot be written.
+
+    """
+    with _private_folder() as folder:
         _remove_stale(folder)
         path = folder / f"{key}-{hashlib.sha256(data).hexdigest()}{suffix}"
         descriptor, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=folder)
@@ -78,8 +88,8 @@ def cache_folder() -> Path:
 
 
 @contextmanager
-def _refused() -> Iterator[Path]:
-    """Give the folder, made private; turn what the system refuses there into a CompilerError."""
+def _private_folder() -> Iterator[Path]:
+    """Yield the folder, made private; turn errors of the system in it into a CompilerError."""
     folder = cache_folder()
     try:
         folder.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
@@ -132,7 +142,7 @@ def _is_intact(path: Path, digest: str) -> bool:
 
 
 def _remove_stale(folder: Path) -> None:
-    """Remove what killed processes left unfinished."""
+    """Remove unfinished files of killed processes."""
     for path in folder.glob(".*.part"):
         with suppress(OSError):
             if time.time() - path.lstat().st_mtime > STALE:

@@ -1,6 +1,6 @@
-"""SolvePlan -> C: model.c, the formulas of a mechanism, and sizes.h, how many there are of what.
+"""SolvePlan -> C: model.c, the formulas of a mechanism, and sizes.h, the sizes of its arrays.
 
-The same plan gives the same bytes. What the functions mean is told in solver/c/kinfmu.h.
+The same plan gives the same bytes. The functions are described in solver/c/kinfmu.h.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from kinfmu.plan import SolvePlan
 
 
 def emit(plan: SolvePlan) -> dict[str, str]:
-    """Texts of sizes.h and model.c, by file name."""
+    """Return the texts of sizes.h and model.c, by file name."""
     parts = Parts(plan)
     model = _model(parts)
     return {"sizes.h": _sizes(parts), "model.c": model}
 
 
 def _model(parts: Parts) -> str:
-    """model.c."""
-    reading = readers(parts)  # before the units, which learn from them what to hand on
+    """Return model.c."""
+    reading = readers(parts)  # before the units: they fill the stage cache
     lines = [
         f"/* Kinematics of {parts.plan.mechanism.name}: generated from its mechanism, not for editing. */",
         '#include "kinfmu.h"',
@@ -40,13 +40,13 @@ def _model(parts: Parts) -> str:
         *drive(parts),
         *bind(parts),
         *stages(parts),
-        *parts.handed_on.placed(reading),
+        *parts.stage_cache.placed(reading),
     ]
     return "\n".join(lines) + "\n"
 
 
 def _sizes(parts: Parts) -> str:
-    """sizes.h, once model.c is written."""
+    """Return sizes.h; to be called after `_model`, which fills the stage cache."""
     plan, solved = parts.plan, parts.solved
     counts = {
         "DRIVERS": len(plan.drivers),
@@ -56,7 +56,7 @@ def _sizes(parts: Parts) -> str:
         "COORDINATES": len(parts.order),
         "BLOCKS": len(solved),
         "ROWS": sum(len(block.residuals) for block in solved),
-        "HOLD": len(parts.handed_on),
+        "HOLD": len(parts.stage_cache),
         "OUTPUTS": len(plan.outputs_motion),
         "WATCHES": len(plan.watches),
         "FIXED": len(plan.fixed_nodes),

@@ -1,8 +1,8 @@
-"""What the functions of a model are written from: units of each kind, names, curves, and what units hand on."""
+"""The parts of a model in C: the units of each kind, names, curves and the stage cache."""
 
 from __future__ import annotations
 
-from kinfmu.codegen.c.stage_cache import HandedOn
+from kinfmu.codegen.c.stage_cache import StageCache
 from kinfmu.codegen.c.text import FUNCTIONS
 from kinfmu.codegen.c.units import Units
 from kinfmu.codegen.lists import Lists
@@ -12,7 +12,7 @@ from kinfmu.solver.python.curve import CurveData
 
 
 class Parts(Lists):
-    """The parts of a plan's model in C.
+    """The parts of a plan's model in C, from which its functions are written.
 
     curves: names of the constants that hold the data of curves; solved: the blocks that need Newton; units: by the
     label of their kind.
@@ -25,4 +25,4 @@ class Parts(Lists):
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves, FUNCTIONS)
         self.solved = [block for block in plan.blocks if block.unknowns]
         self.units = {k: Units(kind, self.curves, self.parameters, self.derived) for k, kind in self.kinds.items()}
-        self.handed_on = HandedOn(self, self.units)
+        self.stage_cache = StageCache(self, self.units)

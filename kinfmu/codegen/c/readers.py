@@ -1,4 +1,4 @@
-"""Functions that read a pose: outputs, their rates and accelerations, rows set aside; and what no pose changes."""
+"""Functions that read a pose: outputs, their rates and accelerations, watches; and the fixed coordinates."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _ALONE = (((0, ""),), ((1, "v"),), ((2, "(v * v)"), (1, "a")))  # sums of deriva
 
 
 def readers(parts: Parts) -> list[str]:
-    """All of them."""
+    """Return all of them."""
     return [*(line for order in range(3) for line in _outputs(parts, order)), *_watches(parts), *_fixed(parts)]
 
 
 def _outputs(parts: Parts, order: int) -> list[str]:
-    """The function of the outputs of an order: some stand in a list, others are formulas.
+    """Return the function of the outputs of an order: some are items of a list, others are formulas.
 
     With one driver x1 and x2 are derivatives with respect to its value, and so are the formulas; of its speed v and
     acceleration a
@@ -34,7 +34,7 @@ def _outputs(parts: Parts, order: int) -> list[str]:
     nodes = {of: [node for node, _ in parts.outputs(of)] for of, _ in summed}
     places = [place for _, place in parts.outputs(order)]
     formulas = [k for k, place in enumerate(places) if place is None]
-    texts, lines = _written(parts, [nodes[of][k] for of, _ in summed for k in formulas])
+    texts, lines = _expressions(parts, [nodes[of][k] for of, _ in summed for k in formulas])
     is_copied = len(formulas) < len(places)
     if is_copied:
         place = f"kf_{out}_places[k]"
@@ -62,18 +62,18 @@ def _outputs(parts: Parts, order: int) -> list[str]:
 
 
 def _sum(terms: Iterable[tuple[str, str]]) -> str:
-    """'value * factor + ...'; a factor of one is left out."""
+    """Return 'value * factor + ...'; a factor of one is left out."""
     return " + ".join(f"{_wrapped(value)} * {factor}" if factor else value for value, factor in terms)
 
 
 def _wrapped(text: str) -> str:
-    """In brackets, unless it is a name or stands in a list."""
+    """Return the text in brackets, unless it is a name or an item of a list."""
     return text if text.isidentifier() or text.endswith("]") else f"({text})"
 
 
 def _watches(parts: Parts) -> list[str]:
     nodes = [node for _, node in parts.plan.watches]
-    texts, lines = _written(parts, nodes)
+    texts, lines = _expressions(parts, nodes)
     lines += [f"watches[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
     signature = "inline void kf_watches(const kf_model *model, const kf_found *found, double *watches)"
     return function(signature, lines, ("model", "found", "watches"))
@@ -81,28 +81,28 @@ def _watches(parts: Parts) -> list[str]:
 
 def _fixed(parts: Parts) -> list[str]:
     nodes = list(parts.plan.fixed_nodes.values())
-    texts, lines = _written(parts, nodes)
+    texts, lines = _expressions(parts, nodes)
     lines += [f"fixed[{k}] = {texts[node]};" for k, node in enumerate(nodes)]
     return function("void kf_fixed(const kf_model *model, double *fixed)", lines, ("model", "fixed"))
 
 
-def _written(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str], list[str]]:
-    """Each target as an expression, and the statements that come before."""
-    writer = Writer(parts.names, [*parts.derived, *parts.handed_on.nodes])
+def _expressions(parts: Parts, targets: Sequence[Node]) -> tuple[dict[Node, str], list[str]]:
+    """Return each target as an expression, and the statements that come before."""
+    writer = Writer(parts.names, [*parts.derived, *parts.stage_cache.nodes])
     statements = [f"{line};" for line in writer.statements(targets)]
     texts = {node: writer.expression(node) for node in targets}
     return texts, [*_loads(parts, writer.used), *statements]
 
 
 def _loads(parts: Parts, used: Iterable[Node]) -> list[str]:
-    """Assignments of what statements use of the model, of its pose and of the lists."""
-    listed = {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.stands(order).items()}
+    """Return assignments of what the statements read from the model, its pose and the lists."""
+    listed = {name: f"{_LISTS[order]}[{k}]" for order in range(3) for name, k in parts.places(order).items()}
     lines = []
     for node in used:
         if node in parts.derived:
             source = f"model->derived[{parts.derived[node]}]"
-        elif node in parts.handed_on.nodes:
-            source = f"found->hold[{parts.handed_on.place(node)}]"
+        elif node in parts.stage_cache.nodes:
+            source = f"found->hold[{parts.stage_cache.place(node)}]"
         elif is_parameter(node):
             source = f"model->parameters[{parts.parameters[node.name]}]"
         else:

@@ -1,7 +1,7 @@
-"""What units hand on: numbers of the position stage that later functions take, and do not compute again.
+"""The stage cache: numbers of the position stage that later functions read and do not compute again.
 
-Which these are shows when the later functions are written; only then is it known where each one stands. Until then its
-place is written '<3:7>': number 7 of what the units of run 3 hand on.
+Which numbers these are is known when the later functions are written; only then has each one its place. Until then a
+place is written '<3:7>': number 7 of those that a unit of run 3 keeps.
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Protocol
 
-from kinfmu.codegen.alike import Run
+from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import Lists
 from kinfmu.equations.graph import Node
 
 
 class Unit(Protocol):
-    """The functions of a kind of units, as far as they are looked at here."""
+    """The writer of a kind's functions, as the stage cache sees it."""
 
     @property
     def positions(self) -> Sequence[Node]:
         """Nodes of the position stage."""
 
-    def handed_on(self, node: Node) -> int:
-        """Place of a node among the numbers that a unit hands on, from now on if not before."""
+    def cached(self, node: Node) -> int:
+        """Return the place of a node among the numbers that a unit keeps; add it if it is new."""
 
-    def room(self) -> int:
-        """How many numbers a unit hands on."""
+    def cache_size(self) -> int:
+        """Return how many numbers a unit keeps."""
 
 
-class HandedOn:
-    """What the units of a plan hand on, run after run and unit after unit.
+class StageCache:
+    """The numbers that the units of a plan keep for later functions, run after run and unit after unit.
 
-    units: by the label of their kind; nodes: what functions of the whole model can take from a unit, with the number of
-    its run, a run of one: of several nobody can tell which one is meant.
+    units: by the label of their kind; nodes: those that functions of the whole model can read, with the number of their
+    run. Only runs of one unit have such nodes: in longer runs a node does not determine the unit.
     """
 
     def __init__(self, lists: Lists, units: Mapping[str, Unit]) -> None:
@@ -50,30 +50,30 @@ class HandedOn:
         }
 
     def place(self, node: Node) -> str:
-        """Where one of the nodes will stand."""
+        """Return the place of a node, to be filled in by `placed`."""
         number = self.nodes[node]
-        return f"<{number}:{self._unit(self._runs[number - 1]).handed_on(node)}>"
+        return f"<{number}:{self._unit(self._runs[number - 1]).cached(node)}>"
 
     def placed(self, lines: Iterable[str]) -> list[str]:
-        """Statements with the numbers of places that `place` told."""
+        """Return statements with numbers for the places that `place` returned."""
 
-        def told(match: re.Match[str]) -> str:
+        def number(match: re.Match[str]) -> str:
             return str(self._starts[int(match[1]) - 1] + int(match[2]))
 
-        return [re.sub(r"<(\d+):(\d+)>", told, line) for line in lines]
+        return [re.sub(r"<(\d+):(\d+)>", number, line) for line in lines]
 
     def start(self, number: int, k: str) -> str:
-        """Where the numbers of unit k of a run begin: '4 + k * 3'."""
-        start, room = self._starts[number - 1], self._unit(self._runs[number - 1]).room()
-        return f"{start}" if k == "0" else f"{start} + {k if k.isalnum() else f'({k})'} * {room}"
+        """Return where the numbers of unit k of a run begin: '4 + k * 3'."""
+        start, count = self._starts[number - 1], self._unit(self._runs[number - 1]).cache_size()
+        return f"{start}" if k == "0" else f"{start} + {k if k.isalnum() else f'({k})'} * {count}"
 
     def __len__(self) -> int:
         return self._starts[-1]
 
     @cached_property
     def _starts(self) -> list[int]:
-        """Where each run's numbers begin: known when all functions that take some are written."""
-        return [0, *accumulate(len(run.members) * self._unit(run).room() for run in self._runs)]
+        """Return where each run's numbers begin; known once all functions that read some are written."""
+        return [0, *accumulate(len(run.members) * self._unit(run).cache_size() for run in self._runs)]
 
-    def _unit(self, run: Run) -> Unit:
+    def _unit(self, run: UnitRun) -> Unit:
         return self._units[run.kind.label]

@@ -1,17 +1,17 @@
-"""Functions that go through the units: kf_solve_blocks, kf_velocity, kf_acceleration, kf_jacobian, kf_residuals."""
+"""Functions that loop over the units: kf_solve_blocks, kf_velocity, kf_acceleration, kf_jacobian, kf_residuals."""
 
 from __future__ import annotations
 
-from kinfmu.codegen.alike import Run
 from kinfmu.codegen.c.parts import Parts
 from kinfmu.codegen.c.text import function, repeated
+from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import LISTS
 
 _LOCALS = ("const double *const x = found->x;", "const double *const hold = found->hold;")
 
 
 def stages(parts: Parts) -> list[str]:
-    """All of them."""
+    """Return all of them."""
     return [
         *_positions(parts),
         *_rates(parts, "velocity", 1),
@@ -22,7 +22,7 @@ def stages(parts: Parts) -> list[str]:
 
 
 def _positions(parts: Parts) -> list[str]:
-    """kf_solve_blocks."""
+    """Return kf_solve_blocks."""
     calls: list[str] = []
     for number, run in parts.numbered():
         unit = _unit(parts, number, index(run))
@@ -47,7 +47,7 @@ def _positions(parts: Parts) -> list[str]:
 
 
 def _rates(parts: Parts, name: str, order: int) -> list[str]:
-    """kf_velocity or kf_acceleration."""
+    """Return kf_velocity or kf_acceleration."""
     out, driven = LISTS[order], "u" + "d" * order
     calls: list[str] = []
     for number, run in parts.numbered():
@@ -68,7 +68,7 @@ def _rates(parts: Parts, name: str, order: int) -> list[str]:
 
 
 def _entries(parts: Parts, name: str) -> list[str]:
-    """kf_jacobian or kf_residuals: numbers of one block."""
+    """Return kf_jacobian or kf_residuals: numbers of one block."""
     calls: list[str] = []
     for number, run in parts.numbered():
         if run.kind.solved:
@@ -84,15 +84,15 @@ def _entries(parts: Parts, name: str) -> list[str]:
 
 
 def _unit(parts: Parts, number: int, k: str) -> str:
-    """Arguments that stand for unit k of a run: its row, the positions, and what it hands on."""
-    return f"&run_{number}[{k}], x, hold + {parts.handed_on.start(number, k)}"
+    """Return the arguments for unit k of a run: its row, the positions, and its part of the stage cache."""
+    return f"&run_{number}[{k}], x, hold + {parts.stage_cache.start(number, k)}"
 
 
-def index(run: Run) -> str:
-    """k of a unit where a run is gone through."""
+def index(run: UnitRun) -> str:
+    """Return the index of a unit in a loop over its run; '0' for a run of one."""
     return "k" if len(run.members) > 1 else "0"
 
 
-def block_of(run: Run) -> str:
-    """Number of the solved block of unit k."""
+def block_of(run: UnitRun) -> str:
+    """Return the number of the solved block of unit k."""
     return f"{run.first} + k" if len(run.members) > 1 else f"{run.first}"

@@ -12,7 +12,7 @@ from kinfmu.solver.python.curve import CurveData
 
 
 def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
-    """What the solver reads of a model besides its functions; solved: the blocks that need Newton."""
+    """Return the tables that the solver reads from a model; solved: the blocks that need Newton."""
     anchor_u, anchor_z = plan.anchor_values
     kinds = [driver.quantity.kind for driver in plan.drivers]
     scales = [1.0 if name.endswith(".phi") else plan.size for name in plan.unknowns]
@@ -50,7 +50,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
 
 
 def curve_tables(curves: Mapping[CurveData, str]) -> list[str]:
-    """The data of curves, and the function that evaluates them."""
+    """Return the data of curves, and the function that evaluates them."""
     lines: list[str] = []
     for (breaks, pieces), reference in curves.items():
         name = reference.removeprefix("&")

@@ -11,7 +11,7 @@ FUNCTIONS = {"sin": "kf_sin", "cos": "kf_cos", "sincos": "kf_sincos"}  # of solv
 
 
 def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") -> list[str]:
-    """'head a, b, c tail' on as many lines as it takes."""
+    """Return 'head a, b, c tail', broken into lines."""
     lines, line = [], head
     for k, item in enumerate(items):
         piece = item if k == len(items) - 1 else f"{item},"
@@ -23,12 +23,12 @@ def wrapped(head: str, items: Sequence[str], tail: str, indent: str = "    ") ->
 
 
 def string(text: str) -> str:
-    """A string literal. Names are ASCII letters, digits, underscores and full stops: nothing is to be escaped."""
+    """Return a string literal. Names are ASCII letters, digits, underscores and full stops: nothing needs escaping."""
     return f'"{text}"'
 
 
 def array(declaration: str, items: Iterable[object]) -> list[str]:
-    """'const double a[2] = {1.0, 2.0};' of 'double a' and its items; without items there is room for one, zero."""
+    """Return 'const double a[2] = {1.0, 2.0};' for 'double a' and its items; an empty array has one item, zero."""
     texts = [repr(item) if isinstance(item, float) else str(item) for item in items]
     storage = "static const" if declaration.startswith("static ") else "const"
     declaration = declaration.removeprefix("static ")
@@ -36,33 +36,33 @@ def array(declaration: str, items: Iterable[object]) -> list[str]:
 
 
 def booleans(values: Iterable[object]) -> list[str]:
-    """C's words for what counts as true or false in Python."""
+    """Return 'true' or 'false' for each value."""
     return ["true" if value else "false" for value in values]
 
 
 def declared(names: Iterable[str]) -> list[str]:
-    """'double a, b;' of names, each once; nothing for no names."""
+    """Return 'double a, b;' for names, each once; no lines for no names."""
     unique = list(dict.fromkeys(names))
     return wrapped("double", unique, ";", "       ") if unique else []
 
 
 def assigned(lines: Iterable[str]) -> list[str]:
-    """Names that the statements of a function give values to."""
+    """Return the names that the statements of a function assign."""
     found = [re.match(r"\s*(\w+) = |\s*kf_sincos\(.*, &(\w+), &(\w+)\);", line) for line in lines]
     return [name for match in found if match for name in match.groups() if name]
 
 
 def indented(lines: Iterable[str]) -> list[str]:
-    """Lines one step further in."""
+    """Return the lines indented by one step."""
     return [f"    {line}" for line in lines]
 
 
 def function(
     signature: str, lines: Sequence[str], arguments: Iterable[str] = (), variables: Sequence[str] = ()
 ) -> list[str]:
-    """A function, and an empty line: what its statements assign is declared as double.
+    """Return a function and an empty line; names that its statements assign are declared as double.
 
-    arguments: names of those that it may do without, which is told where it does; variables: further declarations.
+    arguments: names of those that it may leave unused, marked as unused if so; variables: further declarations.
     """
     text = "\n".join([*variables, *lines])
     unused = [f"(void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
@@ -70,5 +70,5 @@ def function(
 
 
 def repeated(count: int, lines: Sequence[str]) -> list[str]:
-    """The lines, in a loop over k unless they are to be gone through once."""
+    """Return the lines, in a loop over k if the count is more than 1."""
     return list(lines) if count == 1 else [f"for (k = 0; k < {count}; ++k) {{", *indented(lines), "}"]

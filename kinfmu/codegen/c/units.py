@@ -1,20 +1,20 @@
-"""The C functions of a kind of units: what kinfmu.codegen.python.loops writes in Python.
+"""The C functions of a kind of units; kinfmu.codegen.python.loops writes the same in Python.
 
     position(model, row, x, hold, z, held, determinant, newton)    true if Newton arrived
     velocity(model, row, x, hold, given, held, x1)                 rates of the unit's coordinates
     acceleration(model, row, x, hold, given, held, x1, x2)         their accelerations
     jacobian(model, row, x, hold, entries), residuals(...)
 
-A row tells the places of the unit's givens in the lists, the numbers that are its own, and the places of its
-coordinates. Units without a solved block do without z, held, given and determinant.
+A row holds the places of the unit's given values in the lists, its own numbers, and the places of its coordinates.
+Units without a solved block have no z, held, given and determinant.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.alike import Kind, Run, positions
 from kinfmu.codegen.c.text import FUNCTIONS, function, indented
+from kinfmu.codegen.kinds import Kind, UnitRun, positions
 from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.newton import (
     ITERATIONS,
@@ -34,7 +34,7 @@ from kinfmu.units import derivative_name
 
 
 class Units:
-    """Writes the functions of one kind.
+    """The writer of one kind's functions.
 
     curves: names of the constants that hold the data of curves; parameters: places of the parameters by the names of
     their symbols; derived: places of what depends on parameters alone.
@@ -66,19 +66,19 @@ class Units:
 
     # What the functions are made of
 
-    def room(self) -> int:
-        """How many numbers a unit hands on."""
-        return len(self.hold) + int(self.keeps_determinant) + self._factors_room()
+    def cache_size(self) -> int:
+        """Return how many numbers a unit keeps."""
+        return len(self.hold) + int(self.keeps_determinant) + self._factors_size()
 
-    def _factors_room(self) -> int:
+    def _factors_size(self) -> int:
         block = self.kind.solved
         if block is None or is_small(block):
             return 0
         m, k = len(block.residuals), len(block.unknowns)
         return k * k + 2 * k if m == k else 2 * m * k
 
-    def handed_on(self, node: Node) -> int:
-        """Place of a node of the position stage among the numbers that a unit hands on, from now on if not before."""
+    def cached(self, node: Node) -> int:
+        """Return the place of a node of the position stage among the numbers that a unit keeps; add it if it is new."""
         name = self.names.of(node)
         self.hold.setdefault(name, node)
         return list(self.hold).index(name)
@@ -88,11 +88,11 @@ class Units:
 
     @property
     def _kept(self) -> str:
-        """Where the determinant of a small block stands, or the factors of a larger one."""
+        """The place of the determinant of a small block, or of the factors of a larger one."""
         return f"hold[{len(self.hold)}]" if self.keeps_determinant else f"hold + {len(self.hold)}"
 
     def _loads(self, writer: Writer, found: Iterable[str]) -> list[str]:
-        """Assignments of what the statements use and have not found themselves."""
+        """Return assignments of what the statements read and do not compute."""
         known = set(found)
         lines = []
         for node in writer.used:
@@ -101,7 +101,7 @@ class Units:
                 lines.append(f"{name} = model->derived[{self.derived[node]}];")
             elif node.op != "symbol":
                 self.hold.setdefault(name, node)
-                lines.append(f"{name} = <{name}>;")  # the place is told when all of them are known
+                lines.append(f"{name} = <{name}>;")  # replaced when all places are known
             elif node.name in known:
                 continue
             elif is_parameter(node):
@@ -229,7 +229,7 @@ class Units:
         ]
 
     def _correction(self, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
-        """z -= J^-1 r."""
+        """Return z -= J^-1 r."""
         m, k = len(jacobian), len(z)
         if m == k <= 2:
             return [f"{name} -= {step};" for name, step in zip(z, solution(jacobian, r, "det"), strict=True)]
@@ -247,7 +247,7 @@ class Units:
         ]
 
     def _rates(self, name: str, order: int) -> list[str]:
-        """Rates (order 1) or accelerations (2) of all coordinates of the unit."""
+        """Return the function of the rates (order 1) or accelerations (2) of all coordinates of the unit."""
         writer = Writer(self.names, self.known)
         lines: list[str] = []
         found: list[str] = []
@@ -273,7 +273,7 @@ class Units:
         return function(signature, lines, arguments)
 
     def _linear(self, writer: Writer, block: Block, order: int) -> list[str]:
-        """The linear solve of a block, or what is given in its place."""
+        """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
         m, k = len(block.residuals), len(block.unknowns)
         entries = [entry for row in block.jacobian for entry in row] if k == 2 and is_small(block) else []
@@ -293,7 +293,7 @@ class Units:
         return [*before, "if (held) {", *taken, "} else {", *indented(solved), "}"]
 
     def _entries(self, name: str, nodes: Sequence[Node], scales: Sequence[float] | None) -> list[str]:
-        """A function that writes numbers of the position stage one after another."""
+        """Return a function that writes numbers of the position stage into an array."""
         writer = Writer(self.names, self.derived if scales else self.known)
         lines = [f"{line};" for line in writer.statements(nodes)]
         for k, node in enumerate(nodes):
@@ -309,13 +309,13 @@ class Units:
 
 
 def fields(kind: Kind) -> tuple[list[str], list[str], list[str]]:
-    """Names in a row: of the places of what is given, of the numbers, and of the places of the unit's coordinates."""
+    """Return the field names of a row: places of the given values, numbers, and places of the unit's coordinates."""
     given = [f"g{k}" for k in range(len(kind.given))]
     return given, [f"c{k}" for k in range(kind.constants)], [f"k{k}" for k in range(len(kind.coordinates))]
 
 
 def row_type(kind: Kind) -> list[str]:
-    """The struct of a row."""
+    """Return the struct of a row."""
     given, constants, own = fields(kind)
     members = [f"    int {', '.join(given)};"] if given else []
     members += [f"    double {', '.join(constants)};"] if constants else []
@@ -323,7 +323,7 @@ def row_type(kind: Kind) -> list[str]:
 
 
 def places(kind: Kind) -> dict[str, tuple[int, str]]:
-    """Of each symbol of a unit its order of derivative and the row's field that tells its place in that list."""
+    """Return for each symbol of a unit its order of derivative and the row's field with its place in that list."""
     given, _, own = fields(kind)
     found: dict[str, tuple[int, str]] = {}
     for field, names in zip(given, kind.given, strict=True):
@@ -333,11 +333,11 @@ def places(kind: Kind) -> dict[str, tuple[int, str]]:
     return found
 
 
-def rows_of(number: int, run: Run, place: Mapping[str, int]) -> list[str]:
-    """The table of a run."""
+def rows_of(number: int, run: UnitRun, place: Mapping[str, int]) -> list[str]:
+    """Return the table of a run."""
     rows = []
     for member in run.members:
         given, own = ([str(place[name]) for name in names] for names in (member.given, member.own))
-        told = f" /* {', '.join(member.own)} */"
-        rows.append(f"    {{{', '.join([*given, *map(repr, member.constants), *own])}}},{told}")
+        comment = f" /* {', '.join(member.own)} */"
+        rows.append(f"    {{{', '.join([*given, *map(repr, member.constants), *own])}}},{comment}")
     return [f"static const row{run.kind.label} run_{number}[{len(rows)}] = {{", *rows, "};", ""]

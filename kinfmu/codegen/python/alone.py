@@ -1,4 +1,4 @@
-"""A single driver at speed 1 and acceleration 0, for which constants are folded; formulas that others need."""
+"""Formulas with constants folded for a single driver at speed 1 and acceleration 0; definitions in order."""
 
 from __future__ import annotations
 
@@ -34,19 +34,15 @@ class Alone:
                 self._given[name] = folded.constant
 
     def velocity(self, block: Block) -> tuple[Node, ...]:
-        """The block's right side for velocities, folded."""
+        """Return the block's right side for velocities, folded."""
         return tuple(self._folded(block.velocity))
 
     def acceleration(self, block: Block) -> tuple[Node, ...]:
-        """The block's right side for accelerations, folded."""
+        """Return the block's right side for accelerations, folded."""
         return tuple(self._folded(block.acceleration))
 
-    def spoken(self, name: str) -> str:
-        """A rate as an argument: a number where it is one."""
-        return repr(self._given[name]) if name in self._given else identifier(name)
-
     def _folded(self, targets: Sequence[Node]) -> list[Node]:
-        """The targets with numbers in place of the symbols that are given; the graph simplifies what it can."""
+        """Return the targets with numbers in place of the given symbols, simplified by the graph."""
         new: dict[Node, Node] = {}
         for node in reachable(targets):
             if node.op == "symbol" and node.name in self._given:
@@ -68,9 +64,9 @@ class Definitions:
         self._order = {name: k for k, name in enumerate(formulas)}
 
     def lines(self, writer: Writer, wanted: Iterable[str], done: set[str]) -> list[str]:
-        """Statements for the names that the wanted ones are made of and that are not done yet.
+        """Return statements for the names that the wanted ones are made of, without those in `done`.
 
-        done: names already written; it grows.
+        done: names already written; the new ones are added.
         """
         needed: set[str] = set()
         stack = [name for name in wanted if name in self._formulas]

@@ -1,4 +1,4 @@
-"""Parameters bound once: what depends on them alone is computed before the functions of the module."""
+"""Parameters bound once: nodes that depend on them alone are computed before the functions of the module."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _HOLDS = {"positive": "({}) > 0.0", "other than 0": "({}) != 0.0", "0": "abs({})
 
 
 def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequence[str]) -> list[str]:
-    """The functions inside one that binds the parameters: what depends on nothing else is computed there, once."""
+    """Return the functions inside one that binds the parameters and computes once what depends on these alone."""
     values = [identifier(parameter_symbol(parameter.name)) for parameter in plan.parameters]
     writer = Writer(names, (), prolog)
     known = writer.statements([*prolog, *(condition.node for condition in plan.conditions)])
-    for name, node, meant in plan.conditions:
+    for name, node, required in plan.conditions:
         number = writer.expression(node)
         known += [
-            f"if not {_HOLDS[meant].format(number)}:",
-            f"    raise ValueError({name + ' = %.15g must be ' + meant!r} % ({number},))",
+            f"if not {_HOLDS[required].format(number)}:",
+            f"    raise ValueError({name + ' = %.15g must be ' + required!r} % ({number},))",
         ]
     fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in plan.fixed_nodes.items())
     defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]

@@ -19,7 +19,7 @@ from kinfmu.plan import Block
 
 
 def assigned_lines(writer: Writer, block: Block) -> list[str]:
-    """Statements for the coordinates that a block gives outright, each with the row that gives it."""
+    """Return statements for the coordinates that a block gives outright, each with its row as a comment."""
     lines = []
     for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
         new = writer.statements([motion[0]])
@@ -32,7 +32,7 @@ def assigned_lines(writer: Writer, block: Block) -> list[str]:
 
 
 def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str], held: str, number: str) -> list[str]:
-    """Newton's loop of a block from predictions that stand in its unknowns.
+    """Return Newton's loop of a block; it starts from the predictions in its unknowns.
 
     label: ends the names that outlive the loop (det, factors); starts: names of the unknowns before the prediction;
     held: an expression that is true where the unknowns are not to be solved for; number: of the block, for the error.
@@ -50,7 +50,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
     z = [identifier(name) for name in block.unknowns]
     inside += _determinant(label, jacobian, block.usual)
-    # large angles are rounded more; those of the start, for an iteration that runs away is not to be forgiven
+    # large angles are rounded more; the start's angles count, so that a diverging iteration gets no larger tolerance
     angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
     settled = f"16.0 * error > last and error <= {SETTLED**2} * ({angles})"
     done = f"error <= enough or {held} or ({settled})"
@@ -69,7 +69,7 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
 
 
 def kept_name(block: Block, label: str) -> str:
-    """What a block hands on for its linear solves: its determinant, or its factors."""
+    """Return the name of what a block keeps for its linear solves: its determinant, or its factors."""
     return f"det{label}" if is_small(block) else f"factors{label}"
 
 
@@ -86,7 +86,7 @@ def _determinant(label: str, jacobian: Sequence[Sequence[str]], usual: Sequence[
 
 
 def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str], z: Sequence[str]) -> list[str]:
-    """z -= J^-1 r."""
+    """Return z -= J^-1 r."""
     m, n = len(jacobian), len(z)
     if m == n <= 2:
         return [f"{name} -= {step}" for name, step in zip(z, solution(jacobian, r, f"det{label}"), strict=True)]
@@ -99,10 +99,10 @@ def _correction(label: str, jacobian: Sequence[Sequence[str]], r: Sequence[str],
 def solution_lines(
     label: str, order: int, jacobian: Sequence[Sequence[str]], b: Sequence[str], z: Sequence[str]
 ) -> list[str]:
-    """Z = -J^-1 b, of velocities (order 1) or accelerations (2)."""
+    """Return z = -J^-1 b, for velocities (order 1) or accelerations (2)."""
     m, n = len(jacobian), len(z)
     if m == n <= 2:
-        if order == 1:  # a quotient, rounded once: where bodies turn alike their speeds do to the bit
+        if order == 1:  # a quotient, rounded once: bodies that turn equally have equal speeds to the bit
             solved, before = opposite_solution(jacobian, b, f"/ det{label}"), []
         else:
             solved, before = opposite_solution(jacobian, b, "* per_det"), [f"per_det = 1.0 / det{label}"]
@@ -112,22 +112,22 @@ def solution_lines(
 
 
 def matrix(rows: Sequence[Sequence[str]]) -> str:
-    """'[[a, b], [c, d]]'."""
+    """Return '[[a, b], [c, d]]'."""
     return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
 
 
 def tupled(items: Iterable[str]) -> str:
-    """'(a, b)', '(a,)', '()'."""
+    """Return '(a, b)', '(a,)' or '()'."""
     items = list(items)
     return f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
 
 
 def unpacking(names: Iterable[str], source: str) -> list[str]:
-    """Assignment of a tuple's items to names, indented as in a function; nothing for no names."""
+    """Return the assignment of a tuple's items to names, indented as in a function; no line for no names."""
     names = list(names)
     return [f"    {tupled(names)} = {source}"] if names else []
 
 
 def indented(lines: Iterable[str], spaces: int = 4) -> list[str]:
-    """The lines, further to the right."""
+    """Return the lines, indented."""
     return [f"{' ' * spaces}{line}" for line in lines]

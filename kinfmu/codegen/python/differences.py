@@ -1,4 +1,4 @@
-"""How far two rows of `motion` are apart: the function of the module that the error estimates compare motions with."""
+"""The function `differences` of a module: how far two rows of `motion` are apart, for the error estimates."""
 
 from __future__ import annotations
 

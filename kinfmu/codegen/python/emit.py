@@ -1,7 +1,7 @@
 """SolvePlan -> Python source: one module of plain arithmetic on the standard library, the `model` of a Solver.
 
-The module holds constants and these functions, each a stage; nothing is computed before somebody asks for its stage.
-With parameters the functions stand inside `bound(parameters)`, which computes once what depends on parameters alone:
+The module holds constants and these functions, each a stage, which is computed when it is called. With parameters the
+functions are inside `bound(parameters)`, which computes once what depends on parameters alone:
 
     drive(t, constants)                            -> u, ud, udd
     position(u, z, zd, zdd, s, held, enough)       -> z, determinants, margin, residual, iterations, moved, watch,
@@ -36,6 +36,6 @@ MANY = 200  # coordinates; beyond, unrolled code outgrows 256 names a function a
 
 
 def emit(plan: SolvePlan) -> str:
-    """Source text of the model module; equal plans give equal text."""
+    """Return the source text of the model module; equal plans give equal text."""
     count = sum(len(block.coordinates) for block in plan.blocks)
     return looped(plan) if count > MANY else straight(plan)

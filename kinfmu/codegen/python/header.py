@@ -1,4 +1,4 @@
-"""What every emitted module starts with: imports, constants that the solver and the FMU read, the laws of motion."""
+"""The head of every emitted module: imports, constants that the solver and the FMU read, the laws of motion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _RAISING = {"sin", "cos", "sqrt", "floor", "curve", "/"}  # operations that have
 
 
 def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str] = ()) -> list[str]:
-    """Docstring, imports and constants of the module.
+    """Return docstring, imports and constants of the module.
 
     curves: names of the constants that hold the data of curves; extra: more imports of the standard library.
     """
@@ -73,19 +73,19 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
 
 
 def places(solved: Sequence[Block]) -> list[tuple[int, int]]:
-    """First and last + 1 of each solved block's unknowns among all of them."""
+    """Return first and last + 1 of each solved block's unknowns among all of them."""
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return list(zip([0, *ends], ends, strict=False))
 
 
 def curve_names(plan: SolvePlan) -> dict[CurveData, str]:
-    """Names of the constants that hold the data of the plan's curves."""
+    """Return the names of the constants that hold the data of the plan's curves."""
     data = dict.fromkeys(node.curve[0] for node in plan.nodes if node.op == "curve")
     return {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
 
 
 def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
-    """The function of the laws of motion."""
+    """Return the function of the laws of motion."""
     writer = Writer(Names(curves=curves), ())
     orders = [[getattr(law, order) for law in plan.laws] for order in ("position", "rate", "acceleration")]
     flat = [node for nodes in orders for node in nodes]
@@ -108,7 +108,7 @@ def drive(plan: SolvePlan, curves: Mapping[CurveData, str]) -> list[str]:
 
 
 def _may_raise(plan: SolvePlan) -> bool:
-    """True if an operation of the laws has no value for some numbers, such as the sine of infinity."""
+    """Return True if an operation of the laws has no value for some numbers, such as the sine of infinity."""
     found: set[int] = set()
     stack = [node for law in plan.laws for node in (law.position, law.rate, law.acceleration)]
     while stack:

@@ -1,4 +1,4 @@
-"""Loading generated source into this process."""
+"""Load generated source into this process."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""The model module of a plan of many blocks: coordinates stand in lists, alike blocks are loops over tables.
+"""The model module of a plan of many blocks: coordinates are in lists, runs of units are loops over tables.
 
 Unrolled, such a plan would be functions of tens of thousands of statements and names, which are slow to compile and
-fall out of the processor's caches. What stands where in the lists is told in kinfmu.codegen.lists.
+larger than the processor's caches. kinfmu.codegen.lists describes the order of the lists.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kinfmu.codegen.alike import Run
+from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.newton import ROUND_OFF
 from kinfmu.codegen.python.binding import bound
@@ -22,7 +22,7 @@ from kinfmu.plan import SolvePlan
 
 
 def looped(plan: SolvePlan) -> str:
-    """Source text of the module; equal plans give equal text."""
+    """Return the source text of the module; equal plans give equal text."""
     return _Looped(plan).module()
 
 
@@ -31,7 +31,7 @@ class _Looped(Lists):
         super().__init__(plan)
         self.curves = curve_names(plan)
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
-        self.moving = {name: f"{LISTS[order]}[{k}]" for order in range(3) for name, k in self.stands(order).items()}
+        self.moving = {name: f"{LISTS[order]}[{k}]" for order in range(3) for name, k in self.places(order).items()}
         self.alone = len(plan.drivers) == 1
         self.unknowns = len(plan.unknowns)
 
@@ -60,9 +60,9 @@ class _Looped(Lists):
         return "\n".join([*head, *self._tables(), *functions]) + "\n"
 
     def _tables(self) -> list[str]:
-        """Rows of each run, the factors of the determinants, and the places of the outputs."""
+        """Return the rows of each run, the factors of the determinants, and the places of the outputs."""
         solved = [block for block in self.plan.blocks if block.unknowns]
-        lines = [f"REST = (0.0,) * {self.given_outright}  # room for the coordinates that are given outright"]
+        lines = [f"REST = (0.0,) * {self.given_outright}  # for the coordinates that are given outright"]
         lines += [f"DETERMINANT_FACTORS = {tuple(1.0 / block.determinant_scale for block in solved)!r}"]
         for order, name in enumerate(_GATHERS):
             places = self._gathered(order)[1]
@@ -74,12 +74,14 @@ class _Looped(Lists):
                 (*places, *member.constants, *(self.place[name] for name in member.own))
                 for places, member in zip(given, run.members, strict=True)
             ]
-            told = f"{len(rows)} units of kind {run.kind.label}: {run.members[0].own[0]} to {run.members[-1].own[-1]}"
-            lines += [f"RUN_{number} = (  # {told}", *(f"    {row!r}," for row in rows), ")"]
+            comment = (
+                f"{len(rows)} units of kind {run.kind.label}: {run.members[0].own[0]} to {run.members[-1].own[-1]}"
+            )
+            lines += [f"RUN_{number} = (  # {comment}", *(f"    {row!r}," for row in rows), ")"]
         return [*lines, ""]
 
     def _values(self) -> list[str]:
-        """What the position hands on, as later functions take it."""
+        """Return the statement by which later functions read what the position stage keeps."""
         return [f"    {tupled(['x', *(f'holds{k}' for k, _ in self.numbered())])} = values"]
 
     def _position(self) -> list[str]:
@@ -124,7 +126,7 @@ class _Looped(Lists):
         return [*lines, f"    return {summary}, {values}", ""]
 
     def _expressions(self, targets: Sequence[Node]) -> tuple[list[str], list[str]]:
-        """Expressions of the targets, and the statements before them, which take from the lists what they need."""
+        """Return expressions of the targets, and the statements before them, which read the lists."""
         writer = Writer(self.names, self.derived)
         body = writer.statements(targets)
         expressions = [writer.expression(node) for node in targets]
@@ -132,11 +134,11 @@ class _Looped(Lists):
         return expressions, indented([*(f"{identifier(name)} = {self.moving[name]}" for name in names), *body])
 
     def _rest(self, drivers: str) -> str:
-        """A list of rates at rest, with those of the drivers."""
+        """Return a list of rates at rest, with those of the drivers."""
         return f"[0.0] * {len(self.order) - len(self.plan.drivers)} + {drivers}"
 
     def _solving(self, order: int, given: str) -> list[str]:
-        """Calls that fill x1 (order 1) or x2 (order 2), block after block."""
+        """Return calls that fill x1 (order 1) or x2 (order 2), block after block."""
         lists = ", ".join(LISTS[1 : order + 1])
         lines = []
         for k, run in self.numbered():
@@ -147,8 +149,8 @@ class _Looped(Lists):
                 lines += self._carrying(order, k, run)
         return lines
 
-    def _carrying(self, order: int, k: int, run: Run) -> list[str]:
-        """The call that fills in what is given outright from what is solved for."""
+    def _carrying(self, order: int, k: int, run: UnitRun) -> list[str]:
+        """Return the call that computes what is given outright from what is solved for."""
         lists = ", ".join(LISTS[1 : order + 1])
         name = ("rates", "accelerations")[order - 1]
         return [f"    {name}{run.kind.label}(RUN_{k}, holds{k}, {lists})"] if run.kind.has_assigned else []
@@ -179,7 +181,7 @@ class _Looped(Lists):
         ]
 
     def _tangent(self) -> list[str]:
-        """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
+        """Return, for one driver, the derivatives with respect to it, which every pose needs, and motion with them."""
         n = self.unknowns
         return [
             "",
@@ -213,7 +215,7 @@ class _Looped(Lists):
         ]
 
     def _carried(self) -> list[str]:
-        """Rates and accelerations of all coordinates from those of the unknowns."""
+        """Return functions of the rates and accelerations of all coordinates from those of the unknowns."""
         first = [line for k, run in self.numbered() for line in self._carrying(1, k, run)]
         second = [line for k, run in self.numbered() for line in self._carrying(2, k, run)]
         return [
@@ -236,7 +238,7 @@ class _Looped(Lists):
         ]
 
     def _gathered(self, order: int) -> tuple[list[Node], list[int]]:
-        """Outputs of an order that are formulas, and the place of each output in its list with those appended."""
+        """Return the outputs of an order that are formulas, and each output's place in its list with those appended."""
         formulas: list[Node] = []
         places = []
         for node, place in self.outputs(order):
@@ -245,7 +247,7 @@ class _Looped(Lists):
         return formulas, places
 
     def _row(self, orders: Sequence[int]) -> list[str]:
-        """The end of a function that returns the outputs of some orders, one after another."""
+        """Return the end of a function that returns the outputs of some orders, one after another."""
         wanted = [self._gathered(order) for order in orders]
         expressions, lines = self._expressions([node for formulas, _ in wanted for node in formulas])
         parts = []
@@ -259,7 +261,7 @@ class _Looped(Lists):
         return [*lines, f"    return {' + '.join(parts)}", ""]
 
     def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
-        """A function that returns all outputs at some orders of derivative, one after another."""
+        """Return a function that returns all outputs at some orders of derivative, one after another."""
         highest = max(orders)
         arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', "    x = values[0]"]
@@ -273,14 +275,14 @@ class _Looped(Lists):
                 lines.append("    x1 = [d * ud[0] for d in x1]")
         if len(orders) == 1:
             return lines + self._row(orders)
-        told = '"""The outputs, their rates and accelerations in one row."""'
+        about = '"""The outputs, their rates and accelerations in one row."""'
         return [
             *lines,
             "    return motion_row(x, x1, x2)",
             "",
             "",
             "def motion_row(x, x1, x2):",
-            f"    {told}",
+            f"    {about}",
             *self._row(orders),
         ]
 

@@ -7,16 +7,16 @@
     accelerations(run, holds, x1, x2)                                    the same
     jacobian(run, holds, found), residual(run, holds, found)             appended to `found`
 
-A row of a run tells the places of the unit's givens in the lists, the numbers that are its own, and the places of its
-coordinates. holds: what the later functions need of the position, one tuple a unit; number: of the unit's block. Kinds
-without a solved block have the shorter position(run, x) -> holds, rates and accelerations only.
+A row of a run holds the places of the unit's given values in the lists, its own numbers, and the places of its
+coordinates. holds: what the later functions read from the position stage, one tuple per unit; number: of the unit's
+block. Kinds without a solved block have the shorter position(run, x) -> holds, rates and accelerations only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinfmu.codegen.alike import Kind, positions
+from kinfmu.codegen.kinds import Kind, positions
 from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
@@ -36,7 +36,7 @@ from kinfmu.units import derivative_name
 
 
 class Loops:
-    """Writes the functions of one kind. curves: names of the constants that hold the data of curves."""
+    """The writer of one kind's functions. curves: names of the constants that hold the data of curves."""
 
     def __init__(self, kind: Kind, curves: Mapping[CurveData, str]) -> None:
         self.kind = kind
@@ -59,7 +59,7 @@ class Loops:
         self.hold: dict[str, Node | None] = {}  # names that later functions take from the position
 
     def source(self) -> list[str]:
-        """All functions, those of the position stage first."""
+        """Return all functions, those of the position stage first."""
         kind, later = self.kind, []
         if kind.solved:
             later += self._linear("velocity", 1) + self._linear("acceleration", 2)
@@ -105,13 +105,13 @@ class Loops:
         ]
 
     def _loaded(self, writer: Writer, known: Iterable[str]) -> list[str]:
-        """Statements that take from the lists what the written ones use and do not know."""
+        """Return statements that read from the lists what the written ones use and do not know."""
         known = set(map(identifier, known))
         names = [node.name for node in writer.used if node.op == "symbol" and node.name in self.places]
         return [f"{identifier(name)} = {self.places[name]}" for name in names if identifier(name) not in known]
 
     def _later(self, name: str, arguments: Sequence[str], lines: Sequence[str], *, counted: bool = False) -> list[str]:
-        """A function that loops over units with what the position handed on."""
+        """Return a function that loops over units with what the position stage kept."""
         return [
             "",
             f"def {name}{self.label}({', '.join(['run', 'holds', *arguments])}):",
@@ -122,7 +122,7 @@ class Loops:
         ]
 
     def _linear(self, name: str, order: int) -> list[str]:
-        """Rates (order 1) or accelerations (2) of all coordinates of the units."""
+        """Return the function of the rates (order 1) or accelerations (2) of all coordinates of the units."""
         writer = Writer(self.names, self.positions)
         lines: list[str] = []
         found: list[str] = []
@@ -137,7 +137,7 @@ class Loops:
         return self._later(name, [*lists, "given", "held", "number"], lines, counted=True)
 
     def _solution(self, writer: Writer, block: Block, order: int) -> list[str]:
-        """The linear solve of a block, or what is given in its place."""
+        """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
         lines = writer.statements([*right, *(entry for row in block.jacobian for entry in row)])
         b = [f"b{i}" for i in range(len(right))]
@@ -146,14 +146,14 @@ class Loops:
         jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
         self.hold.setdefault(kept_name(block, self.label), None)
         taken = [f"given[{self.own[name]}]" for name in block.unknowns]
-        stand = [self.places[derivative_name(name, order)] for name in block.unknowns]
+        places = [self.places[derivative_name(name, order)] for name in block.unknowns]
         return [
             *lines,
             f"if {_HELD}:",
             *(f"    {one} = {value}" for one, value in zip(z, taken, strict=True)),
             "else:",
             *indented(solution_lines(self.label, order, jacobian, b, z)),
-            *(f"{place} = {one}" for place, one in zip(stand, z, strict=True)),
+            *(f"{place} = {one}" for place, one in zip(places, z, strict=True)),
         ]
 
     def _assignments(self, writer: Writer, block: Block, order: int) -> list[str]:
@@ -187,14 +187,14 @@ class Loops:
         return self._later("residual", ["found"], [*lines, f"found.append([{row}])"])
 
     def _import(self, writer: Writer) -> None:
-        """Note what a later function takes from the position."""
-        told = {*self.own, *(names[0] for names in self.kind.given)}
+        """Record what a later function reads from the position stage."""
+        readable = {*self.own, *(names[0] for names in self.kind.given)}
         for node in writer.used:
             if node.op != "symbol":
                 self.hold.setdefault(self.names.of(node), node)
-            elif node.name in told and not is_parameter(node):
+            elif node.name in readable and not is_parameter(node):
                 self.hold.setdefault(identifier(node.name), None)
 
 
 _HOLD = "<hold>"
-_HELD = "held and held >> number & 1"  # as a rule nothing is held
+_HELD = "held and held >> number & 1"  # usually no block is held

@@ -1,4 +1,4 @@
-"""The model module of a plan of few blocks: everything unrolled, every number under its own name."""
+"""The model module of a plan of few blocks: all unrolled, every number under its own name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from kinfmu.units import derivative_name
 
 
 def straight(plan: SolvePlan) -> str:
-    """Source text of the module; equal plans give equal text."""
+    """Return the source text of the module; equal plans give equal text."""
     return _Straight(plan).module()
 
 
@@ -50,17 +50,17 @@ class _Straight:
             self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
         self.parametric, self.prolog = parametric(plan)
         known = [node for node in reachable(self.position_nodes) if node not in self.parametric]
-        self.known = {*known, *self.prolog}  # what later stages find computed
+        self.known = {*known, *self.prolog}  # computed before the later stages
         self.definitions = Definitions(self.formulas)
         self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
-        self.exports: dict[str, Node | None] = {}  # names that later stages take from `values`
+        self.exports: dict[str, Node | None] = {}  # names that later stages read from `values`
 
     def _rate_of(self, name: str, order: int) -> str:
-        """Name of a derivative of a coordinate or of a driver's value."""
+        """Return the name of a derivative of a coordinate or of a driver's value."""
         return self.rates[name][order] if name in self.rates else derivative_name(name, order)
 
     def module(self) -> str:
-        """Constants and functions; with parameters the functions stand in `bound`, which binds their values."""
+        """Return constants and functions; with parameters the functions are in `bound`, which binds their values."""
         later = [
             self._velocity(),
             self._acceleration(),
@@ -73,8 +73,8 @@ class _Straight:
             self._jacobians(),
             self._residuals(),
         ]
-        position = self._position()  # after the later stages, which say what it has to hand on
-        unpacked = "\n".join(unpacking(self.exports, "values")) or "    # nothing is handed on"
+        position = self._position()  # after the later stages: they determine what it returns
+        unpacked = "\n".join(unpacking(self.exports, "values")) or "    # no values are read"
         functions = [*drive(self.plan, self.curves), *position, *differences(self.plan)]
         for lines in later:
             functions += [unpacked if line is _VALUES else line for line in lines]
@@ -124,7 +124,7 @@ class _Straight:
         return [*lines, f"    return {z}, {determinants}, {summary}, {values}", ""]
 
     def _predicted(self) -> list[str]:
-        """Unknowns as predicted, by their names."""
+        """Return statements of the predicted unknowns, by their names."""
         lines = []
         for letter, source in (("z", "z"), ("d", "zd"), ("a", "zdd")):
             lines += unpacking([f"{letter}{k}" for k in range(len(self.unknowns))], source)
@@ -133,7 +133,7 @@ class _Straight:
         return lines
 
     def _moved(self) -> str:
-        """The largest correction of a prediction, in radians and sizes."""
+        """Return the largest correction of a prediction, in radians and sizes."""
         moves = []
         for k, name in enumerate(self.unknowns):
             move = f"abs({identifier(name)} - p{k})"
@@ -141,7 +141,7 @@ class _Straight:
         return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
 
     def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
-        """Statements of a block that needs Newton."""
+        """Return the statements of a block that needs Newton."""
         starts = [f"z{place}" for place in range(*self.places[k])]
         lines = [f"# block {k + 1}: {', '.join(block.unknowns)} from {', '.join(block.row_names)}"]
         lines += newton_lines(writer, block, str(k + 1), starts, f"held & {1 << k}", str(k))
@@ -173,7 +173,7 @@ class _Straight:
         return lines + self._linear(2, lambda block: block.acceleration)
 
     def _alone(self) -> list[list[str]]:
-        """With one driver: derivatives with respect to it, which are needed at every pose, and motion with them."""
+        """Return, for one driver, the derivatives with respect to it, which every pose needs, and motion with them."""
         writer = Writer(self.names, self.known)
         alone = Alone(self.inputs[1][0], self.inputs[2][0], self.formulas)
         definitions = Definitions(alone.formulas)
@@ -182,11 +182,11 @@ class _Straight:
             lines += indented(self._linear_lines(writer, order, right, definitions, done))
         self._import(writer)
         first, second = (tupled(identifier(derivative_name(name, order)) for name in self.unknowns) for order in (1, 2))
-        told = "First and second derivative of the unknowns with respect to the driver."
+        about = "First and second derivative of the unknowns with respect to the driver."
         tangent = [
             "",
             "def tangent(values):",
-            f'    """{told}"""',
+            f'    """{about}"""',
             _VALUES,
             *lines,
             f"    return {first}, {second}",
@@ -208,7 +208,7 @@ class _Straight:
         return [tangent, first_read]
 
     def _linear(self, order: int, right: _Right) -> list[str]:
-        """Linear solves of one order as a function's body."""
+        """Return the linear solves of one order as a function's body."""
         writer = Writer(self.names, self.known)
         lines = self._linear_lines(writer, order, right, self.definitions, set(), held=True)
         self._import(writer)
@@ -225,7 +225,7 @@ class _Straight:
         *,
         held: bool = False,
     ) -> list[str]:
-        """Linear solves of one order, block after block, with the definitions that they need on the way."""
+        """Return the linear solves of one order, block after block, with the definitions that they need."""
         lines = []
         for k, block in enumerate(self.solved):
             z = [identifier(derivative_name(name, order)) for name in block.unknowns]
@@ -247,7 +247,7 @@ class _Straight:
         return lines
 
     def _stage(self, name: str, docstring: str, orders: Sequence[int]) -> list[str]:
-        """A function that returns all outputs at some orders of derivative, one after another."""
+        """Return a function that returns all outputs at some orders of derivative, one after another."""
         targets: list[Node] = [motion[1:][order] for order in orders for motion in self.plan.outputs_motion]
         highest = max(orders)
         arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
@@ -264,7 +264,7 @@ class _Straight:
         return [*lines, *indented(body), f"    return {returned}", ""]
 
     def _chained(self, order: int) -> list[str]:
-        """Rates (and accelerations, of order 2) of the unknowns from `first` (and `second`).
+        """Return statements of the rates (and accelerations, order 2) of the unknowns from `first` (and `second`).
 
         With one driver by the chain rule: zd = z' ud, zdd = z'' ud^2 + z' udd.
         """
@@ -333,7 +333,7 @@ class _Straight:
         ]
 
     def _import(self, writer: Writer) -> None:
-        """Note what a later stage takes from the position stage."""
+        """Record what a later stage reads from the position stage."""
         coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
         for node in writer.used:
             if node in self.parametric:
@@ -349,5 +349,5 @@ _Right = Callable[[Block], tuple[Node, ...]]
 
 
 def _names(targets: Sequence[Node]) -> list[str]:
-    """Names of the symbols that the targets are made of."""
+    """Return the names of the symbols that the targets are made of."""
     return [symbol.name for symbol in symbols(targets)]

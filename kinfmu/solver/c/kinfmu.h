@@ -114,7 +114,7 @@ extern const int kf_outputs_places[KF_ROOM(KF_OUTPUTS)];
 extern const int kf_rates_places[KF_ROOM(KF_OUTPUTS)];
 extern const int kf_accelerations_places[KF_ROOM(KF_OUTPUTS)];
 
-bool kf_bind(kf_model *model, const double *parameters, char *why, size_t room);
+bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size);
 void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
 bool kf_is_outside(const kf_model *model, int block); /* true for a block that is not of the track that is followed */
 int kf_solve_blocks(const kf_model *model, const double *z, const bool *held, kf_found *found,

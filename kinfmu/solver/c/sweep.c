@@ -148,14 +148,14 @@ bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
     const double u = isnan(job->u[sample]) ? INFINITY : job->u[sample]; /* what has no place in the order comes last */
     kf_list *const list = &sweep->alone;
     double turns;
-    if (list->count == list->room) {
-        const int64_t room = 2 * list->room + 1024;
-        kf_left *const more = realloc(list->samples, (size_t)room * sizeof *more);
+    if (list->count == list->capacity) {
+        const int64_t capacity = 2 * list->capacity + 1024;
+        kf_left *const more = realloc(list->samples, (size_t)capacity * sizeof *more);
         if (more == NULL) {
             return false;
         }
         list->samples = more;
-        list->room = room;
+        list->capacity = capacity;
     }
     turns = kf_turns_after(&sweep->segments, u);
     list->samples[list->count++] = (kf_left){turns == 0.0 ? u : kf_turned(u, -turns), turns, sample};

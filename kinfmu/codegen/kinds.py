@@ -1,7 +1,7 @@
-"""Alike blocks: the same formulas over other coordinates and other numbers. A run of them shares one set of functions.
+"""Kinds of units: blocks with the same formulas over other coordinates and numbers share one set of functions.
 
-Blocks are first joined to units: a block that is solved and the coordinates that follow from its unknowns at once, or
-the coordinates of one body that are given outright. Units in a row whose formulas are the same form a run; a chain of a
+Blocks are first joined to units: a block that is solved with the coordinates that follow from its unknowns at once, or
+the coordinates of one body that are given outright. Consecutive units with the same formulas form a run; a chain of a
 thousand loops is a run of a thousand units, with a table of what differs from one to the next.
 """
 
@@ -22,10 +22,10 @@ RateOf = Callable[[str, int], str]  # name of a coordinate's or driver value's d
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """What alike units share: blocks over names of their own, `own0.phi`, `given0.phi`, and `c0` for numbers.
+    """The blocks that units of equal formulas share, over names of their own: `own0.phi`, `given0.phi`, and `c0`.
 
-    A unit that is the only one of its kind is itself, under its own names. given: what comes from outside, coordinates
-    or driver values, each with its rate and acceleration; constants: how many numbers differ from unit to unit.
+    The only unit of its kind keeps its own names. given: coordinates or driver values from outside the unit, each with
+    its rate and acceleration; constants: how many numbers differ from unit to unit.
     """
 
     label: str
@@ -39,7 +39,7 @@ class Kind:
 
     @property
     def solved(self) -> Block | None:
-        """The block that needs Newton, if there is one."""
+        """The block that is solved by Newton, if there is one."""
         return next((block for block in self.blocks if block.unknowns), None)
 
     @property
@@ -47,43 +47,43 @@ class Kind:
         return any(block.assigned for block in self.blocks)
 
 
-class Member(NamedTuple):
-    """What stands in place of a kind's own names: symbols from outside, numbers, and the unit's coordinates."""
+class UnitMember(NamedTuple):
+    """What a unit has for the names of its kind: symbols from outside, numbers, and its own coordinates."""
 
     given: tuple[str, ...]
     constants: tuple[float, ...]
     own: tuple[str, ...]
 
 
-class Run(NamedTuple):
-    """Alike units one after another; first: number of its first solved block among all of them."""
+class UnitRun(NamedTuple):
+    """Consecutive units of one kind; first: number of the first solved block of the run among all solved blocks."""
 
     kind: Kind
-    members: tuple[Member, ...]
+    members: tuple[UnitMember, ...]
     first: int
 
 
 class _Form(NamedTuple):
-    """A unit seen without its names and numbers; equal `text` means alike."""
+    """A unit without its names and numbers; units with equal `text` are of one kind."""
 
     text: tuple[object, ...]
     nodes: list[Node]
-    member: Member
+    member: UnitMember
 
 
 _Unit = tuple[Block, ...]
 
 
-def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[Run]:
-    """The blocks, in their order, as runs; units that are alike but apart share a kind."""
+def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[UnitRun]:
+    """Return the blocks, in their order, as runs; units of equal formulas share a kind also in different runs."""
     units = _units(blocks)
     forms = [_form(unit, rate_of) for unit in units]
-    alike: dict[tuple[object, ...], list[int]] = {}
+    of_text: dict[tuple[object, ...], list[int]] = {}
     for k, form in enumerate(forms):
-        alike.setdefault(form.text, []).append(k)
+        of_text.setdefault(form.text, []).append(k)
     kinds: dict[tuple[object, ...], Kind] = {}
     differs: dict[tuple[object, ...], list[bool]] = {}
-    for text, numbers in alike.items():
+    for text, numbers in of_text.items():
         table = zip(*(forms[k].member.constants for k in numbers), strict=True)
         differs[text] = [len(set(column)) > 1 for column in table]
         first = numbers[0]
@@ -92,9 +92,9 @@ def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[Run]:
     for text, row in groupby(forms, key=lambda form: form.text):
         members = []
         for _, _, member in row:
-            told = [value for value, is_told in zip(member.constants, differs[text], strict=True) if is_told]
-            members.append(member._replace(constants=tuple(told)))
-        runs.append(Run(kinds[text], tuple(members), solved))
+            own = [value for value, is_own in zip(member.constants, differs[text], strict=True) if is_own]
+            members.append(member._replace(constants=tuple(own)))
+        runs.append(UnitRun(kinds[text], tuple(members), solved))
         solved += len(members) if kinds[text].solved else 0
     return runs
 
@@ -110,7 +110,7 @@ def _units(blocks: Sequence[Block]) -> list[_Unit]:
 
 
 def _continues(head: Block, block: Block) -> bool:
-    """True if a block only gives coordinates, and these belong to the unit that starts with `head`."""
+    """Return True if a block only gives coordinates, and these belong to the unit that starts with `head`."""
     if block.unknowns:
         return False
     name, motion = block.assigned[0]
@@ -120,7 +120,7 @@ def _continues(head: Block, block: Block) -> bool:
 
 
 def positions(blocks: Sequence[Block]) -> Iterator[Sequence[Node]]:
-    """The nodes of the position stage, in an order that a unit's form and its kind share."""
+    """Yield the nodes of the position stage, in an order that a unit's form and its kind share."""
     for block in blocks:
         yield [motion[0] for _, motion in block.assigned]
         yield block.residuals
@@ -128,7 +128,7 @@ def positions(blocks: Sequence[Block]) -> Iterator[Sequence[Node]]:
 
 
 def _groups(unit: _Unit) -> Iterator[Sequence[Node]]:
-    """All nodes of a unit."""
+    """Yield all nodes of a unit."""
     yield from positions(unit)
     for block in unit:
         for _, motion in block.assigned:
@@ -145,7 +145,7 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
     number = {node: k for k, node in enumerate(nodes)}
     met = symbols([node for group in positions(unit) for node in group])
     given = tuple(node.name for node in met if node.name not in own and not is_parameter(node))
-    spoken = {
+    new_name = {
         rate_of(name, order): f"{canonical}{order}"
         for name, canonical in [*own.items(), *((name, f"given{k}") for k, name in enumerate(given))]
         for order in range(3)
@@ -157,7 +157,7 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
             constants.append(float(node.value))  # type: ignore[arg-type]  # constants hold floats
             lines.append("constant")
         elif node.op == "symbol":
-            lines.append(node.name if is_parameter(node) else spoken[node.name])
+            lines.append(node.name if is_parameter(node) else new_name[node.name])
         else:
             lines.append((node.op, node.value, *(number[arg] for arg in node.args)))
     lines += [tuple(number[node] for node in group) for group in roots]
@@ -166,34 +166,34 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
         lines.append(
             (tuple(own[name] for name in block.coordinates), len(block.unknowns), block.row_scales, block.usual, rows)
         )
-    return _Form(tuple(lines), nodes, Member(given, tuple(constants), coordinates))
+    return _Form(tuple(lines), nodes, UnitMember(given, tuple(constants), coordinates))
 
 
-def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of: RateOf, count: int) -> Kind:
+def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of: RateOf, units: int) -> Kind:
     own, given = form.member.own, form.member.given
-    if count == 1:
+    if units == 1:
         return Kind(label, unit, tuple((name, rate_of(name, 1), rate_of(name, 2)) for name in given), 0)
     graph = Graph()
     names = {name: f"own{k}{name[name.rindex('.') :]}" for k, name in enumerate(own)}
     names |= {name: f"given{k}.phi" for k, name in enumerate(given)}
-    spoken = {rate_of(name, k): derivative_name(new, k) for name, new in names.items() for k in range(3)}
+    new_name = {rate_of(name, k): derivative_name(new, k) for name, new in names.items() for k in range(3)}
     new: dict[Node, Node] = {}
-    is_told = iter(differs)
-    told = 0
+    is_own = iter(differs)
+    count = 0
     for node in form.nodes:
         if node.op == "constant":
-            if next(is_told):
-                new[node] = graph.symbol(f"c{told}")
-                told += 1
+            if next(is_own):
+                new[node] = graph.symbol(f"c{count}")
+                count += 1
             else:
                 new[node] = graph.constant(float(node.value))  # type: ignore[arg-type]  # constants hold floats
         elif node.op == "symbol":
-            new[node] = graph.symbol(node.name if is_parameter(node) else spoken[node.name])
+            new[node] = graph.symbol(node.name if is_parameter(node) else new_name[node.name])
         else:
             new[node] = graph.copy(node, *(new[arg] for arg in node.args))
     renamed = tuple(_renamed(block, names, new) for block in unit)
-    outside = tuple((spoken[name], spoken[rate_of(name, 1)], spoken[rate_of(name, 2)]) for name in given)
-    return Kind(label, renamed, outside, told)
+    outside = tuple((new_name[name], new_name[rate_of(name, 1)], new_name[rate_of(name, 2)]) for name in given)
+    return Kind(label, renamed, outside, count)
 
 
 def _renamed(block: Block, names: dict[str, str], new: dict[Node, Node]) -> Block:
@@ -212,4 +212,4 @@ def _renamed(block: Block, names: dict[str, str], new: dict[Node, Node]) -> Bloc
     )
 
 
-__all__ = ["Kind", "Member", "Run", "positions", "runs_of"]
+__all__ = ["Kind", "UnitMember", "UnitRun", "positions", "runs_of"]
