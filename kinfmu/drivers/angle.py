@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.drivers.driver import Driver
 from kinfmu.laws import ConstantSpeed, Law
@@ -14,11 +14,11 @@ from kinfmu.units import Quantity
 
 @dataclass(frozen=True)
 class AngleDriver(Driver):
-    """The angle of a body, driven: a crank turned by a motor on the ground.
+    """A driven angle of a body: a crank turned by a motor on the ground.
 
         Phi = phi_i - u(t)        (1 row)
 
-    of: the body; law: u(t) [rad]. Haug (1989), driving constraints.
+    Haug (1989), driving constraints.
     """
 
     type: ClassVar[str] = "angle"
@@ -26,8 +26,8 @@ class AngleDriver(Driver):
     quantity: ClassVar[Quantity] = Quantity("angle")
 
     name: str
-    of: BodyName
-    law: Law = field(default_factory=ConstantSpeed)
+    of: Annotated[BodyName, "the body"]
+    law: Annotated[Law, "u(t) [rad]"] = field(default_factory=ConstantSpeed)
 
     def measured(self) -> AngleBetween:
         return AngleBetween(self.of)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.drivers.driver import Driver
 from kinfmu.laws import ConstantSpeed, Law
@@ -14,11 +14,11 @@ from kinfmu.units import Quantity
 
 @dataclass(frozen=True)
 class CoordinateDriver(Driver):
-    """A world coordinate of a point, driven.
+    """A driven world coordinate of a point.
 
         Phi = (r_i + A_i s_a)_x - u(t)     or the same with y        (1 row)
 
-    of: the point; axis: "x" or "y"; law: u(t) [length]. Haug (1989), driving constraints.
+    Haug (1989), driving constraints.
     """
 
     type: ClassVar[str] = "coordinate"
@@ -26,9 +26,9 @@ class CoordinateDriver(Driver):
     quantity: ClassVar[Quantity] = Quantity("length")
 
     name: str
-    of: PointName
-    axis: Axis
-    law: Law = field(default_factory=ConstantSpeed)
+    of: Annotated[PointName, "the point"]
+    axis: Annotated[Axis, "'x' or 'y'"]
+    law: Annotated[Law, "u(t) [length]"] = field(default_factory=ConstantSpeed)
 
     def measured(self) -> CoordinateOf:
         return CoordinateOf(self.of, self.axis)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.drivers.driver import Driver
 from kinfmu.laws import ConstantSpeed, Law
@@ -14,11 +14,11 @@ from kinfmu.units import Quantity
 
 @dataclass(frozen=True)
 class DistanceDriver(Driver):
-    """The distance of two points, driven: a cylinder between two bodies.
+    """A driven distance of two points: a cylinder between two bodies.
 
         Phi = d.d - u(t)^2,   d = r_j + A_j s_b - r_i - A_i s_a        (1 row)
 
-    between: the two points; law: u(t) > 0 [length]. Haug (1989), driving constraints.
+    Haug (1989), driving constraints.
     """
 
     type: ClassVar[str] = "distance"
@@ -26,8 +26,8 @@ class DistanceDriver(Driver):
     quantity: ClassVar[Quantity] = Quantity("length")
 
     name: str
-    between: PointPair
-    law: Law = field(default_factory=ConstantSpeed)
+    between: Annotated[PointPair, "the two points"]
+    law: Annotated[Law, "u(t) > 0 [length]"] = field(default_factory=ConstantSpeed)
 
     def measured(self) -> DistanceBetween:
         return DistanceBetween(self.between)

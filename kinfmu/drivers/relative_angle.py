@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.drivers.driver import Driver
 from kinfmu.laws import ConstantSpeed, Law
@@ -14,11 +14,11 @@ from kinfmu.units import Quantity
 
 @dataclass(frozen=True)
 class RelativeAngleDriver(Driver):
-    """The angle of one body against another, driven: a motor in a joint between moving bodies.
+    """A driven angle of one body relative to another: a motor in a joint between moving bodies.
 
         Phi = phi_j - phi_i - u(t)        (1 row)
 
-    between: bodies i and j; law: u(t) [rad]. Haug (1989), driving constraints.
+    Haug (1989), driving constraints.
     """
 
     type: ClassVar[str] = "relative_angle"
@@ -26,8 +26,8 @@ class RelativeAngleDriver(Driver):
     quantity: ClassVar[Quantity] = Quantity("angle")
 
     name: str
-    between: BodyPair
-    law: Law = field(default_factory=ConstantSpeed)
+    between: Annotated[BodyPair, "bodies i and j"]
+    law: Annotated[Law, "u(t) [rad]"] = field(default_factory=ConstantSpeed)
 
     def measured(self) -> AngleBetween:
         return AngleBetween(self.between[1], self.between[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.drivers.driver import Driver
 from kinfmu.laws import ConstantSpeed, Law
@@ -14,12 +14,11 @@ from kinfmu.units import Quantity, Radians
 
 @dataclass(frozen=True)
 class SlideDriver(Driver):
-    """The position along a slide, driven: a linear actuator.
+    """A driven position along a slide: a linear actuator.
 
         Phi = e.d - u(t),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row)
 
-    between: a point of the slide on body i, then the moved point of body j; axis: direction e in i's frame [rad];
-    law: u(t) [length]. Haug (1989), driving constraints.
+    Haug (1989), driving constraints.
     """
 
     type: ClassVar[str] = "slide"
@@ -27,9 +26,9 @@ class SlideDriver(Driver):
     quantity: ClassVar[Quantity] = Quantity("length")
 
     name: str
-    between: PointPair
-    axis: Radians = 0.0
-    law: Law = field(default_factory=ConstantSpeed)
+    between: Annotated[PointPair, "a point of the slide on body i, then the moved point of body j"]
+    axis: Annotated[Radians, "direction e in i's frame [rad]"] = 0.0
+    law: Annotated[Law, "u(t) [length]"] = field(default_factory=ConstantSpeed)
 
     def measured(self) -> PositionAlong:
         return PositionAlong(self.between, self.axis)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Held
 from kinfmu.measures import AngleBetween
@@ -11,19 +11,19 @@ from kinfmu.units import Radians
 
 @dataclass(frozen=True)
 class Angle(Held):
-    """The angle of one body, held at a value: it moves without turning.
+    """The angle of one body is held at a value: the body moves without turning.
 
         Phi = phi_i - value        (1 row)
 
-    of: the body; value: [rad]. Haug (1989), absolute constraints.
+    Haug (1989), absolute constraints.
     """
 
     type: ClassVar[str] = "angle"
     labels: ClassVar[tuple[str, ...]] = ("angle",)
 
     name: str
-    of: BodyName
-    value: Radians = 0.0
+    of: Annotated[BodyName, "the body"]
+    value: Annotated[Radians, "the angle [rad]"] = 0.0
 
     def measured(self) -> tuple[AngleBetween, float]:
         return AngleBetween(self.of), self.value

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.cam import Cam
 from kinfmu.laws import Law
@@ -12,13 +12,11 @@ from kinfmu.units import Radians
 
 @dataclass(frozen=True)
 class CamOscillating(Cam):
-    """A cam that swings a follower, by a lift law.
+    """A cam that swings a follower by a lift law.
 
         Phi = phi_j - phi_i - offset - f(phi_k - phi_i)        (1 row)
 
-    between: body i, which holds both pivots, then the follower j; cam: body k; law: lift f over the cam's angle [rad
-    over rad]; offset: angle of the follower where the lift is 0 [rad]. After Haug (1989), cam-followers; there by
-    profiles.
+    After Haug (1989), cam-followers, which are given there by profiles.
     """
 
     type: ClassVar[str] = "cam_oscillating"
@@ -26,10 +24,10 @@ class CamOscillating(Cam):
     led: ClassVar[str] = "angle"
 
     name: str
-    between: BodyPair
-    cam: BodyName
-    law: Law
-    offset: Radians = 0.0
+    between: Annotated[BodyPair, "body i, which holds both pivots, then the follower j"]
+    cam: Annotated[BodyName, "the cam, body k"]
+    law: Annotated[Law, "lift f over the cam's angle [rad over rad]"]
+    offset: Annotated[Radians, "angle of the follower where the lift is 0 [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
         return (*self.between, self.cam)

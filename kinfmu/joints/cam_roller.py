@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.cam import closing
@@ -21,17 +21,21 @@ class CamRoller(Joint):
 
         Phi = |d| - f(angle of d in the cam's frame),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
 
-    between: the pole of the pitch curve on the cam i, then the roller's centre on the follower j; law: radius f > 0 of
-    the pitch curve over the polar angle in the cam's frame [length over rad], with a turn for its period. The pitch
-    curve is the cam's profile moved outwards by the roller's radius. After Haug (1989), cam-followers.
+    The pitch curve is the cam's profile moved outwards by the roller's radius. After Haug (1989), cam-followers.
     """
 
     type: ClassVar[str] = "cam_roller"
     labels: ClassVar[tuple[str, ...]] = ("radius",)
 
     name: str
-    between: PointPair
-    law: Law
+    between: Annotated[
+        PointPair,
+        "the pole of the pitch curve on the cam i, then the roller's centre on the follower j",
+    ]
+    law: Annotated[
+        Law,
+        "radius f > 0 of the pitch curve over the polar angle in the cam's frame [length over rad], period: a turn",
+    ]
 
     @property
     def law_kinds(self) -> tuple[str, str]:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Held
 from kinfmu.measures import CoordinateOf
@@ -12,21 +12,20 @@ from kinfmu.units import Length
 
 @dataclass(frozen=True)
 class Coordinate(Held):
-    """A world coordinate of a point, held at a value: the point slides along a line parallel to an axis.
+    """A world coordinate of a point is held at a value: the point slides along a line parallel to an axis.
 
         Phi = (r_i + A_i s_a)_x - value     or the same with y        (1 row, scale 1)
 
-    of: the point 'body.point'; axis: 'x' or 'y'; value: in the mechanism's unit of length. Haug (1989), absolute
-    constraints.
+    Haug (1989), absolute constraints.
     """
 
     type: ClassVar[str] = "coordinate"
     labels: ClassVar[tuple[str, ...]] = ("value",)
 
     name: str
-    of: PointName
-    axis: Axis
-    value: Length = 0.0
+    of: Annotated[PointName, "the point 'body.point'"]
+    axis: Annotated[Axis, "'x' or 'y'"]
+    value: Annotated[Length, "the coordinate [length]"] = 0.0
 
     def moved(self, dx: float, dy: float) -> Coordinate:
         return replace(self, value=decimal_sum(self.value, dx if self.axis == "x" else dy))

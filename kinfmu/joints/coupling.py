@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Joint
 from kinfmu.laws import Law
@@ -12,22 +12,20 @@ from kinfmu.measures.placement import Placement
 
 @dataclass(frozen=True)
 class Coupling(Joint):
-    """One measured quantity led by another, by a law: any gearing, screw or indexer.
+    """One measured quantity follows another by a law: a gear train, a screw or an indexer.
 
         Phi = output - f(input)        (1 row, scale 1)
 
-    input: the measure that leads, such as the angle of a body; output: the measure that is led, such as the position of
-    a point along an axis; law: f, in the unit of the output over that of the input. After Haug (1989), relative
-    constraints; measures may be absolute too.
+    After Haug (1989), relative constraints; measures may be absolute too.
     """
 
     type: ClassVar[str] = "coupling"
     labels: ClassVar[tuple[str, ...]] = ("coupled",)
 
     name: str
-    input: Measure
-    output: Measure
-    law: Law
+    input: Annotated[Measure, "the independent measure, such as the angle of a body"]
+    output: Annotated[Measure, "the dependent measure, such as the position of a point along an axis"]
+    law: Annotated[Law, "f, in the unit of the output over that of the input"]
 
     @property
     def law_kinds(self) -> tuple[str, str]:

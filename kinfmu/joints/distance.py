@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Held
@@ -14,20 +14,19 @@ SHORTEST = 1e-30  # [length]; squares of anything shorter run out of digits
 
 @dataclass(frozen=True)
 class Distance(Held):
-    """Two points, one on each body, kept a fixed distance apart (revolute-revolute link).
+    """Two points, one on each body, at a fixed distance (revolute-revolute link).
 
         Phi = d.d - L^2,   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 2 L)
 
-    between: the two points 'body.point'; length: L > 0, in the mechanism's unit of length. Haug (1989), planar
-    composite joints.
+    Haug (1989), planar composite joints.
     """
 
     type: ClassVar[str] = "distance"
     labels: ClassVar[tuple[str, ...]] = ("length",)
 
     name: str
-    between: PointPair
-    length: Length
+    between: Annotated[PointPair, "the two points 'body.point'"]
+    length: Annotated[Length, "L > 0 [length]"]
 
     def reach(self) -> float:
         return self.length

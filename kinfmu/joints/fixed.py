@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Joint
 from kinfmu.measures import AngleBetween
@@ -16,15 +16,15 @@ class Fixed(Joint):
 
         Phi = [r_j + A_j s_b - r_i - A_i s_a; phi_j - phi_i - angle]        (3 rows, scales 1)
 
-    between: the two points 'body.point' that coincide; angle: of body j against body i [rad]. Haug (1989).
+    Haug (1989).
     """
 
     type: ClassVar[str] = "fixed"
     labels: ClassVar[tuple[str, ...]] = ("x", "y", "angle")
 
     name: str
-    between: PointPair
-    angle: Radians = 0.0
+    between: Annotated[PointPair, "the two points 'body.point' that coincide"]
+    angle: Annotated[Radians, "angle of body j relative to body i [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(body_of(point) for point in self.between)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Joint
@@ -13,23 +13,24 @@ from kinfmu.units import Number, Radians
 
 @dataclass(frozen=True)
 class Gear(Joint):
-    """A pair of gears on a carrier: their angles against it keep a ratio.
+    """A pair of gears on a carrier: their angles relative to it keep a ratio.
 
         Phi = (phi_j - phi_k) - ratio (phi_i - phi_k) - offset        (1 row)
 
-    between: gears i and j; carrier: body k that holds both axles; ratio: negative for outer gears (-z_i / z_j of the
-    teeth), positive for an inner one or a belt; offset: angle of j where i stands at 0 [rad]. After Haug (1989), gears;
-    there as rolling pitch circles.
+    After Haug (1989), gears, which are given there as rolling pitch circles.
     """
 
     type: ClassVar[str] = "gear"
     labels: ClassVar[tuple[str, ...]] = ("angle",)
 
     name: str
-    between: BodyPair
-    ratio: Number
-    carrier: BodyName = "ground"
-    offset: Radians = 0.0
+    between: Annotated[BodyPair, "gears i and j"]
+    ratio: Annotated[
+        Number,
+        "negative for external gears (-z_i / z_j of the teeth), positive for an internal one or a belt",
+    ]
+    carrier: Annotated[BodyName, "body k that holds both axles"] = "ground"
+    offset: Annotated[Radians, "angle of j where the angle of i is 0 [rad]"] = 0.0
 
     def check(self) -> None:
         if self.ratio == 0.0:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Joint
@@ -13,24 +13,22 @@ from kinfmu.units import Length, Radians
 
 @dataclass(frozen=True)
 class RackAndPinion(Joint):
-    """A rack that slides on the body that holds the pinion: its way is the arc that the pinion rolls.
+    """A rack that slides on the body that holds the pinion: its travel equals the arc length rolled by the pinion.
 
         Phi = e.d - radius (phi_k - phi_i) - offset,   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
 
-    between: a point of body i, which holds pinion and slide, then a point of the rack j; axis: direction e of the slide
-    in i's frame [rad]; pinion: body k; radius: of its pitch circle, negative if the rack runs back as the pinion turns
-    on; offset: way of the rack where the pinion stands at 0 against i [length]. After Haug (1989), rack and pinion.
+    After Haug (1989), rack and pinion.
     """
 
     type: ClassVar[str] = "rack_and_pinion"
     labels: ClassVar[tuple[str, ...]] = ("way",)
 
     name: str
-    between: PointPair
-    pinion: BodyName
-    radius: Length
-    axis: Radians = 0.0
-    offset: Length = 0.0
+    between: Annotated[PointPair, "a point of body i, which holds pinion and slide, then a point of the rack j"]
+    pinion: Annotated[BodyName, "the pinion, body k"]
+    radius: Annotated[Length, "radius of the pitch circle; negative if a positive rotation moves the rack against e"]
+    axis: Annotated[Radians, "direction e of the slide in i's frame [rad]"] = 0.0
+    offset: Annotated[Length, "position of the rack where the angle of the pinion relative to i is 0 [length]"] = 0.0
 
     def check(self) -> None:
         if self.radius == 0.0:

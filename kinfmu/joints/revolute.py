@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Joint
 from kinfmu.measures.arithmetic import Value
@@ -10,18 +10,18 @@ from kinfmu.measures.placement import Placement, PointPair, body_of
 
 @dataclass(frozen=True)
 class Revolute(Joint):
-    """A pin: one point of each body, kept together.
+    """A pin: one point of each body, in the same place.
 
         Phi = r_j + A_j s_b - r_i - A_i s_a        (2 rows, scale 1)
 
-    between: the two points 'body.point', s_a and s_b in their bodies' frames. Haug (1989), revolute joint.
+    Haug (1989), revolute joint.
     """
 
     type: ClassVar[str] = "revolute"
     labels: ClassVar[tuple[str, ...]] = ("x", "y")
 
     name: str
-    between: PointPair
+    between: Annotated[PointPair, "the two points 'body.point', s_a and s_b in their bodies' frames"]
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(body_of(point) for point in self.between)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.laws.law import Law, Led, LedRate
 from kinfmu.measures.arithmetic import Value
@@ -13,13 +13,13 @@ class ConstantSpeed(Law):
 
         u = start + speed x
 
-    start: value at x = 0; speed: rate, such as [rad/s] or [length/s] after the driver's quantity.
+    x: time of a driver, angle of a cam, input of a coupling.
     """
 
     type: ClassVar[str] = "constant_speed"
 
-    start: Led = 0.0
-    speed: LedRate = 1.0
+    start: Annotated[Led, "value at x = 0"] = 0.0
+    speed: Annotated[LedRate, "rate, such as [rad/s] or [length/s], by the driven quantity"] = 1.0
 
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["speed"] * x

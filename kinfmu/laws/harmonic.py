@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.laws.law import NEARLY, Frequency, Law, Led, Phase
 from kinfmu.measures.arithmetic import Value, sine_of_line
@@ -13,16 +13,15 @@ class Harmonic(Law):
 
         u = start + amplitude sin(frequency x + phase)
 
-    amplitude: half of the whole way; start: middle of the motion; frequency: [rad] per unit of x, over time also in Hz;
-    phase: [rad].
+    Periodic over a turn of x if `frequency` is a whole number.
     """
 
     type: ClassVar[str] = "harmonic"
 
-    amplitude: Led
-    frequency: Frequency
-    start: Led = 0.0
-    phase: Phase = 0.0
+    amplitude: Annotated[Led, "half of the peak-to-peak stroke"]
+    frequency: Annotated[Frequency, "[rad] per unit of x, over time also in Hz"]
+    start: Annotated[Led, "middle of the motion"] = 0.0
+    phase: Annotated[Phase, "[rad]"] = 0.0
 
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["amplitude"] * sine_of_line(constants["frequency"], x, constants["phase"])

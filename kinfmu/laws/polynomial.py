@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.laws.law import Constant, Law, LawQuantity, Path
@@ -17,12 +17,12 @@ class Polynomial(Law):
 
         u = c0 + c1 x + c2 x^2 + ...
 
-    coefficients: (c0, c1, ...), c_k in the unit of u per x^k. They are constants of their own, named c0, c1, ...
+    The coefficients are constants named c0, c1, ...
     """
 
     type: ClassVar[str] = "polynomial"
 
-    coefficients: tuple[float, ...]
+    coefficients: Annotated[tuple[float, ...], "(c0, c1, ...), c_k in the unit of u per x^k"]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", tuple(self.coefficients))

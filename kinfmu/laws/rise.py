@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.laws.jumps import Jumps, jumping_breaks
 from kinfmu.laws.law import Argument, Duration, Law, Led
@@ -19,16 +19,15 @@ class Rise(Law):
 
         u = start + rise N((x - begin) / duration)
 
-    N: the normalized curve of the class, from 0 to 1 on [0, 1], 0 before and 1 after. start: value before; rise: how
-    far, down if negative; begin: x where it begins; duration: x that it takes.
+    N: the normalized curve of the class, from 0 to 1 on [0, 1], 0 before and 1 after.
     """
 
     shape: ClassVar[CurveData]  # N
 
-    rise: Led
-    duration: Duration
-    start: Led = 0.0
-    begin: Argument = 0.0
+    rise: Annotated[Led, "change of u, negative for a fall"]
+    duration: Annotated[Duration, "range of x that the rise takes"]
+    start: Annotated[Led, "value before the rise"] = 0.0
+    begin: Annotated[Argument, "x where the rise begins"] = 0.0
 
     def target(self, x: Value, **constants: Value) -> Value:
         part = (x - constants["begin"]) / constants["duration"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.laws.jumps import Jumps, jumping_breaks
@@ -32,17 +32,18 @@ class MotionSequence(Law):
 
         u = start + sum_k rise_k N_k((x - begin_k) / duration_k),   begin_1 = begin,   begin_k+1 = begin_k + duration_k
 
-    N_k: normalized curves, 0 before and 1 after. segments: the parts in order; start: value before; begin: x where the
-    first one begins; repeat: the sequence begins again whenever it is over, and did so before `begin`; each time from
-    where the last one ended. Constants: start, begin, duration_1, rise_1, duration_2, ...
+    N_k: normalized curves, 0 before and 1 after. Constants: start, begin, duration_1, rise_1, duration_2, ...
     """
 
     type: ClassVar[str] = "sequence"
 
-    segments: tuple[Segment, ...]
-    start: Led = 0.0
-    begin: Argument = 0.0
-    repeat: bool = False
+    segments: Annotated[tuple[Segment, ...], "the rises and dwells in order"]
+    start: Annotated[Led, "value before the first segment"] = 0.0
+    begin: Annotated[Argument, "x where the first segment begins"] = 0.0
+    repeat: Annotated[
+        bool,
+        "repeat the sequence before `begin` and after its end, each time from the value at which the last one ended",
+    ] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", tuple(Segment(*segment) for segment in self.segments))

@@ -27,16 +27,19 @@ class Spline(Law):
 
         u = u_k + b_k s + c_k s^2 + d_k s^3,   s = x - x_k,        u'' continuous
 
-    points: (x_k, u_k), x ascending; ends: "not_a_knot" (the first two pieces are one cubic, and the last two),
-    "natural" (u'' = 0 at both ends) or "periodic" (repeats after the table's width, u' and u'' continuous there too).
-    Unless it is periodic, u stays at the first value before the table and at the last one after it.
+    Unless the spline is periodic, u keeps the first value before the table and the last one after it.
     De Boor, A Practical Guide to Splines, chapter IV.
     """
 
     type: ClassVar[str] = "spline"
 
-    points: tuple[tuple[float, float], ...]
-    ends: Annotated[str, Reference("choice", ENDS)] = NOT_A_KNOT
+    points: Annotated[tuple[tuple[float, float], ...], "(x_k, u_k), x ascending"]
+    ends: Annotated[
+        str,
+        Reference("choice", ENDS),
+        "'not_a_knot' (the first two pieces are one cubic, and the last two), 'natural' (u'' = 0 at both ends) or "
+        "'periodic' (repeats after the table's width, with continuous u' and u'')",
+    ] = NOT_A_KNOT
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", tuple(_pair(point) for point in self.points))

@@ -12,16 +12,13 @@ from kinfmu.measures.placement import BodyName, Placement, Reference
 
 @dataclass(frozen=True)
 class AngleBetween(Measure):
-    """Angle of a body against another, or against the world: phi_of - phi_to, turns kept.
-
-    of: the body; to: the body that it is counted from, the world if nothing is said.
-    """
+    """Angle of a body relative to another or to the world: phi_of - phi_to, with whole turns."""
 
     type: ClassVar[str] = "angle"
     kind: ClassVar[str] = "angle"
 
-    of: BodyName
-    to: Annotated[str | None, Reference("body")] = None
+    of: Annotated[BodyName, "the body"]
+    to: Annotated[str | None, Reference("body"), "the reference body; default: the world"] = None
 
     def bodies(self) -> tuple[str, ...]:
         return (self.of,) if self.to is None else (self.to, self.of)

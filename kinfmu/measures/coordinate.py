@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.measure import Measure
@@ -12,17 +12,14 @@ from kinfmu.measures.placement import Axis, Placement, PointName, body_of
 
 @dataclass(frozen=True)
 class CoordinateOf(Measure):
-    """World coordinate of a point.
-
-    of: the point; axis: 'x' or 'y'.
-    """
+    """World coordinate of a point."""
 
     type: ClassVar[str] = "coordinate"
     kind: ClassVar[str] = "length"
     is_absolute: ClassVar[bool] = True
 
-    of: PointName
-    axis: Axis
+    of: Annotated[PointName, "the point"]
+    axis: Annotated[Axis, "'x' or 'y'"]
 
     def bodies(self) -> tuple[str, ...]:
         return (body_of(self.of),)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.measure import Measure
@@ -13,15 +13,15 @@ from kinfmu.measures.placement import Placement, PointPair, body_of
 
 @dataclass(frozen=True)
 class DistanceBetween(Measure):
-    """Distance of two points, L = |d|; its row d.d - L^2 needs no root and is smooth for every d.
+    """Distance L = |d| of two points.
 
-    between: the two points.
+    The row d.d - L^2 needs no root and is smooth for every d.
     """
 
     type: ClassVar[str] = "distance"
     kind: ClassVar[str] = "length"
 
-    between: PointPair
+    between: Annotated[PointPair, "the two points"]
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(map(body_of, self.between))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, NamedTuple, get_origin
+from typing import Annotated, NamedTuple
 
 from kinfmu.measures.arithmetic import Value, cos, sin
 
@@ -14,11 +14,6 @@ class Reference(NamedTuple):
 
     kind: str  # "point": 'body.point', "body": a body's name, or "choice"
     choices: tuple[str, ...] = ()
-
-
-def is_pair(hint: Any) -> bool:
-    """True if a field with this annotation holds two references."""
-    return get_origin(getattr(hint, "__origin__", None)) is tuple
 
 
 PointName = Annotated[str, Reference("point")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.measure import Measure
@@ -13,16 +13,13 @@ from kinfmu.units import Radians
 
 @dataclass(frozen=True)
 class PositionAlong(Measure):
-    """How far a point lies along an axis through another: e.d with d = r_b - r_a and e fixed in a's body.
-
-    between: the points a and b; axis: angle of e in a's body's frame [rad].
-    """
+    """Position of a point along an axis through another: e.d with d = r_b - r_a and e fixed in a's body."""
 
     type: ClassVar[str] = "position"
     kind: ClassVar[str] = "length"
 
-    between: PointPair
-    axis: Radians = 0.0
+    between: Annotated[PointPair, "the points a and b"]
+    axis: Annotated[Radians, "angle of e in a's body's frame [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(map(body_of, self.between))
@@ -35,16 +32,13 @@ class PositionAlong(Measure):
 
 @dataclass(frozen=True)
 class OffsetFrom(Measure):
-    """How far a point lies to the left of an axis through another: n.d with n = e turned by 90 degrees.
-
-    between: the points a and b; axis: angle of e in a's body's frame [rad].
-    """
+    """Distance of a point to the left of an axis through another: n.d with n = e turned by 90 degrees."""
 
     type: ClassVar[str] = "offset"
     kind: ClassVar[str] = "length"
 
-    between: PointPair
-    axis: Radians = 0.0
+    between: Annotated[PointPair, "the points a and b"]
+    axis: Annotated[Radians, "angle of e in a's body's frame [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
         return tuple(map(body_of, self.between))

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
 from kinfmu.measures import Measure
-from kinfmu.measures.placement import Reference, is_pair
+from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
-from kinfmu.mechanism.members import hints_of, path_text
+from kinfmu.mechanism.declared import keys_of
+from kinfmu.mechanism.members import path_text
 from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.units import METRES
 
@@ -108,16 +108,13 @@ def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
 
 
 def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure) -> None:
-    """What its fields refer to; `before` is said before the key."""
-    cls: object = type(member)
-    hints = hints_of(cls)
-    for key in fields(member):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+    """Check the references in its fields; messages put `before` in front of the key."""
+    for key in keys_of(type(member)):
         where, value = f"{before}{key.name}", getattr(member, key.name)
         if isinstance(value, Measure):
             _check_fields(bodies, f"{where}.", value)
-        for said in getattr(hints[key.name], "__metadata__", ()):
-            if isinstance(said, Reference) and not (value is None and key.default is None):
-                _check_reference(bodies, where, value, said, is_pair=is_pair(hints[key.name]))
+        elif key.refers is not None and not (value is None and key.default is None):
+            _check_reference(bodies, where, value, key.refers, is_pair=key.takes == "pair")
 
 
 def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:

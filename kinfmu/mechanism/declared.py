@@ -1,13 +1,16 @@
-"""What the classes of joints, drivers, laws and measures declare as keys of their tables, for schema and documentation.
+"""The keys of tables in mechanism files, from the annotations of the classes of joints, drivers, measures and laws.
 
-The reader takes the same annotations; what a key means is said once, in the docstring of its class.
+The reader, the checks, the JSON Schema and the documentation all use this list. An annotation holds what a number
+measures or what a text refers to, and the meaning of the key as text:
+
+    axis: Annotated[Radians, "direction of the line in i's frame [rad]"] = 0.0
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import MISSING, fields
-from typing import Any, Literal, NamedTuple, get_args, get_type_hints
+from functools import cache
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from kinfmu.laws import Law, LawQuantity, Segment
 from kinfmu.measures import Measure
@@ -16,69 +19,52 @@ from kinfmu.units import Quantity
 
 Takes = Literal["number", "text", "pair", "truth", "numbers", "points", "segments", "measure", "law"]
 REQUIRED = MISSING
+_PLAIN: dict[Any, Takes] = {
+    bool: "truth",
+    Law: "law",
+    Measure: "measure",
+    tuple[float, ...]: "numbers",
+    tuple[tuple[float, float], ...]: "points",
+    tuple[Segment, ...]: "segments",
+}
 
 
 class Key(NamedTuple):
-    """A key of a table.
-
-    takes: the shape of its value; measures: of a number, what it measures; refers: of text or of a pair of texts, to
-    what; default: REQUIRED if there is none; meaning: in words.
-    """
+    """A key of a table."""
 
     name: str
-    takes: Takes
-    measures: Quantity | LawQuantity | None
-    refers: Reference | None
-    default: Any
+    takes: Takes  # the shape of its value
+    measures: Quantity | LawQuantity | None  # of a number
+    refers: Reference | None  # of a text, or of both texts of a pair
+    default: Any  # REQUIRED if there is none
     meaning: str
 
 
-def keys_of(cls: type) -> tuple[Key, ...]:
-    """The keys that a class declares, without `type` and `name`, in the order of its fields."""
+@cache
+def keys_of(cls: Any) -> tuple[Key, ...]:
+    """Return the keys that a class declares, without `type` and `name`, in the order of its fields."""
     hints = get_type_hints(cls, include_extras=True)
-    found = []
-    for field in fields(cls):
-        if field.name == "name":
-            continue
-        hint = hints[field.name]
-        said = getattr(hint, "__metadata__", ())
-        measures = next((one for one in said if isinstance(one, Quantity | LawQuantity)), None)
-        refers = next((one for one in said if isinstance(one, Reference)), None)
-        takes = _takes(cls, field.name, hint, measures, refers)
-        default = REQUIRED if takes == "law" else field.default
-        found.append(Key(field.name, takes, measures, refers, default, meaning_of(cls, field.name)))
-    return tuple(found)
+    return tuple(_key(cls, field, hints[field.name]) for field in fields(cls) if field.name != "name")
 
 
-def _takes(cls: type, key: str, hint: Any, measures: object, refers: Reference | None) -> Takes:
+def _key(cls: Any, field: Any, hint: Any) -> Key:
+    annotated = get_origin(hint) is Annotated
+    base, metadata = (get_args(hint)[0], hint.__metadata__) if annotated else (hint, ())
+    measures = next((one for one in metadata if isinstance(one, Quantity | LawQuantity)), None)
+    refers = next((one for one in metadata if isinstance(one, Reference)), None)
+    meaning = next((one for one in metadata if isinstance(one, str)), "")
+    takes: Takes
     if measures is not None:
-        return "number"
-    if refers is not None:
-        return "pair" if getattr(hint.__origin__, "__origin__", None) is tuple else "text"
-    if hint is bool:
-        return "truth"
-    if isinstance(hint, type) and issubclass(hint, Law):
-        return "law"
-    if isinstance(hint, type) and issubclass(hint, Measure):
-        return "measure"
-    items: dict[Any, Takes] = {float: "numbers", tuple[float, float]: "points", Segment: "segments"}
-    item = next(iter(get_args(hint)), None)
-    if item not in items:
-        raise NotImplementedError(f"{cls.__name__}.{key}: {hint} is no key that a mechanism file can hold")
-    return items[item]
-
-
-def meaning_of(cls: type, key: str) -> str:
-    """What the docstring of the class, or of one it is derived from, says after 'key: ' below its first line."""
-    pattern = re.compile(rf"(?<![\w.'])(?:\w+, )*{key}(?:, \w+)*: (.*?)(?=; (?:\w+, )*\w+: |\.(?: [A-Z]|$))")
-    for base in cls.__mro__:
-        _, _, body = (base.__doc__ or "").partition("\n\n")
-        found = pattern.search(" ".join(body.split()))
-        if found:
-            return found[1]
-    return ""
+        takes = "number"
+    elif refers is not None:
+        takes = "pair" if get_origin(base) is tuple else "text"
+    elif base in _PLAIN:
+        takes = _PLAIN[base]
+    else:
+        raise NotImplementedError(f"{cls.__name__}.{field.name}: {base} is not a type that a mechanism file can hold")
+    return Key(field.name, takes, measures, refers, REQUIRED if takes == "law" else field.default, meaning)
 
 
 def summary_of(cls: type) -> str:
-    """The first line of the docstring, without its full stop."""
+    """Return the first line of the docstring, without its full stop."""
     return (cls.__doc__ or "").strip().partition("\n")[0].rstrip(".:")

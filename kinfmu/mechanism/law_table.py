@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws import RISES, Law, MotionSequence, Polynomial, Segment, Spline
-from kinfmu.laws.law import number_fields
+from kinfmu.laws import RISES, Law, Segment, Spline
+from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_tables import text_of
@@ -21,52 +21,54 @@ _SEGMENT_KEYS = ("law", "rise", "duration")
 
 
 def law_keys(law: type[Law]) -> list[str]:
-    """Keys of a law besides `law` itself."""
-    keys = [key.name for key in fields(law)]  # type: ignore[arg-type]  # every leaf is a dataclass
-    return [*keys, "file"] if law is Spline else keys
+    """Return the names of the keys of a law, without `law` itself."""
+    return [key.name for key in keys_of(law)] + (["file"] if law is Spline else [])
 
 
 def read_law(where: str, table: Mapping[str, Any], law: type[Law], folder: Path | None) -> Law:
-    """The law of a class from the table of its driver or joint; numbers stay as written, the mechanism reads them.
+    """Return the law of a class from the table of its driver or joint.
 
-    folder: where a file named in the table is looked for, unless its path is absolute; without one a file is refused.
-    Raises a MechanismError.
+    Args:
+        where: The table in messages, such as '[drivers.crank]'.
+        table: Keys and values of the table; numbers stay as written, the mechanism converts them.
+        law: The class.
+        folder: Where a relative path to a file in the table starts; None: files are refused.
+
+    Raises:
+        MechanismError: A key is missing or has an invalid value.
+
     """
     values: dict[str, Any] = {}
-    for key in fields(law):  # type: ignore[arg-type]
+    for key in keys_of(law):
         if key.name in table:
-            values[key.name] = _read(f"{where} {key.name}", table[key.name], law, key.name)
+            values[key.name] = _read(f"{where} {key.name}", table[key.name], key.takes)
     if law is Spline and "file" in table:
         if "points" in values:
             raise MechanismError(f"{where} has both 'points' and 'file'; the table is one or the other")
         values["points"] = read_table(f"{where} file", table["file"], folder)
-    for key in fields(law):  # type: ignore[arg-type]
-        if key.name not in values and key.default is MISSING:
+    for key in keys_of(law):
+        if key.name not in values and key.default is REQUIRED:
             or_file = " or 'file'" if key.name == "points" else ""
             raise MechanismError(f"{where} needs the key '{key.name}'{or_file}; keys: {listed(law_keys(law))}")
     return law(**values)
 
 
-def _read(where: str, value: Any, law: type[Law], key: str) -> Any:
-    """One key of a law."""
-    if key in number_fields(law):
-        return value
-    if law is Polynomial:
+def _read(where: str, value: Any, takes: Takes) -> Any:
+    """Return the value of one key of a law."""
+    if takes == "numbers":
         if not isinstance(value, list):
             raise MechanismError(f"{where} = {quoted(value)} must be a list of numbers [c0, c1, ...]")
         return tuple(value)
-    if law is MotionSequence:
-        return _truth(where, value) if key == "repeat" else _segments(where, value)
-    if key == "ends":
-        return text_of(where, value)
-    if not isinstance(value, list) or any(not isinstance(point, list) or len(point) != 2 for point in value):
-        raise MechanismError(f"{where} = {quoted(value)} must be a list of points [[x, u], [x, u], ...]")
-    return tuple(tuple(point) for point in value)
-
-
-def _truth(where: str, value: Any) -> bool:
-    if not isinstance(value, bool):
+    if takes == "truth" and not isinstance(value, bool):
         raise MechanismError(f"{where} = {quoted(value)} must be true or false")
+    if takes == "segments":
+        return _segments(where, value)
+    if takes == "text":
+        return text_of(where, value)
+    if takes == "points":
+        if not isinstance(value, list) or any(not isinstance(point, list) or len(point) != 2 for point in value):
+            raise MechanismError(f"{where} = {quoted(value)} must be a list of points [[x, u], [x, u], ...]")
+        return tuple(tuple(point) for point in value)
     return value
 
 
@@ -94,7 +96,7 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
 def law_lines(law: Law, written: Callable[[Any], str]) -> Iterable[str]:
     """The lines of a law in a mechanism file; written: turns a number, a truth, a text or a tuple of them into TOML."""
     yield f"law = {written(law.type)}"
-    for key in fields(law):  # type: ignore[arg-type]
+    for key in keys_of(type(law)):
         value = getattr(law, key.name)
         if key.name == "segments":
             yield "segments = ["

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from operator import is_
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
@@ -14,6 +13,7 @@ from kinfmu.laws import Law
 from kinfmu.measures import Measure
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.declared import keys_of
 from kinfmu.units import Quantity
 
 if TYPE_CHECKING:
@@ -63,19 +63,6 @@ def path_text(place: NumberPath) -> str:
     return f"[{table}.{name}] {'.'.join(keys)}"
 
 
-@cache
-def hints_of(cls: Any) -> Mapping[str, Any]:
-    """What the fields of a joint or driver class are declared to be."""
-    return get_type_hints(cls, include_extras=True)
-
-
-@cache
-def quantities_of(cls: Any) -> Mapping[str, Quantity]:
-    """The fields of a joint or driver class that are numbers, with what they measure."""
-    said = {key.name: getattr(hints_of(cls)[key.name], "__metadata__", ()) for key in fields(cls)}
-    return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, Quantity)}
-
-
 def _body(body: Body, change: Change) -> Body:
     points = {}
     for name, point in body.points.items():
@@ -92,12 +79,13 @@ def _body(body: Body, change: Change) -> Body:
 
 
 def _member(member: Any, place: NumberPath, change: Change) -> Any:
-    cls: object = type(member)  # object: mypy holds that type[Any] has no hash
-    numbers = quantities_of(cls).items()
-    values = {key: change((*place, key), getattr(member, key), quantity) for key, quantity in numbers}
-    for key in fields(member):
+    cls: object = type(member)  # object: mypy does not take type[Any] for hashable
+    values = {}
+    for key in keys_of(cls):
         part = getattr(member, key.name)
-        if isinstance(part, Law):
+        if isinstance(key.measures, Quantity):
+            values[key.name] = change((*place, key.name), part, key.measures)
+        elif isinstance(part, Law):
             values[key.name] = _law(part, member.law_kinds, (*place, key.name), change)
         elif isinstance(part, Measure):
             values[key.name] = _member(part, (*place, key.name), change)

@@ -1,6 +1,6 @@
-"""The JSON Schema of mechanism files, from what joints, drivers and laws declare: editors complete keys by it.
+"""The JSON Schema of mechanism files, by which editors complete keys, from the declared keys (`declared.py`).
 
-A schema knows shapes and names of keys; what refers to what, and units, only `kinfmu check` can judge.
+A schema describes names and shapes of keys; only `kinfmu check` can check references and units.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST
+from kinfmu.mechanism.law_table import law_keys
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]
@@ -28,19 +29,17 @@ _EXAMPLES = {"length": "25 mm", "angle": "60 deg", "time": "10 ms", "number": "z
 
 
 def schema_text() -> str:
-    """The schema as JSON; the same bytes every time."""
+    """Return the schema as JSON; the same bytes every time."""
     return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def schema() -> Schema:
-    """The schema of a mechanism file, as a tree of JSON values."""
+    """Return the schema of a mechanism file, as a tree of JSON values."""
     names = {"propertyNames": _ref("name")}
     tables = {
         "name": _ref("name", description="The mechanism's name, and its FMU's"),
         "title": {"type": "string", "description": "One line for people"},
-        "units": _table(
-            {"length": {"enum": list(METRES), "description": "Unit of bare lengths; m if nothing is said"}}
-        ),
+        "units": _table({"length": {"enum": list(METRES), "description": "Unit of bare lengths; default: m"}}),
         "parameters": {
             "type": "object",
             "description": "Numbers that expressions refer to by name",
@@ -49,9 +48,9 @@ def schema() -> Schema:
         },
         "run": _table(
             {
-                "start": _number(Quantity("time"), "First sample [s]; 0 if nothing is said"),
-                "stop": _number(Quantity("time"), "Last sample [s]; 1 if nothing is said"),
-                "step": _number(Quantity("time"), "Communication step [s]; 0.01 if nothing is said"),
+                "start": _number(Quantity("time"), "First sample [s]; default: 0"),
+                "stop": _number(Quantity("time"), "Last sample [s]; default: 1"),
+                "step": _number(Quantity("time"), "Communication step [s]; default: 0.01"),
             }
         ),
         "bodies": _named("body", f"Bodies; '{GROUND_NAME}' does not move", **names),
@@ -66,7 +65,7 @@ def schema() -> Schema:
         "outputs": _table(
             {
                 "coordinates": {
-                    "description": "Generalized coordinates to hand out; 'moving' if nothing is said",
+                    "description": "Generalized coordinates in the results; default: 'moving'",
                     "anyOf": [{"enum": ["moving", "all"]}, {"type": "array", "items": {"type": "string"}}],
                 }
             }
@@ -131,19 +130,19 @@ def _body() -> Schema:
 
 
 def _segment() -> Schema:
-    """A rise or a dwell of a sequence."""
+    """Describe a rise or a dwell of a sequence."""
     return {
         "oneOf": [
             _table(
                 {
                     "law": {"enum": [rise.type for rise in RISES]},
-                    "rise": _number(LawQuantity("led"), "How far, down if negative"),
-                    "duration": _number(LawQuantity("argument"), "How long"),
+                    "rise": _number(LawQuantity("led"), "Change of u, negative for a fall"),
+                    "duration": _number(LawQuantity("argument"), "Range of x"),
                 },
                 required=("law", "rise", "duration"),
             ),
             _table(
-                {"law": {"const": DWELL}, "duration": _number(LawQuantity("argument"), "How long")},
+                {"law": {"const": DWELL}, "duration": _number(LawQuantity("argument"), "Range of x")},
                 required=("law", "duration"),
             ),
         ]
@@ -151,7 +150,7 @@ def _segment() -> Schema:
 
 
 def _member(cls: Any, laws: Iterable[type[Law]]) -> Schema:
-    """The table of a joint or driver; one that has a law holds the law's keys too."""
+    """Describe the table of a joint or driver, with the keys of its law if it has one."""
     keys = [key for key in keys_of(cls) if key.takes != "law"]
     own = {"type": {"const": cls.type}, **{key.name: _value(key) for key in keys}}
     required = ["type", *(key.name for key in keys if key.default is REQUIRED)]
@@ -162,37 +161,33 @@ def _member(cls: Any, laws: Iterable[type[Law]]) -> Schema:
         "type": "object",
         "properties": own,
         "required": [*required, "law"],
-        "oneOf": [_ref(f"law_{law.type}", propertyNames={"enum": [*own, "law", *_law_keys(law)]}) for law in laws],
+        "oneOf": [_ref(f"law_{law.type}", propertyNames={"enum": [*own, "law", *law_keys(law)]}) for law in laws],
     }
 
 
 def _measure(cls: type[Measure]) -> Schema:
-    """The table of a measured quantity."""
+    """Describe the table of a measured quantity."""
     keys = keys_of(cls)
     required = ["measure", *(key.name for key in keys if key.default is REQUIRED)]
     own = {"measure": {"const": cls.type}, **{key.name: _value(key) for key in keys}}
     return {"description": summary_of(cls), **_table(own, required)}
 
 
-def _law_keys(law: type[Law]) -> list[str]:
-    return [key.name for key in keys_of(law)] + (["file"] if law is Spline else [])
-
-
 def _law(law: type[Law]) -> Schema:
-    """The keys of a law, which stand in the table of what it leads."""
+    """Describe the keys of a law, which belong to the table of the joint or driver."""
     keys = keys_of(law)
     properties = {"law": {"const": law.type}, **{key.name: _value(key) for key in keys}}
     required = ["law", *(key.name for key in keys if key.default is REQUIRED)]
     found: Schema = {"description": summary_of(law), "type": "object", "properties": properties, "required": required}
     if law is Spline:
-        properties["file"] = {"type": "string", "description": "A CSV file of two columns, in place of points"}
+        properties["file"] = {"type": "string", "description": "A CSV file of two columns, instead of points"}
         found["required"] = [key for key in required if key != "points"]
         found["oneOf"] = [{"required": ["points"]}, {"required": ["file"]}]
     return found
 
 
 def _value(key: Key) -> Schema:
-    """What may stand as the value of a key."""
+    """Describe the values that a key accepts."""
     if key.takes == "number" and key.measures is not None:
         return _number(key.measures, key.meaning, key.default)
     shapes: dict[str, Schema] = {
@@ -222,7 +217,7 @@ def _number(measures: Quantity | LawQuantity, meaning: str, default: Any = REQUI
 
 
 def _ref(definition: str, **more: Any) -> Schema:
-    """A definition, with what stands beside it; in this dialect nothing beside a $ref is seen."""
+    """Refer to a definition, with `more` keywords; this dialect ignores all keywords next to a $ref."""
     ref = {"$ref": f"#/definitions/{definition}"}
     return {**more, "allOf": [ref]} if more else ref
 
@@ -232,7 +227,7 @@ def _list(items: Schema, least: int, most: int | None = None) -> Schema:
 
 
 def _named(definition: str, description: str, **more: Any) -> Schema:
-    """A table of tables that have names of their own."""
+    """Describe a table of named tables."""
     return {
         "type": "object",
         "description": description,

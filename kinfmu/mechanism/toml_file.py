@@ -5,17 +5,16 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from kinfmu.drivers import DRIVERS, Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import JOINTS, Joint
 from kinfmu.laws import LAWS, External, Law
 from kinfmu.measures import MEASURES, Measure
-from kinfmu.measures.placement import is_pair
 from kinfmu.mechanism.body import Body, Point, RunSettings, Start
+from kinfmu.mechanism.declared import REQUIRED, keys_of
 from kinfmu.mechanism.law_table import law_keys, read_law
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.number import read_number
@@ -190,30 +189,28 @@ class _Reader:
             values["law"] = read_law(where, table, law, self.folder)
         else:
             check_keys(where, table, ("type", *keys))
-        return cls(name=name, **values, **self.values(where, cls, table, skip=("law",)))
+        return cls(name=name, **values, **self.values(where, cls, table))
 
     def run(self, table: Mapping[str, Any]) -> RunSettings:
         check_keys("[run]", table, ("start", "stop", "step"))
         return RunSettings(**{key: self.number(f"[run] {key}", value, _TIME) for key, value in table.items()})
 
-    def values(self, where: str, cls: type, table: Mapping[str, Any], skip: Iterable[str] = ()) -> dict[str, Any]:
-        """Fields of a joint or driver from its table, each read as its annotation says."""
-        hints = get_type_hints(cls, include_extras=True)
+    def values(self, where: str, cls: type, table: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of a joint, driver or measure from its table, without the law."""
         values: dict[str, Any] = {}
-        for key in fields(cls):
-            if key.name == "name" or key.name in skip:
+        for key in keys_of(cls):
+            if key.takes == "law":
                 continue
             if key.name not in table:
-                if key.default is MISSING and key.default_factory is MISSING:
+                if key.default is REQUIRED:
                     raise MechanismError(f"{where} needs the key '{key.name}'; keys: {listed(member_keys(cls))}")
                 continue
             value, spot = table[key.name], f"{where} {key.name}"
-            quantity = next((m for m in getattr(hints[key.name], "__metadata__", ()) if isinstance(m, Quantity)), None)
-            if quantity is not None:
-                values[key.name] = self.number(spot, value, quantity)
-            elif hints[key.name] is Measure:
+            if isinstance(key.measures, Quantity):
+                values[key.name] = self.number(spot, value, key.measures)
+            elif key.takes == "measure":
                 values[key.name] = self.measure(spot, value)
-            elif not is_pair(hints[key.name]):
+            elif key.takes == "text":
                 values[key.name] = text_of(spot, value)
             else:
                 if not isinstance(value, list) or len(value) != 2:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.valid import check_name, quoted
 
 
 def member_keys(cls: type) -> list[str]:
-    """Keys of a joint, driver or measure in its table: the fields of its class, but its name."""
-    return [key.name for key in fields(cls) if key.name != "name"]
+    """Return the names of the keys of a joint, driver or measure in its table."""
+    return [key.name for key in keys_of(cls)]
 
 
 def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:

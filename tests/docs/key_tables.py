@@ -1,4 +1,4 @@
-"""The key tables of docs/mechanism-files.md, from what the classes declare."""
+"""The key tables of docs/mechanism-files.md, from the declared keys of the classes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REFERRED = {"point": ('`"body.point"`', 'two `"body.point"`'), "body": ("a body"
 
 
 def sections() -> dict[str, str]:
-    """The generated parts of the page by name, as Markdown."""
+    """Return the generated parts of the page by name, as Markdown."""
     return {
         "units": _units(),
         "joints": "\n".join(_types(JOINTS, "type")),
@@ -36,7 +36,7 @@ def sections() -> dict[str, str]:
 
 
 def filled(page: str) -> str:
-    """The page with its generated parts written anew."""
+    """Return the page with its generated parts replaced."""
     for name, text in sections().items():
         begin, end = f"<!-- generated: {name} -->", f"<!-- end: {name} -->"
         assert page.count(begin) == page.count(end) == 1, f"the page must have {begin} and {end}, once"
@@ -50,8 +50,8 @@ def _units() -> str:
     lines += [f"| {kind} | {', '.join(f'`{unit}`' for unit in units)} |" for kind, units in rows.items()]
     lines += [
         "| speed | such as `mm/s`, `m/min` |",
-        "| angular speed | such as `rad/s`, `deg/s`, `rev/min`; `rpm`; `Hz`, a whole wave or turn in a second |",
-        "| acceleration | such as `mm/s2`, `deg/s2`; higher rates such as `mm/s3` alike |",
+        "| angular speed | such as `rad/s`, `deg/s`, `rev/min`; `rpm`; `Hz` (periods or turns per second) |",
+        "| acceleration | such as `mm/s2`, `deg/s2`; also higher derivatives such as `mm/s3` |",
         "| per angle or length | for cams and couplings, such as `mm/rad`, `mm/deg2`, `rad/mm` |",
         "| number | none |",
     ]
@@ -65,16 +65,16 @@ def _types(classes: Iterable[Any], word: str) -> Iterable[str]:
         equation = _equation(cls)
         if equation:
             lines += [*(f"    {line}" for line in equation), ""]
-        lines += ["| key | value | if not said | meaning |", "|---|---|---|---|"]
+        lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
         lines += [f"| `{key.name}` | {_value(key)} | {_default(key)} | {_cell(key.meaning)} |" for key in keys_of(cls)]
         if cls.type == "spline":
-            lines.append("| `file` | name of a CSV file | | two columns, in place of `points` |")
+            lines.append("| `file` | name of a CSV file | | two columns, instead of `points` |")
         blocks.append("\n".join(lines))
     return ["\n\n".join(blocks)]
 
 
 def _equation(cls: Any) -> list[str]:
-    """The lines set in below the first line of the docstring, or of that of the class it is derived from."""
+    """Return the indented lines of the docstring, or of that of a base class."""
     for base in cls.__mro__:
         lines = [line.strip() for line in (base.__doc__ or "").splitlines() if line.startswith(" " * 8)]
         if lines:
@@ -103,7 +103,7 @@ def _measured(measures: Quantity | LawQuantity | None) -> str:
 
 def _default(key: Key) -> str:
     if key.default is REQUIRED:
-        return "must be said"
+        return "required"
     if key.default is None:
         return ""
     if isinstance(key.default, bool):

@@ -7,9 +7,8 @@ made once: hypothesis looks through a new one every time, which takes longer tha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from functools import cache
-from typing import Any, get_type_hints
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -22,8 +21,9 @@ from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, 
 from kinfmu.laws.law import number_fields
 from kinfmu.laws.spline import ENDS, PERIODIC
 from kinfmu.measures import MEASURES, DistanceBetween, Measure
-from kinfmu.measures.placement import Reference, is_pair
+from kinfmu.measures.placement import Reference
 from kinfmu.mechanism import Body, Mechanism, Point, Start
+from kinfmu.mechanism.declared import Key, keys_of
 from kinfmu.units import Quantity
 from tests.power_series import Series
 
@@ -35,39 +35,36 @@ angles = st.floats(-7.0, 7.0).map(lambda x: round(x, 6))
 
 @cache
 def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
-    """Members of a joint or driver class between ground, left and right; `third` is for what a joint needs besides."""
-    hints = get_type_hints(cls, include_extras=True)
+    """Draw joints or drivers of a class between ground, left and right; `third` is a third body if one is needed."""
     drawn = {"name": st.just("member"), **given}
-    for key in fields(cls):
+    for key in keys_of(cls):
         if key.name not in drawn:
-            drawn[key.name] = _values(cls, key.name, hints[key.name])
+            drawn[key.name] = _values(cls, key)
     return st.builds(cls, **drawn)
 
 
 @cache
-def _values(cls: type[Any], key: str, hint: Any) -> st.SearchStrategy[Any]:
-    if hint is Law:
+def _values(cls: type[Any], key: Key) -> st.SearchStrategy[Any]:
+    if key.takes == "law":
         if issubclass(cls, Driver):
             return st.sampled_from(LAWS).flatmap(laws)
         return pitch_curves() if cls is CamRoller else lifts()
-    if hint is Measure:
+    if key.takes == "measure":
         return st.sampled_from(MEASURES).flatmap(measures)
-    for said in getattr(hint, "__metadata__", ()):
-        if isinstance(said, Quantity):
-            return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[said.kind]
-        if isinstance(said, Reference):
-            beside = "between" in {field.name for field in fields(cls)}
-            return _references(said, is_pair=is_pair(hint), beside=beside)
-    raise NotImplementedError(f"{cls.__name__}.{key}: tests/joints/drawn.py does not know how to draw {hint}")
+    if isinstance(key.measures, Quantity):
+        return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[key.measures.kind]
+    assert key.refers is not None, f"{cls.__name__}.{key.name}: tests/joints/drawn.py does not know how to draw it"
+    third = any(other.name == "between" for other in keys_of(cls))
+    return _references(key.refers, is_pair=key.takes == "pair", third=third)
 
 
-def _references(reference: Reference, *, is_pair: bool, beside: bool) -> st.SearchStrategy[Any]:
+def _references(reference: Reference, *, is_pair: bool, third: bool) -> st.SearchStrategy[Any]:
     if reference.kind == "choice":
         return st.sampled_from(reference.choices)
     names = {"point": {body: f"{body}.{point}" for body, point in POINTS.items()}, "body": {b: b for b in POINTS}}
     of = names[reference.kind]
     if not is_pair:
-        return st.sampled_from([of["third"]] if beside else [of["left"], of["right"]])
+        return st.sampled_from([of["third"]] if third else [of["left"], of["right"]])
     bodies = [("left", "right"), ("right", "left"), ("ground", "left"), ("right", "ground")]
     return st.sampled_from([(of[a], of[b]) for a, b in bodies])
 
@@ -108,15 +105,13 @@ def pitch_curves() -> st.SearchStrategy[Law]:
 def measures(cls: type[Measure]) -> st.SearchStrategy[Measure]:
     """Measures of a class between the bodies left and right."""
     drawn: dict[str, st.SearchStrategy[Any]] = {}
-    hints = get_type_hints(cls, include_extras=True)
-    for key in fields(cls):  # type: ignore[arg-type]  # every leaf is a dataclass
-        (said,) = hints[key.name].__metadata__
-        if isinstance(said, Quantity):
+    for key in keys_of(cls):
+        if key.refers is None:
             drawn[key.name] = angles
         elif key.name == "to":
             drawn[key.name] = st.sampled_from([None, "third"])
         else:
-            drawn[key.name] = _references(said, is_pair=is_pair(hints[key.name]), beside=False)
+            drawn[key.name] = _references(key.refers, is_pair=key.takes == "pair", third=False)
     return st.builds(cls, **drawn)
 
 

@@ -167,7 +167,7 @@ def test_parameters_may_be_numbers_text_or_tables() -> None:
 def test_every_key_has_a_meaning(cls: Any) -> None:
     assert summary_of(cls)
     for key in keys_of(cls):
-        assert key.meaning, f"the docstring of {cls.__name__} says nothing of '{key.name}: '"
+        assert key.meaning, f"the annotation of {cls.__name__}.{key.name} has no text for its meaning"
 
 
 def test_a_field_that_no_file_can_hold_is_an_error() -> None:
@@ -177,7 +177,7 @@ def test_a_field_that_no_file_can_hold_is_an_error() -> None:
     class Odd:
         anything: dict[str, float]
 
-    with pytest.raises(NotImplementedError, match=r"Odd\.anything: .* is no key that a mechanism file can hold"):
+    with pytest.raises(NotImplementedError, match=r"Odd\.anything: .* is not a type that a mechanism file can hold"):
         keys_of(Odd)
 
 
