@@ -1,7 +1,7 @@
 """CDR, the wire format of ROS 2: thousands of messages of one layout filled by numpy at once.
 
-Little-endian; an item of k bytes stands at a multiple of k, counted after the four header bytes (OMG DDS-XTypes, plain
-CDR version 1).
+Little-endian; the offset of an item of k bytes is a multiple of k, counted after the four header bytes (OMG DDS-XTypes,
+plain CDR version 1).
 """
 
 from __future__ import annotations
@@ -23,42 +23,42 @@ class Template:
     def __init__(self) -> None:
         self._bytes = bytearray(HEADER)
         self._stamps: list[int] = []
-        self._words: list[tuple[int, int]] = []  # where slots stand side by side, and how many
+        self._words: list[tuple[int, int]] = []  # offset and number of adjacent slots
 
     def uint8(self, value: int) -> Template:
-        """A fixed number of one byte."""
+        """Add a fixed number of one byte."""
         self._bytes.append(value)
         return self
 
     def uint32(self, value: int) -> Template:
-        """A fixed number of four bytes."""
+        """Add a fixed number of four bytes."""
         self._align(4)
         self._bytes += value.to_bytes(4, "little")
         return self
 
     def string(self, text: str) -> Template:
-        """A fixed text: its length with the zero that ends it, then its UTF-8."""
+        """Add a fixed text: its length with the final zero byte, then its UTF-8."""
         encoded = text.encode() + b"\0"
         self.uint32(len(encoded))
         self._bytes += encoded
         return self
 
     def strings(self, texts: tuple[str, ...]) -> Template:
-        """A sequence of fixed texts."""
+        """Add a sequence of fixed texts."""
         self.uint32(len(texts))
         for text in texts:
             self.string(text)
         return self
 
     def stamp(self) -> Template:
-        """A slot for builtin_interfaces/Time."""
+        """Add a slot for builtin_interfaces/Time."""
         self._align(4)
         self._stamps.append(len(self._bytes))
         self._bytes += bytes(8)
         return self
 
     def words(self, count: int) -> Template:
-        """Slots for `count` numbers of 8 bytes."""
+        """Add slots for `count` numbers of 8 bytes."""
         if count:
             self._align(8)
             self._words.append((len(self._bytes), count))
@@ -66,12 +66,14 @@ class Template:
         return self
 
     def sequence(self, count: int) -> Template:
-        """A sequence of `count` 8-byte numbers: its length, then the slots."""
+        """Add a sequence of `count` 8-byte numbers: its length, then the slots."""
         return self.uint32(count).words(count)
 
     def fill(self, out: Bytes, stamps: NDArray[np.int64], tables: Iterable[NDArray[np.generic]] = ()) -> None:
-        """Messages into out (n, L): stamps (n,) [ns] into every time slot, into the others tables (n, k) of 8-byte
-        items, one after the other; none needs to end where slots side by side end.
+        """Write n messages into out (n, L).
+
+        stamps: (n,) [ns], written into every time slot; tables: (n, k) of 8-byte items, written into the other slots
+        in turn; a table need not end where adjacent slots end.
         """
         out[:] = np.frombuffer(self._bytes, np.uint8)
         times = np.column_stack([stamps // NANOSECONDS, stamps % NANOSECONDS]).astype("<u4")
@@ -89,12 +91,12 @@ class Template:
                     k, filled = k + 1, 0
 
     def read(self, messages: Bytes) -> NDArray[np.uint64]:
-        """The 8-byte items (n, slots) of messages (n, L): the inverse of `fill`."""
+        """Return the 8-byte items (n, slots) of messages (n, L), the inverse of `fill`."""
         return np.hstack([messages[:, place : place + 8 * count].view("<u8") for place, count in self._words])
 
     @property
     def length(self) -> int:
-        """L, bytes of a message."""
+        """Length L of a message [bytes]."""
         return len(self._bytes)
 
     def _align(self, size: int) -> None:
@@ -102,5 +104,5 @@ class Template:
 
 
 def _words(table: NDArray[np.generic]) -> NDArray[np.uint64]:
-    """A table of 8-byte items as their bits, so that nothing looks at what they mean."""
+    """Return a table of 8-byte items as their bits, so that copying does not interpret them."""
     return table.astype(table.dtype.newbyteorder("<"), copy=False).view("<u8")

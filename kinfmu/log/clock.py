@@ -13,7 +13,7 @@ LATEST = 2.0**31 - 1.0  # [s]; a ROS 2 time stamp holds its seconds in 32 bits
 
 
 def nanoseconds(t: FloatArray) -> NDArray[np.int64]:
-    """Times (n,) [s] as whole nanoseconds, rounded: truncation would put samples of a 1 ms grid a nanosecond low."""
+    """Return times (n,) [s] as whole nanoseconds, rounded: truncation would make times of a 1 ms grid 1 ns too low."""
     bad = ~(np.abs(t) <= LATEST)
     if bad.any():
         row = int(np.argmax(bad))
@@ -22,8 +22,8 @@ def nanoseconds(t: FloatArray) -> NDArray[np.int64]:
 
 
 def zero_of(t: FloatArray) -> int:
-    """Simulation time [whole s] at which a log starts counting: 0, or below it when the run begins before 0.
+    """Return the origin of log times [whole s]: 0, or less if the run begins before 0.
 
-    MCAP's times are unsigned, so a run that begins at -0.5 s is counted from -1 s.
+    MCAP's times are unsigned, so the log times of a run that begins at -0.5 s are counted from -1 s.
     """
     return min(0, int(np.floor(t.min()))) if len(t) else 0

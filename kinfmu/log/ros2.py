@@ -1,6 +1,6 @@
-"""Message definitions of ROS 2 that viewers draw by themselves, and names as it allows them.
+"""Definitions of the ROS 2 messages that viewers draw without set-up, and field names that ROS 2 allows.
 
-Text of the definitions: common_interfaces, geometry2 and rcl_interfaces (Apache-2.0 / BSD-3), without comments.
+Source of the definitions: common_interfaces, geometry2 and rcl_interfaces (Apache-2.0 / BSD-3), without comments.
 """
 
 from __future__ import annotations
@@ -31,17 +31,20 @@ LOG = (
     f"{_TIME}"
 )
 LOG_LEVELS = {"info": 20, "warning": 30, "error": 40}
-ROOT = "ground"  # the frame that everything stands in
+ROOT = "ground"  # the root frame
 
 
 def sample_definition(fields: Iterable[tuple[str, str, str]]) -> str:
-    """Definition of kinfmu_msgs/msg/Sample: a stamp, then one field a column; fields: (type, name, comment)."""
+    """Return the definition of kinfmu_msgs/msg/Sample: a stamp, then one field per column.
+
+    fields: (type, name, comment) of each.
+    """
     lines = [f"{kind} {name}  # {comment}" for kind, name, comment in fields]
     return "builtin_interfaces/Time stamp\n" + "\n".join(lines) + f"\n{_TIME}"
 
 
 def field_names(columns: Iterable[str]) -> list[str]:
-    """Names as ROS 2 allows them, 'coupler_x' of 'coupler.x': lower case, single underscores, all different."""
+    """Return names that ROS 2 allows, 'coupler_x' for 'coupler.x': lower case, single underscores, all different."""
     names: list[str] = []
     for column in columns:
         name = re.sub(r"[^a-z0-9]+", "_", column.lower()).strip("_") or "column"

@@ -1,4 +1,4 @@
-"""How a recording is laid out on the screen: linkage, card and log on the left, plots on the right."""
+"""Layout of a recording on the screen: linkage, card and log on the left, plots on the right."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from kinfmu.scene.scene import Scene
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
-SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s] that playing the whole run takes
-SWEEP_SHOW = 10.0  # [s] that it takes where there is no time
+SHORTEST_SHOW, LONGEST_SHOW = 5.0, 30.0  # [s], limits of the time to play the whole run
+SWEEP_SHOW = 10.0  # [s] to play a run that has no time
 EDGE = 0.01  # of the run's time, left free before and after the curves
 LEGEND_EDGE, LETTER = 34.0, 7.0  # [points]; width of a legend around its names, and of a letter
 PLOT, NARROW = 400.0, 200.0  # [points], widths of plots on a usual screen
-LEAST_ROOM, MOST_ROOM = 0.15, 0.6  # of the run's time, left free behind the curves for the legend
+LEAST_LEGEND, MOST_LEGEND = 0.15, 0.6  # of the run's time, left free after the curves for the legend
 
 
 def single(
@@ -30,8 +30,9 @@ def single(
     curves: Mapping[tuple[str, str], Group],
     solver: Sequence[Group],
 ) -> rrb.Blueprint:
-    """One run: what moves on the left, what it measures on the right, one row an order, one column a unit; below that
-    what the solver tells.
+    """Return the layout of one run: linkage on the left; on the right one row per order, one column per unit.
+
+    The solver's diagnostics are below the curves.
     """
     import rerun.blueprint as rrb
 
@@ -57,7 +58,7 @@ def compared(
     curves: Sequence[Mapping[tuple[str, str], Group]],
     difference: Mapping[tuple[str, str], Group],
 ) -> rrb.Blueprint:
-    """Two runs: overlaid on top, below that the differences of the coordinates that they have in common."""
+    """Return the layout of two runs: curves overlaid, and below the differences of their common coordinates."""
     import rerun.blueprint as rrb
 
     overlaid = [row for order in ORDERS if (row := _overlaid(order, timeline, runs, curves))]
@@ -79,9 +80,9 @@ def compared(
 
 
 def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.Container:
-    """What moves, the card, and below it what happened, if anything did.
+    """Return the left side: linkage, card, and the log if there are events.
 
-    The log shows a line of each text, so it is as wide as it can be; the card breaks them.
+    The log does not wrap its texts, so it gets the full width; the card wraps them.
     """
     import rerun.blueprint as rrb
 
@@ -93,7 +94,7 @@ def _left(linkage: rrb.View, roots: Sequence[str], runs: Sequence[Run]) -> rrb.C
 def _overlaid(
     order: str, timeline: Timeline, runs: tuple[Run, Run], curves: Sequence[Mapping[tuple[str, str], Group]]
 ) -> rrb.Container | None:
-    """The curves of both runs in the same plots, one for each unit; None if they have none of that order."""
+    """Return plots of the curves of both runs, one for each unit; None if they have none of that order."""
     import rerun.blueprint as rrb
 
     plots = []
@@ -105,7 +106,7 @@ def _overlaid(
 
 
 def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) -> rrb.Blueprint:
-    """The content with Rerun's own panels out of the way, ready to play."""
+    """Return the blueprint of the content, with Rerun's own panels collapsed, ready to play."""
     import rerun.blueprint as rrb
 
     length = max((float(run.t.max() - run.t.min()) for run in runs if len(run)), default=0.0)
@@ -128,8 +129,11 @@ def arranged(content: rrb.Container, timeline: Timeline, runs: Sequence[Run]) ->
     )
 
 
-def time_axis(timeline: Timeline, runs: Sequence[Run], room: float = EDGE) -> rrb.TimeAxis:
-    """The time of the whole runs, not the half minute around the cursor that is Rerun's default."""
+def time_axis(timeline: Timeline, runs: Sequence[Run], after: float = EDGE) -> rrb.TimeAxis:
+    """Return an axis over the whole runs; Rerun's default is half a minute around the cursor.
+
+    after: part of the runs' time that is left free after the curves.
+    """
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -137,7 +141,7 @@ def time_axis(timeline: Timeline, runs: Sequence[Run], room: float = EDGE) -> rr
     stop = max((float(run.t.max()) for run in runs if len(run)), default=0.0)
     length = stop - start or 1.0
     boundary = rr.encodings.TimeRangeBoundary.absolute
-    first, last = timeline.number(start - EDGE * length), timeline.number(stop + room * length)
+    first, last = timeline.number(start - EDGE * length), timeline.number(stop + after * length)
     shown = rr.TimeRange(start=boundary(**first), end=boundary(**last))
     return rrb.TimeAxis(view_range=shown)
 
@@ -149,35 +153,33 @@ def plot(
     runs: Sequence[Run],
     width: float = PLOT,
 ) -> rrb.TimeSeriesView:
-    """The curves of groups over the whole runs, with their names beside them; groups: (root entity, group); width: of
-    the plot [points].
-    """
+    """Return a plot of curves with a legend; groups: (root entity, group); width: of the plot [points]."""
     import rerun.blueprint as rrb
 
     names = [name for _, group in groups for name in group.names]
-    has_legend = len(names) > 1  # one that is longer than the plot is high scrolls
+    has_legend = len(names) > 1  # a long legend scrolls
     ranges = [group.shown for _, group in groups if group.shown]
     axis_y = rrb.ScalarAxis(range=(min(low for low, _ in ranges), max(high for _, high in ranges))) if ranges else None
     return rrb.TimeSeriesView(
         name=title,
         origin="/",
         contents=[f"{root}/{group.path}" for root, group in groups],
-        axis_x=time_axis(timeline, runs, _legend_room(names, width) if has_legend else EDGE),
+        axis_x=time_axis(timeline, runs, _legend_part(names, width) if has_legend else EDGE),
         axis_y=axis_y,
         plot_legend=rrb.PlotLegend(corner="RightTop", visible=has_legend),
     )
 
 
-def _legend_room(names: Sequence[str], width: float) -> float:
-    """Part of the run's time that the legend of these curves hides in a plot of this width [points]."""
+def _legend_part(names: Sequence[str], width: float) -> float:
+    """Return the part of the run's time that the legend of these curves hides in a plot of this width [points]."""
     legend = LEGEND_EDGE + LETTER * max(map(len, names))
-    return min(max(legend / max(width - legend, 1.0), LEAST_ROOM), MOST_ROOM)
+    return min(max(legend / max(width - legend, 1.0), LEAST_LEGEND), MOST_LEGEND)
 
 
 def linkage_view(
     roots: Sequence[str], timeline: Timeline, runs: Sequence[Run], scenes: Sequence[Scene | None]
 ) -> rrb.Spatial2DView:
-    """The linkages, framed, with trails; the view stands at the root so that the flip of the plane takes effect."""
+    """Return the view of the linkages with trails; its origin is the root, so that the flip of the plane applies."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -200,14 +202,14 @@ def linkage_view(
 
 
 def card_view() -> rrb.TextDocumentView:
-    """Mechanism, run and verdict."""
+    """Return the view of the card."""
     import rerun.blueprint as rrb
 
     return rrb.TextDocumentView(name="run", origin="/card")
 
 
 def status_view(roots: Sequence[str], timeline: Timeline, runs: Sequence[Run]) -> rrb.StateTimelineView:
-    """A lane of solver states for every run."""
+    """Return the view of the solver's states, one lane for each run."""
     import rerun.blueprint as rrb
 
     contents = [f"{root}/solver/status" for root in roots]
@@ -216,7 +218,7 @@ def status_view(roots: Sequence[str], timeline: Timeline, runs: Sequence[Run]) -
 
 
 def log_view(roots: Sequence[str]) -> rrb.TextLogView:
-    """What happened when."""
+    """Return the view of the log."""
     import rerun.blueprint as rrb
 
     columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])

@@ -9,13 +9,13 @@ from kinfmu.log.verdict import MEANINGS, counts, notable_events, worst_residual
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 
-MOST_EVENTS = 12  # the log holds them all
+MOST_EVENTS = 12  # listed on the card; the log has all
 _WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}
-_UNSHOWN = ("title", "token")  # the token identifies FMUs for programs; the record holds it
+_UNSHOWN = ("title", "token")  # only programs need the token; the record has it
 
 
 def card(run: Run, note: str = "") -> str:
-    """Markdown; `note` is one more sentence, such as what could not be drawn."""
+    """Return the card as Markdown; note: one more sentence, such as what could not be drawn."""
     axis = axis_of(run)
     title = run.info.get("title") or run.info.get("name") or "Run"
     lines = [f"### {plain(title)}", "", _period(run), ""]
@@ -61,5 +61,5 @@ def _table(heading: str, entries: Mapping[str, str]) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Text that Markdown shows as it is, on one line."""
+    """Return text escaped for Markdown, on one line."""
     return re.sub(r"([\\`*_|<>\[\]#])", r"\\\1", " ".join(text.split()))

@@ -23,11 +23,11 @@ from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
 
-MOST_TOLD = 6  # names that a line lists
+MOST_LISTED = 6  # coordinates that a line names
 
 
 class _Look(NamedTuple):
-    """How one of the two runs is drawn: B narrow, over a wide A, so that both show where they agree."""
+    """Style of one of the two runs: B is narrow, over a wide A, so that both are visible where they agree."""
 
     name: str
     root: str
@@ -44,7 +44,18 @@ _LOOKS = (
 
 
 def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = ("A", "B")) -> None:
-    """Runs `a` and `b` in one recording, linkages and curves overlaid, B - A for the coordinates that both have."""
+    """Write two runs into one recording: linkages and curves overlaid, and B - A of the common coordinates.
+
+    Args:
+        a: Run A.
+        b: Run B, with the same unit of length and the same axis.
+        path: The .rrd file; an older one is replaced when the new one is complete.
+        names: Of the runs, for titles. Default: A and B.
+
+    Raises:
+        LogError: The runs cannot be compared, a time is outside the range of a log, or the file cannot be written.
+
+    """
     if a.length_unit != b.length_unit:
         raise LogError(
             f"{path}: the runs measure lengths in {a.length_unit} and {b.length_unit}; they need the same unit"
@@ -69,16 +80,16 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
             log_status(rec, look.root, timeline, timeline.placed(run))
         for group in differences.values():
             log_group(rec, "/difference", timeline, apart or a, group)
-        told = [
+        decimation = [
             f"{look.name}: {text}"
             for run, drawn, look in zip((a, b), shown, _LOOKS, strict=True)
             for text in left_out(run, drawn)
         ]
-        log_card(rec, _card(a, b, difference, names, [*told, *(note for note in notes if note)]))
+        log_card(rec, _card(a, b, difference, names, [*decimation, *(note for note in notes if note)]))
 
 
 def _in_common(a: Run, b: Run, path: str | Path) -> Timeline:
-    """The timeline of two runs."""
+    """Return the timeline of two runs."""
     try:
         return timeline_of((a, b))
     except LogError as error:
@@ -86,16 +97,16 @@ def _in_common(a: Run, b: Run, path: str | Path) -> Timeline:
 
 
 def in_common(a: Run, b: Run, names: tuple[str, str] = ("A", "B")) -> str:
-    """A line on which coordinates two runs both have; '' if they are the same, as those of one mechanism are."""
+    """Return a line that states which coordinates two runs have in common; '' if both have the same coordinates."""
     common = _common(a, b)
     if len(common) == len(a.outputs) == len(b.outputs):
         return ""
     if not common:
         return f"{names[0]} and {names[1]} have no coordinates in common, so there are no differences to show"
-    told = listed([*common[:MOST_TOLD], *["..."][: len(common) > MOST_TOLD]])
+    shown = listed([*common[:MOST_LISTED], *["..."][: len(common) > MOST_LISTED]])
     return (
         f"{names[0]} and {names[1]} have {len(common)} of {len(a.outputs)} and {len(b.outputs)} coordinates in common, "
-        f"whose differences are shown: {told}"
+        f"whose differences are shown: {shown}"
     )
 
 
@@ -104,11 +115,9 @@ def _common(a: Run, b: Run) -> list[str]:
 
 
 def _difference(a: Run, b: Run) -> Run | None:
-    """B - A at the times of A, or at its driver values, for the coordinates of A that B has too.
+    """Return B - A of the common coordinates at the times, or driver values, of A; None if there are none.
 
-    B is interpolated where its times differ.
-
-    Linear interpolation is off by up to h^2 / 8 times the second derivative; equal times are compared as they are.
+    Where the times differ, B is interpolated linearly, with an error of at most h^2 / 8 times the second derivative.
     """
     common = _common(a, b)
     if not common or not len(a) or not len(b):
@@ -124,20 +133,18 @@ def _difference(a: Run, b: Run) -> Run | None:
 
 
 def _at(times: FloatArray, t: FloatArray, table: FloatArray) -> FloatArray:
-    """Columns of table (n, k), given at t, at other times; NaN outside them."""
+    """Return the columns of a table (n, k), given at t, at other times; NaN outside the range of t."""
     if np.array_equal(times, t):
         return table
     if len(t) > 1 and np.all(np.diff(t) < 0.0):
         t, table = t[::-1], table[::-1]
     if np.any(np.diff(t) <= 0.0):
-        raise LogError(
-            "the runs have different times, and those of B do not increase, so that it cannot be interpolated"
-        )
+        raise LogError("the runs have different times, and B cannot be interpolated because its times do not increase")
     return np.column_stack([np.interp(times, t, column, left=np.nan, right=np.nan) for column in table.T])
 
 
 def _named(group: Group, look: _Look) -> Group:
-    """The group with its curves named after the run, B's in lighter colours."""
+    """Return the group with its curves named after the run, those of B in lighter colours."""
     colours = group.colours if look is _LOOKS[0] else tuple(palette.lighter(colour) for colour in group.colours)
     return dataclasses.replace(group, names=tuple(f"{look.name} {name}" for name in group.names), colours=colours)
 
@@ -152,8 +159,8 @@ def _card(a: Run, b: Run, difference: Run | None, names: tuple[str, str], notes:
         "",
         *[plain(note) for note in notes],
     ]
-    if told := in_common(a, b):
-        lines += ["", f"{plain(told)}.", ""]
+    if common := in_common(a, b):
+        lines += ["", f"{plain(common)}.", ""]
     if difference is None:
         return "\n".join(lines)
     if not np.array_equal(axis_of(a).values, axis_of(b).values):

@@ -1,4 +1,4 @@
-"""Fewer samples for a picture: those of a long run that show what happened in it."""
+"""Fewer samples for a recording: those of a long run that show its peaks and gaps."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from numpy.typing import NDArray
 
 from kinfmu.run import Run
 
-MOST_ROWS = 200_000  # of a recording; viewers get slow beyond
+MOST_ROWS = 200_000  # of a recording; the viewer is slow with more
 
 
 def decimated(run: Run, most: int | None = None) -> Run:
-    """The run itself if it has at most so many samples (MOST_ROWS if nothing is said), else evenly chosen ones and what
-    lies between them that counts.
+    """Return the run itself if it has at most `most` samples, else evenly spaced ones and the important ones between.
 
-    These are the first and the last sample of every gap and beside it, and of each column the least and the greatest
-    value, so that no peak is lost. The run that is logged elsewhere keeps every sample.
+    most: default MOST_ROWS. Important are the first and last sample of every gap and the numbers next to it, and the
+    least and greatest value of each column, so that no peak is lost. The MCAP record keeps every sample.
     """
     most = MOST_ROWS if most is None else most
     if len(run) <= most:
@@ -25,7 +24,7 @@ def decimated(run: Run, most: int | None = None) -> Run:
 
 
 def _indispensable(run: Run) -> NDArray[np.int64]:
-    """Samples that must not be left out."""
+    """Return the samples that must not be left out."""
     found = [0, len(run) - 1]
     turns = np.flatnonzero(np.diff(run.good.astype(int)))
     found += [*turns.tolist(), *(turns + 1).tolist()]

@@ -1,4 +1,4 @@
-"""The ground of a recording: what stands still under the linkage, hatched where it holds."""
+"""The ground of a recording: supports, rails and other fixed parts, with hatching."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from kinfmu.scene.strokes import Stroke
 if TYPE_CHECKING:
     import rerun as rr
 
-MOST_NAMES = 12  # more names than this would hide the linkage; they show when pointed at
+MOST_NAMES = 12  # more names would hide the linkage; they show when pointed at
 
 
 def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> None:
-    """Supports as triangles on hatched lines, rails, and what else joints add to the ground, under the entity `root`.
+    """Log supports as triangles on hatched lines, rails, and other fixed parts, under the entity `root`.
 
-    pin: radius of its pins [length].
+    pin: radius of the pins [length].
     """
     import rerun as rr
 
@@ -67,7 +67,7 @@ def log_ground(rec: rr.RecordingStream, root: str, scene: Scene, pin: float) -> 
 
 
 def _support() -> list[FloatArray]:
-    """Strokes of a support for a pin at (0, 0), height 1: a triangle on a line with hatching below."""
+    """Return the lines of a support for a pin at (0, 0), height 1: a triangle on a line with hatching below."""
     feet = np.array([[-0.6, -1.0], [0.6, -1.0]])
     triangle = np.vstack([[0.0, 0.0], feet, [0.0, 0.0]])
     line = np.array([[-1.0, -1.0], [1.0, -1.0]])
@@ -75,7 +75,7 @@ def _support() -> list[FloatArray]:
 
 
 def _rail(rail: Stroke, height: float) -> list[FloatArray]:
-    """A rail beyond the way of its slide, with hatching on the side of the ground."""
+    """Return the lines of a rail, longer than the path of its slide, with hatching on the side of the ground."""
     first, last = rail.points
     length = float(np.hypot(*(last - first)))
     along = (last - first) / length if length > 0.0 else np.array([1.0, 0.0])
@@ -87,7 +87,7 @@ def _rail(rail: Stroke, height: float) -> list[FloatArray]:
 
 
 def _under(block: Stroke, height: float, size: float) -> list[FloatArray]:
-    """The hatched line under a block of the ground, through which a body slides."""
+    """Return the hatched line under a block of the ground, through which a body slides."""
     first, last = block.points if block.points[0, 0] <= block.points[-1, 0] else block.points[::-1]
     along = (last - first) / (float(np.hypot(*(last - first))) or 1.0)
     down = block.radius * size * np.array([along[1], -along[0]])
@@ -96,7 +96,7 @@ def _under(block: Stroke, height: float, size: float) -> list[FloatArray]:
 
 
 def _hatching(first: FloatArray, last: FloatArray, depth: float) -> list[FloatArray]:
-    """Strokes to the right of a line, looking along it."""
+    """Return hatching on the right side of a line, looking along it."""
     length = float(np.hypot(*(last - first)))
     along = (last - first) / length
     count = max(round(length / (0.8 * depth)), 3)

@@ -1,4 +1,4 @@
-"""A Rerun viewer without a window: pictures of recordings, and what its views complain about."""
+"""A Rerun viewer without a window: pictures of recordings, and the errors and warnings of its views."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from rerun.experimental import Timeline, ViewerClient
 
 Cursor = dict[str, Any]  # {"duration": seconds}, or {"sequence": number} of recordings without time
-CursorOn = Callable[["Timeline"], Cursor]  # a cursor from the timeline that the recording turns out to have
+CursorOn = Callable[["Timeline"], Cursor]  # a function that returns the cursor on the recording's timeline
 START_TIME, SETTLE_TIME, END_TIME = 30.0, 25.0, 5.0  # [s], at most
 NO_DRIVER = (
     "no graphics driver for a picture without a display: scripts/graphics of the source tree installs one; on Debian: "
     "apt-get install mesa-vulkan-drivers libvulkan1"
 )
-_SIGNS_OF_NO_DRIVER = ("No graphics adapter", "render context")  # none at all; one that is too old
+_SIGNS_OF_NO_DRIVER = ("No graphics adapter", "render context")  # no driver; a driver that is too old
 _COLOUR = re.compile("\x1b\\[[0-9;]*m")  # of terminals
 _POLL = 0.05  # [s]
-_PROBE_SIZE = 640  # [pixels]; small pictures suffice to see that nothing changes any more
+_PROBE_SIZE = 640  # [pixels]; small pictures are enough to detect changes
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture of a recording: PNG bytes, the names of its views, and their complaints as 'view: text'."""
+    """A picture of a recording: PNG bytes, the names of its views, and their reports as 'view: severity: text'."""
 
     png: bytes
     views: tuple[str, ...]
@@ -42,7 +42,7 @@ class Shot:
 
 
 def shoot(path: str | Path, at: Cursor | CursorOn | None = None, size: tuple[int, int] = (1600, 900)) -> Shot:
-    """Show a recording in an invisible viewer, at time `at` if given, and take a picture once it stands still.
+    """Show a recording in an invisible viewer, at the cursor `at` if given, and return a picture of the settled view.
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
     """
@@ -52,13 +52,13 @@ def shoot(path: str | Path, at: Cursor | CursorOn | None = None, size: tuple[int
 
 
 class Viewer:
-    """An invisible viewer that shows one recording after the other."""
+    """An invisible viewer that shows one recording after another."""
 
     def __init__(self, client: ViewerClient) -> None:
         self._client = client
 
     def show(self, path: str | Path, at: Cursor | CursorOn | None = None) -> None:
-        """Show a recording in the place of the one before, at time `at` if given."""
+        """Show a recording, which replaces the one before, at the cursor `at` if given."""
         client, deadline = self._client, time.monotonic() + SETTLE_TIME
         if client.get_state().recordings:
             client.close("all")
@@ -73,13 +73,13 @@ class Viewer:
         client.set_time(play_state="paused", **(at or {}))
 
     def shot(self) -> Shot:
-        """A picture once it stands still."""
+        """Return a picture once the view does not change any more."""
         _settle(self._client, time.monotonic() + SETTLE_TIME)
         return self._shot()
 
     def glance(self) -> Shot:
-        """A picture as soon as everything is drawn, notices above it and all: for what the views complain about."""
-        for _ in range(2):  # a view complains when it is drawn, and plots are drawn after what they load
+        """Return a picture as soon as everything is drawn once, which is enough for the reports of the views."""
+        for _ in range(2):  # a view reports when it is drawn, and plots are drawn after their data are loaded
             self._client.take_screenshot(max_size=_PROBE_SIZE)
         return self._shot()
 
@@ -92,7 +92,10 @@ class Viewer:
 
 
 def executable() -> str:
-    """The viewer itself. The `rerun` script starts it as a child, which would outlive an end of the script."""
+    """Return the path of the viewer's own program.
+
+    The `rerun` script starts it as a child, which keeps running when the script is ended.
+    """
     import rerun_cli  # type: ignore[import-untyped]
 
     name = "rerun.exe" if os.name == "nt" else "rerun"
@@ -105,17 +108,17 @@ def executable() -> str:
 
 
 def last_error(stream: IO[bytes]) -> str:
-    """The line in a viewer's complaints that says why it ended."""
+    """Return the line of a viewer's error output that states why it ended."""
     stream.seek(0)
     plain = _COLOUR.sub("", stream.read().decode(errors="replace"))
     lines = [line.strip() for line in plain.splitlines() if line.strip()]
-    telling = [line for line in lines if line.startswith("Error") or "panicked" in line]
-    return (telling or lines or ["no reason given"])[-1]
+    fatal = [line for line in lines if line.startswith("Error") or "panicked" in line]
+    return (fatal or lines or ["no reason given"])[-1]
 
 
 @contextmanager
 def viewer(size: tuple[int, int] = (1600, 900)) -> Iterator[Viewer]:
-    """A viewer of our own on the loopback interface, ended with the block.
+    """Yield a viewer on the loopback interface, which is ended after the block.
 
     A LogError whose data hold `no_graphics` means that the machine has no graphics driver.
     """
@@ -138,7 +141,7 @@ def viewer(size: tuple[int, int] = (1600, 900)) -> Iterator[Viewer]:
             with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
                 _await_answer(process, client, complaints)
                 try:
-                    client.take_screenshot(max_size=_PROBE_SIZE)  # a viewer that cannot draw ends when it first does
+                    client.take_screenshot(max_size=_PROBE_SIZE)  # a viewer that cannot draw ends here
                     yield Viewer(client)
                 except OSError as error:  # what the client raises when the viewer is gone
                     with suppress(subprocess.TimeoutExpired):
@@ -166,7 +169,7 @@ def _await_port(process: subprocess.Popen[bytes], port: int, complaints: IO[byte
 
 
 def _await_answer(process: subprocess.Popen[bytes], client: ViewerClient, complaints: IO[bytes]) -> None:
-    """The port opens before the viewer can answer, and before it looks for a graphics driver."""
+    """Wait for the first answer: the port opens before the viewer can answer or has found a graphics driver."""
     deadline = time.monotonic() + START_TIME
     while True:
         try:
@@ -190,7 +193,7 @@ def _check_running(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> N
 
 
 def _settle(client: ViewerClient, deadline: float) -> None:
-    """Wait for three equal pictures in a row: plots load one by one, and notices fade."""
+    """Wait for three equal pictures in a row, because plots load one by one and notices fade."""
     last, same = b"", 0
     while same < 2 and time.monotonic() < deadline:
         picture = client.take_screenshot(max_size=_PROBE_SIZE)
@@ -200,7 +203,7 @@ def _settle(client: ViewerClient, deadline: float) -> None:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ask the viewer to end, then make it."""
+    """Ask the viewer to end, then kill it if it does not."""
     process.terminate()
     try:
         process.wait(END_TIME)

@@ -1,4 +1,4 @@
-"""Which names a linkage shows all the time, so that none is printed over another; the others show when pointed at."""
+"""Choice of the names that are always shown, so that none covers another; the others show when pointed at."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from kinfmu.scene.scene import Scene
 
 SUPPORT = 0.05  # height of a support, as a part of the size
 _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame
-_LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: a letter, what is around them, its height
-_LOOKS = 40  # poses that are looked at
-_OFTEN = 0.35  # of them; names that cover each other in more are not shown both
+_LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: width of a letter, margin, height
+_SAMPLES = 40  # poses that are compared
+_OFTEN = 0.35  # of them; of two names that cover each other in more poses only one is shown
 
 
 def dots(scene: Scene) -> float:
-    """Points of the screen to one unit of length, where the view shows the whole linkage."""
+    """Return the points of the screen per unit of length, where the view shows the whole linkage."""
     width, height = np.maximum(scene.high - scene.low, 1e-9 * scene.size)
     return float(min(_WIDTH / width, _HEIGHT / height))
 
 
 def places_below(scene: Scene) -> FloatArray:
-    """Return where names of supports are written, (k, 2): below each, and further down where another would cover it."""
+    """Return the places of the names of supports, (k, 2): below each, or lower where another name would cover it."""
     depth = 1.7 * SUPPORT * scene.stroke
     line, placed = _LINE / dots(scene), list[FloatArray]()
     for at in scene.supports.values():
@@ -36,15 +36,15 @@ def places_below(scene: Scene) -> FloatArray:
 
 
 def _pairs(scene: Scene, placed: Sequence[FloatArray]) -> list[tuple[FloatArray, str, str]]:
-    """Names of supports that are placed, each with that of the next one."""
+    """Return the supports' names that are placed, each with the name of the next one."""
     names = list(scene.supports)
     return [(at, names[len(placed)], name) for at, name in zip(placed, names, strict=False)]
 
 
 def shown_names(scene: Scene) -> frozenset[str]:
-    """Names of bodies and bars that are shown all the time: those of supports and points of interest come first."""
+    """Return the bodies and bars whose names are always shown; supports and points of interest have precedence."""
     count = max((len(body.pose) for body in scene.bodies), default=0)
-    rows = np.unique(np.linspace(0, max(count - 1, 0), _LOOKS).astype(int)) if count else np.zeros(0, int)
+    rows = np.unique(np.linspace(0, max(count - 1, 0), _SAMPLES).astype(int)) if count else np.zeros(0, int)
     taken = [(name, path[rows]) for name, path in scene.paths.items()]
     taken += [(name, np.tile(at, (len(rows), 1))) for name, at in zip(scene.supports, places_below(scene), strict=True)]
     found = []
@@ -59,13 +59,13 @@ def shown_names(scene: Scene) -> frozenset[str]:
 
 
 def _middle(outline: FloatArray) -> tuple[float, float]:
-    """Where the viewer puts the name of a line."""
+    """Return where the viewer puts the name of a line."""
     x, y = outline.mean(axis=0)
     return float(x), float(y)
 
 
 def _covers(scene: Scene, a: FloatArray, b: FloatArray, first: str, second: str) -> FloatArray:
-    """Where two names (n, 2) lie on one another, (n,); False in gaps."""
+    """Return where two names at (n, 2) cover each other, (n,) of 1.0 or 0.0; 0.0 in gaps."""
     apart = np.abs(a - b) * dots(scene)
     width = 0.5 * _LETTER * (len(first) + len(second)) + _EDGE
     return np.asarray((apart[:, 0] < width) & (apart[:, 1] < _LINE), float)

@@ -1,4 +1,4 @@
-"""The moving linkage of a recording, y up: lines that stand still in the frames of bodies, and the frames that move."""
+"""The moving linkage of a recording, y up: lines that are fixed in frames of bodies, and the moving frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's si
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
 _BAR, _PIN, _POINT = 0.006, 0.012, 0.015  # radii, as parts of the size
-_SUPPORT_NAMES = 0.04  # more room below, for the names of supports
+_SUPPORT_NAMES = 0.04  # additional margin below, for the names of supports
 
 
 APPLICATION = "kinfmu"
@@ -38,14 +38,14 @@ def send(
     t: FloatArray,
     columns: Callable[[slice], Iterable[rr.ComponentColumn]],
 ) -> None:
-    """Rows at times t (n,) of the timeline to the entity `path`; columns(rows) gives those of a slice of them."""
+    """Send rows at times t (n,) of the timeline to the entity `path`; columns(rows): the columns of a slice of rows."""
     for start in range(0, len(t), ROWS):
         rows = slice(start, start + ROWS)
         rec.send_columns(path, [timeline.column(t[rows])], columns(rows))
 
 
 def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Ranges of x and of the flipped y that show everything with a margin."""
+    """Return ranges of x and of the flipped y that show everything with a margin."""
     margin = MARGIN * scene.size
     below = np.array([0.0, _SUPPORT_NAMES * scene.size if scene.supports else 0.0])
     low, high = scene.low - margin - below, scene.high + margin
@@ -53,15 +53,15 @@ def view_box(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def trail_path(root: str, point: str) -> str:
-    """Entity of the trail behind a point of interest."""
+    """Return the entity of the trail behind a point of interest."""
     return f"{root}/trails/{point}"
 
 
 def trail_time(run: Run, scene: Scene, point: str) -> float:
-    """How long the trail behind a point reaches back, on the timeline: usually for TRAIL of the linkage's size."""
+    """Return the duration of the trail behind a point on the timeline; its length is usually TRAIL of the size."""
     steps = np.hypot(*np.diff(scene.paths[point], axis=0).T)
-    way, span = float(np.nansum(steps)), float(np.ptp(run.t)) if len(run) else 0.0
-    return span * min(TRAIL * scene.size / way, LONGEST_TRAIL) if way > 0.0 else 0.0
+    length, span = float(np.nansum(steps)), float(np.ptp(run.t)) if len(run) else 0.0
+    return span * min(TRAIL * scene.size / length, LONGEST_TRAIL) if length > 0.0 else 0.0
 
 
 def log_linkage(
@@ -74,17 +74,16 @@ def log_linkage(
     width: float = 1.0,
     layer: float = 0.0,
 ) -> None:
-    """The linkage of a placed run under the entity `root`: all in `colour`, or each body in its own.
+    """Log the linkage of a placed run under the entity `root`: all in `colour`, or each body in its own.
 
-    `width` scales the lines, and what has a higher `layer` covers what has a lower one.
-    Where the run has no numbers the last pose that closed stays, in grey, with a notice; before the first pose there is
-    nothing to draw.
+    width: factor of the lines' widths; layer: higher layers cover lower ones. Where the run has no numbers, the last
+    pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
     """
     _Linkage(rec, root, timeline, run, scene, colour, width, layer).log()
 
 
 class _Linkage:
-    """What is being logged, and how."""
+    """A linkage that is being logged, and its style."""
 
     def __init__(
         self,
@@ -106,7 +105,7 @@ class _Linkage:
         self.names = shown_names(scene) if is_named else frozenset[str]()
 
     def log(self) -> None:
-        """Everything, the ground first."""
+        """Log everything, the ground first."""
         import rerun as rr
 
         # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
@@ -128,7 +127,7 @@ class _Linkage:
         self._notice()
 
     def _body(self, body: DrawnBody) -> None:
-        """Its link, what joints add to it, its pins, and its points of interest."""
+        """Log the link of a body, what joints add to it, its pins, and its points of interest."""
         path = f"{self.root}/bodies/{body.name}"
         own = self.colour or palette.body(body.index)
         order = 20.0 + body.index / 100.0
@@ -176,22 +175,22 @@ class _Linkage:
                 self.frames.points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
 
     def _pins(self, path: str, pins: tuple[tuple[str, FloatArray], ...]) -> None:
-        """Pins with the names of their joints, which show when pointed at."""
+        """Log pins with the names of their joints, which show when pointed at."""
         if pins:
             names, at = zip(*pins, strict=True)
             self.frames.points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
-        """Where a point goes over the run, in one piece for each stretch without a gap."""
+        """Log the path of a point over the run, one line for each part between gaps."""
         import rerun as rr
 
-        pieces = [piece.astype(np.float32) for piece in stretches(points)]
+        pieces = [piece.astype(np.float32) for piece in pieces_between_gaps(points)]
         if pieces:
             line = rr.LineStrips2D(pieces, colors=[colour], radii=self._thin(1.0), draw_order=self.layer + 5.0)
             self.rec.log(path, line, static=True)
 
     def _trail(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
-        """Pieces of the path at their own times; the view shows those of a short time back."""
+        """Log pieces of the path at their times; the view shows those of the last moments."""
         import rerun as rr
 
         step = max(-(-len(points) // _TRAIL_PIECES), 1)
@@ -206,20 +205,20 @@ class _Linkage:
         self._strips(path, self.run.t[ends[known]], strips)
 
     def _thin(self, points: float) -> Any:
-        """Radius of a line that is thin at any zoom; of two runs that lie on one another the lower one is wide."""
+        """Return the radius of a line that is thin at any zoom; of two overlaid runs the lower one is wide."""
         import rerun as rr
 
         return rr.Radius.ui_points(points if self.colour is None else 2.0 * self.width * points)
 
     def _strips(self, path: str, t: FloatArray, strips: FloatArray) -> None:
-        """One polyline a sample: strips (n, k, 2)."""
+        """Send one polyline per sample; strips: (n, k, 2)."""
         import rerun as rr
 
         columns = lambda rows: rr.LineStrips2D.columns(strips=strips[rows].astype(np.float32))  # noqa: E731  short
         send(self.rec, path, self.timeline, t, columns)
 
     def _notice(self) -> None:
-        """Above the linkage, while the run has no numbers."""
+        """Log a notice above the linkage for samples without numbers."""
         import rerun as rr
 
         run, scene, path = self.run, self.scene, f"{self.root}/notice"
@@ -228,9 +227,9 @@ class _Linkage:
         place = [(scene.low[0] + scene.high[0]) / 2, scene.high[1] + 0.6 * MARGIN * scene.size]
         look = rr.Points2D.from_fields(colors=[palette.STATUS[3]], radii=[0.0], show_labels=True)
         self.rec.log(path, look, static=True)
-        turns = self.frames.turns()
-        lost = ~run.good[turns]
-        before = ~np.maximum.accumulate(run.good)[turns]
+        switches = self.frames.switches()
+        lost = ~run.good[switches]
+        before = ~np.maximum.accumulate(run.good)[switches]
         texts = [
             "no pose yet" if early else "no pose: the last one that closed, in grey"
             for early, gone in zip(before, lost, strict=True)
@@ -244,11 +243,11 @@ class _Linkage:
             positions = np.tile(np.array(place, np.float32), (len(labels), 1))
             return [*rr.Points2D.columns(positions=positions, labels=labels).partition(counts)]
 
-        send(self.rec, path, self.timeline, run.t[turns], columns)
+        send(self.rec, path, self.timeline, run.t[switches], columns)
 
 
-def stretches(points: FloatArray) -> list[FloatArray]:
-    """The parts of a path (n, 2) between its gaps, those of more than one point."""
+def pieces_between_gaps(points: FloatArray) -> list[FloatArray]:
+    """Return the parts of a path (n, 2) between its gaps that have more than one point."""
     known = np.isfinite(points).all(axis=1)
     pieces = [piece[np.isfinite(piece).all(axis=1)] for piece in np.split(points, np.flatnonzero(~known)) if len(piece)]
     return [piece for piece in pieces if len(piece) > 1]
@@ -266,7 +265,7 @@ class Frames:
         self._always = 0 < len(self._good) == len(run.good)  # every sample holds numbers
 
     def move(self, path: str, pose: FloatArray) -> None:
-        """Poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers."""
+        """Send poses (n, 3) of the frame of an entity, x, y [length], phi [rad], at the samples that hold numbers."""
         import rerun as rr
 
         known = pose[self._good]
@@ -292,9 +291,9 @@ class Frames:
         label: str | None = None,
         shown: bool = False,
     ) -> None:
-        """A line (k, 2) that stands still in its frame, from the first pose on; grey where the last pose stands in.
+        """Log a line (k, 2) that is fixed in its frame, from the first pose on; grey where the run has no numbers.
 
-        radius: as a part of the size; label: its name, if it has one; shown: not only when it is pointed at.
+        radius: relative to the size; label: its name, if it has one; shown: True if the name is always shown.
         """
         import rerun as rr
 
@@ -305,9 +304,11 @@ class Frames:
         elif len(self._good):
             self._rec.log(path, rr.LineStrips2D.from_fields(**look), static=True)
             self._with_first_pose(path, rr.LineStrips2D.columns(strips=strip))
-            turns = self.turns()
-            colours = np.array([colour if good else palette.OUT_OF_REACH for good in self._run.good[turns]], np.uint8)
-            at = self._run.t[turns]
+            switches = self.switches()
+            colours = np.array(
+                [colour if good else palette.OUT_OF_REACH for good in self._run.good[switches]], np.uint8
+            )
+            at = self._run.t[switches]
             send(self._rec, path, self._timeline, at, lambda rows: rr.LineStrips2D.columns(colors=colours[rows]))
 
     def points(
@@ -320,7 +321,7 @@ class Frames:
         names: list[str],
         shown: bool,
     ) -> None:
-        """Points (k, 2) with their names, which stand still in their frame, from the first pose on."""
+        """Log points (k, 2) with their names, fixed in their frame, from the first pose on."""
         import rerun as rr
 
         look = {"colors": [colour], **self._look(radius, order, names, shown)}
@@ -331,15 +332,15 @@ class Frames:
             self._rec.log(path, rr.Points2D.from_fields(**look), static=True)
             self._with_first_pose(path, rr.Points2D.columns(positions=at).partition([len(at)]))
 
-    def turns(self) -> NDArray[np.int64]:
-        """The first sample of each stretch with numbers, and of each without."""
+    def switches(self) -> NDArray[np.int64]:
+        """Return the first sample of each series with numbers, and of each without."""
         return np.flatnonzero(np.diff(self._run.good.astype(int), prepend=-1))
 
     def _with_first_pose(self, path: str, columns: Any) -> None:
         send(self._rec, path, self._timeline, self._run.t[self._good[:1]], lambda _: columns)
 
     def _look(self, radius: float, order: float, names: list[str], shown: bool) -> dict[str, Any]:
-        """What lines and points are told alike."""
+        """Return the style that lines and points have in common."""
         return {
             "radii": [radius * self._size],
             "labels": names or None,

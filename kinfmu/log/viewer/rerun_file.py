@@ -47,17 +47,24 @@ if TYPE_CHECKING:
 
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
-_ENCODING = "Failed to encode LogMsg: "  # Rerun's words
+_ENCODING = "Failed to encode LogMsg: "  # beginning of Rerun's messages
 
 
 def write_rrd(run: Run, path: str | Path) -> None:
     """Write `run` as a Rerun recording with the blueprint to review it.
 
-    Of more than decimated.MOST_ROWS samples the recording holds that many and all that tell something, and says so; the
-    lane of states and the log come from all of them. Raises a LogError for a file that cannot be written, which leaves
-    an older one as it was, and for times that a log cannot hold.
+    A run of more than decimated.MOST_ROWS samples is decimated; peaks and gaps are kept, and the card states the
+    numbers. The lane of states and the log are made from all samples.
+
+    Args:
+        run: The run.
+        path: The .rrd file; an older one is replaced when the new one is complete.
+
+    Raises:
+        LogError: The file cannot be written, or a time is outside the range of a log.
+
     """
-    nanoseconds(run.t)  # says what is wrong with a time before a file is begun
+    nanoseconds(run.t)  # reports invalid times before a file is made
     timeline = timeline_of([run])
     shown = timeline.placed(decimated(run))
     scene, note = drawable(shown)
@@ -76,14 +83,17 @@ def write_rrd(run: Run, path: str | Path) -> None:
 
 
 def left_out(run: Run, shown: Run) -> list[str]:
-    """A sentence on samples that the recording leaves out, none if it holds all."""
+    """Return a sentence on the samples that the recording leaves out; empty if it holds all."""
     if len(shown) == len(run):
         return []
     return [f"{len(shown)} of {len(run)} samples are drawn, peaks and gaps among them; the MCAP holds all."]
 
 
 def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
-    """Name of the application that recordings of such runs and curves belong to, such as 'kinfmu_fourbar_12ab34cd'."""
+    """Return Rerun's application id for such runs and curves, such as 'kinfmu_fourbar_12ab34cd'.
+
+    The viewer keeps one layout per application, so recordings that need another layout get another id.
+    """
     ranges = [(group.path, group.shown) for group in groups]
     spans = [(float(run.t.min()), float(run.t.max())) for run in runs if len(run)]
     facts = repr(
@@ -95,16 +105,16 @@ def application(runs: Sequence[Run], groups: Iterable[Group]) -> str:
 
 @contextmanager
 def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: str) -> Iterator[rr.RecordingStream]:
-    """A recording that is at `path` as a whole when the block ends."""
+    """Yield a recording; its complete file replaces `path` when the block ends."""
     import rerun as rr
 
     with replacing(path) as temporary:
         rec = rr.RecordingStream(application, recording_id=f"{Path(path).stem}-{uuid4()}")
-        rec.set_log_time_enabled(False)  # wall-clock time is nothing to review, and 16 bytes a row
+        rec.set_log_time_enabled(False)  # wall-clock time is not needed and takes 16 bytes a row
         rec.set_log_tick_enabled(False)
         try:
             rec.save(temporary, default_blueprint=layout)
-        except RuntimeError as error:  # what Rerun makes of an OSError
+        except RuntimeError as error:  # Rerun's form of an OSError
             raise LogError(f"{path}: cannot be written ({str(error).removeprefix(_ENCODING)})") from error
         rec.send_recording_name(name)
         try:
@@ -118,7 +128,7 @@ def recording(path: str | Path, name: str, layout: rrb.Blueprint, application: s
 def log_group(
     rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run, group: Group, width: float = 1.5
 ) -> None:
-    """The curves of a group, a gap where they are NaN; as points where lines would not show, between gaps."""
+    """Log the curves of a group: lines with gaps where they are NaN, or points if a sample lies between two gaps."""
     import rerun as rr
 
     path = f"{root}/{group.path}"
@@ -139,23 +149,23 @@ def log_group(
 
 
 def log_card(rec: rr.RecordingStream, markdown: str) -> None:
-    """The text beside the linkage."""
+    """Log the card."""
     import rerun as rr
 
     rec.log("/card", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
 
 
 def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run) -> None:
-    """The lane of states and the log of what happened."""
+    """Log the lane of states and the events."""
     import rerun as rr
 
     path = f"{root}/solver/status"
     labels = [label(status) for status in Status]
     colours = [palette.STATUS[status] for status in Status]
     rec.log(path, rr.StateConfiguration(values=labels, colors=colours), static=True)
-    turns = list(changes(run))
-    times = np.array([turn.t for turn in turns])
-    states = [label(turn.status) for turn in turns]
+    changed = list(changes(run))
+    times = np.array([change.t for change in changed])
+    states = [label(change.status) for change in changed]
     send(rec, path, timeline, times, lambda rows: rr.StateChange.columns(state=states[rows]))
     events = notable_events(run)
     send(
@@ -171,7 +181,7 @@ def log_status(rec: rr.RecordingStream, root: str, timeline: Timeline, run: Run)
 
 
 def _properties(run: Run) -> rr.AnyValues:
-    """The run's info, unit and verdict as properties of the recording."""
+    """Return the run's info, unit and verdict as properties of the recording."""
     import rerun as rr
 
     about = rr.AnyValues()
@@ -188,7 +198,7 @@ def _flush(rec: rr.RecordingStream, path: str | Path) -> None:
 
 
 def _check_whole(file: Path, path: str | Path) -> None:
-    """Look for the footer: what fails after the last flush Rerun tells to the terminal only."""
+    """Look for the footer, because Rerun reports failures after the last flush on the terminal only."""
     with file.open("rb") as stream:
         stream.seek(-min(64, file.stat().st_size), 2)
         if b"RRF" not in stream.read():

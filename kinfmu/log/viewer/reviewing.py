@@ -1,4 +1,4 @@
-"""Look at a run: open it in the Rerun viewer, save the recording, or take a picture."""
+"""Review of a run: open it in the Rerun viewer, save the recording, or take a picture."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     Place = float | Callable[[Timeline], float]
 
-FAILS_WITHIN = 1.5  # [s]; a viewer that cannot open a window ends sooner
-POSTER = 1 / 3  # of the run's time: where a picture is taken if no time is given; ends are often singular
-_VIEWERS: list[subprocess.Popen[bytes]] = []  # kept, for Python warns of processes that it forgets
+FAILS_WITHIN = 1.5  # [s]; a viewer that cannot open a window ends within this time
+POSTER = 1 / 3  # of the run's time, default time of a picture; poses at the ends are often singular
+_VIEWERS: list[subprocess.Popen[bytes]] = []  # kept, because Python warns of running processes without a reference
 
 
 def review(
@@ -40,15 +40,23 @@ def review(
 ) -> Path | None:
     """Make the recording of a run and open the viewer on it, or only `save` it, or take a `screenshot`.
 
-    run: an .mcap, or an .rrd to be shown as it is; other: a second .mcap to compare with; at: time of the picture [s],
-    of a run over driver values the value [rad or the unit of length] or the number of the sample, or a function that
-    returns it from the timeline of the recording;
-    report: called with a line on which coordinates two runs have in common if they are not the same.
-    Without `save` the recording that is opened stands beside the run, under its name with .rrd. Returns where the
-    recording is, None if there was only a picture.
+    Args:
+        run: An .mcap file, or an .rrd file to be shown unchanged.
+        other: A second .mcap file to compare with. Default: none.
+        save: The .rrd file to write. Default: in the folder of the run, with its name and the suffix .rrd.
+        screenshot: The .png file to write. Default: none.
+        at: Time of the screenshot [s]; of a run over driver values the value [rad or the unit of length] or the number
+            of the sample; or a function that returns it from the timeline of the recording. Default: a third of the
+            run.
+        report: Called with a line on the common coordinates if the two runs do not have the same. Default: none.
 
-    Raises a RequestError for files and times that cannot be meant, a LogError for a run that cannot be read, a file
-    that cannot be written, and a viewer that does not open or cannot draw.
+    Returns:
+        The path of the recording; None if only a screenshot was taken.
+
+    Raises:
+        RequestError: Invalid files or time.
+        LogError: A run cannot be read, a file cannot be written, or the viewer cannot open or draw.
+
     """
     run = Path(run)
     _check(run, other, save, screenshot, at)
@@ -78,7 +86,7 @@ def review(
 def _check(
     run: Path, other: str | Path | None, save: str | Path | None, screenshot: str | Path | None, at: Place | None
 ) -> None:
-    """Raise a RequestError for files that cannot be reviewed or written, or that do not go together."""
+    """Raise a RequestError for files that cannot be reviewed, written or combined."""
     if at is not None and not screenshot:
         asked = "at" if callable(at) else f"at = {at:g}"
         raise RequestError(f"{asked} is the time of a screenshot, and none is asked for")
@@ -108,7 +116,7 @@ def _record(
     at: Place | None,
     report: Callable[[str], None] | None,
 ) -> Cursor | None:
-    """Write the recording; returns where a picture of it shows something."""
+    """Write the recording and return the cursor for a picture of it."""
     first = read(run)
     axis = axis_of(first)
     second = None if other is None else read(other)
@@ -136,7 +144,7 @@ def _record(
 
 
 def _on_shown(at: Place | None) -> CursorOn | None:
-    """Where a picture of a recording is taken, once the viewer tells the recording's timeline."""
+    """Return a function from the viewer's timeline to the cursor of a picture; None without a time."""
     if at is None:
         return None
 
@@ -155,12 +163,12 @@ def _on_shown(at: Place | None) -> CursorOn | None:
 
 
 def _shoot(recording: Path, screenshot: str | Path, at: Cursor | CursorOn | None) -> None:
-    """A picture of the recording; a view that cannot show its data is an error."""
+    """Write a picture of the recording; LogError for a view that cannot show its data."""
     shot = shoot(recording, at)
     with replacing(screenshot) as temporary:
         temporary.write_bytes(shot.png)
     if shot.reports:
-        raise LogError(f"{screenshot}: the viewer complains: {'; '.join(shot.reports)}")
+        raise LogError(f"{screenshot}: the viewer reports: {'; '.join(shot.reports)}")
 
 
 def _need_display(run: Path) -> None:
@@ -172,7 +180,7 @@ def _need_display(run: Path) -> None:
 
 
 def _open(recording: Path) -> None:
-    """Start the viewer and leave it running; a viewer that is open already takes the recording over."""
+    """Start the viewer and leave it running; a viewer that is already open shows the recording instead."""
     with TemporaryFile() as complaints:
         viewer = subprocess.Popen(  # noqa: S603  # our own arguments
             [executable(), "--bind", "127.0.0.1", str(recording.resolve())],

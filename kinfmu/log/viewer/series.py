@@ -1,4 +1,4 @@
-"""The curves of a run: coordinates grouped by what they measure, and the solver's accuracy."""
+"""Curves of a run: coordinates grouped by order and unit, and the solver's diagnostics."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from kinfmu.units import Quantity, derivative_name, quantity_of, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
-SMALLEST = 1e-17  # drawn in the place of 0 on a logarithmic axis, below all round-off
+SMALLEST = 1e-17  # drawn in place of 0 on a logarithmic axis; smaller than round-off
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Curves of one unit that belong into one plot: values (n, k), NaN in a gap; shown: range of the axis, or None."""
+    """Curves of one unit for one plot: values (n, k), NaN in a gap; shown: range of the axis, None for the default."""
 
     path: str
     title: str
@@ -32,13 +32,13 @@ class Group:
 
     @property
     def is_scattered(self) -> bool:
-        """True where a value has none beside it, so that a line would not show it."""
+        """True if a value has no neighbour, so that a line would not show it."""
         known = np.pad(np.isfinite(self.values).any(axis=1), 1)
         return bool(np.any(known[1:-1] & ~known[:-2] & ~known[2:]))
 
 
 def groups(run: Run) -> dict[tuple[str, str], Group]:
-    """Coordinates and points of interest by (order, kind), such as ('velocity', 'angle'); kinds that occur."""
+    """Return coordinates and points of interest by (order, kind), such as ('velocity', 'angle')."""
     colours = _colours(run)
     axis = axis_of(run)
     found = {}
@@ -66,13 +66,13 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
 
 
 def _title(quantity: Quantity, length_unit: str) -> str:
-    """Such as 'angular velocity [rad/s]'."""
+    """Return a title such as 'angular velocity [rad/s]'."""
     words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]
     return f"{words[quantity.order]} [{unit_of(quantity, length_unit)}]"
 
 
 def accuracy(run: Run) -> Group | None:
-    """log10 of the residual and of the largest watch, both relative to the mechanism's size; None if not kept."""
+    """Return log10 of the residual and of the largest watch, relative to the mechanism's size; None if not kept."""
     curves = {"residual": run.residual} if "solver.residual" not in run.absent else {}
     if run.watch_names and not {f"watch.{name}" for name in run.watch_names} & run.absent:
         curves["watch" if len(run.watch_names) == 1 else "largest watch"] = np.abs(run.watch).max(axis=1)
@@ -80,22 +80,22 @@ def accuracy(run: Run) -> Group | None:
 
 
 def error_estimates(run: Run) -> Group | None:
-    """log10 of the estimated errors of q, qd and qdd; None if no sample has any."""
+    """Return log10 of the estimated errors of q, qd and qdd; None if no sample has any."""
     curves = {name: run.error[:, k] for k, name in enumerate(("q", "qd", "qdd"))}
-    if not np.any(run.error > 0.0):  # nor where errors were not kept, which are NaN then
+    if not np.any(run.error > 0.0):  # errors that were not kept are NaN
         return None
     return _logarithmic("error", "log10 error", curves, 2, np.nan)
 
 
 def margin(run: Run) -> Group | None:
-    """log10 of the margin, 1 / condition of the worst block: 0 far from singular points, -16 at one."""
+    """Return log10 of the margin, 1 / condition of the worst block: 0 far from singular points, -16 at one."""
     if "solver.margin" in run.absent:
         return None
     return _logarithmic("margin", "log10 margin", {"margin": run.margin}, 1, SMALLEST)
 
 
 def iterations(run: Run) -> Group | None:
-    """Newton's iterations, a step from sample to sample."""
+    """Return Newton's iterations as a stepped curve; None if not kept."""
     if "solver.iterations" in run.absent:
         return None
     return Group(
@@ -109,7 +109,7 @@ def iterations(run: Run) -> Group | None:
 
 
 def _logarithmic(path: str, title: str, curves: Mapping[str, FloatArray], first_colour: int, zero: float) -> Group:
-    """log10 of the curves; `zero` is drawn in the place of 0, and nothing where nothing is known."""
+    """Return log10 of the curves; `zero` is drawn in place of 0, and unknown values are a gap."""
     table = np.column_stack(list(curves.values()))
     table[np.isinf(table)] = np.nan
     return Group(
@@ -122,7 +122,7 @@ def _logarithmic(path: str, title: str, curves: Mapping[str, FloatArray], first_
 
 
 def _colours(run: Run) -> dict[str, palette.Colour]:
-    """Colour of each output: that of its body or point, lighter for y."""
+    """Return the colour of each output: that of its body or point, lighter for y."""
     owners: list[str] = []
     for name in (*run.outputs[: run.coordinate_count], *run.fixed, *run.outputs):
         owner = name.rpartition(".")[0]

@@ -26,10 +26,10 @@ _OF_DRIVER = re.compile(r"(?P<driver>.+) \[(?:0\.(?P<decimals>0*1) )?(?P<unit>[a
 
 @dataclass(frozen=True)
 class Timeline:
-    """How a recording counts.
+    """The timeline of a recording.
 
-    name: 'sim_time', 'crank [deg]', 'crank [0.1 deg]' or 'sample'; parts: whole numbers to one unit of the axis, None
-    for times, which are seconds.
+    name: 'sim_time', 'crank [deg]', 'crank [0.1 deg]' or 'sample'; parts: whole numbers per unit of the axis, None for
+    times, which are seconds.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Timeline:
         return "t [s]" if self.parts is None else f"{match['driver']} [{match['unit']}]" if match else self.name
 
     def place(self, value: float) -> float:
-        """The time of placed runs at a value of the axis in the unit used inside [s, rad, length, sample]."""
+        """Return the time of placed runs at a value of the axis [s, rad, length, sample]."""
         return value / (DEGREE if self.unit == "deg" else 1.0) * (self.parts or 1)
 
     def placed(self, run: Run) -> Run:
-        """The run with its values on this timeline in the place of its times, those of its events too."""
+        """Return the run with times on this timeline, for its samples and events."""
         if self.parts is None:
             return run
         axis, parts = axis_of(run), self.parts
@@ -61,7 +61,7 @@ class Timeline:
         return replace(run, t=np.rint(axis.values * parts), events=events)
 
     def column(self, t: FloatArray) -> rr.TimeColumn:
-        """Times of placed runs (n,) for Rerun, which truncates float durations to nanoseconds: give it whole ones."""
+        """Return times of placed runs (n,) for Rerun, as whole nanoseconds because Rerun truncates float durations."""
         import rerun as rr
 
         if self.parts is None:
@@ -69,11 +69,11 @@ class Timeline:
         return rr.TimeColumn(self.name, sequence=np.rint(t).astype(np.int64))
 
     def cursor(self, t: float) -> dict[str, Any]:
-        """A time of placed runs as where a viewer's cursor is put."""
+        """Return a time of placed runs as a viewer's cursor."""
         return {"duration": t} if self.parts is None else {"sequence": round(t)}
 
     def number(self, t: float) -> dict[str, Any]:
-        """A time of placed runs, or a span of them, as the argument of a boundary of Rerun's."""
+        """Return a time of placed runs, or a span, as the argument of one of Rerun's boundaries."""
         return {"seconds": t} if self.parts is None else {"seq": round(t)}
 
 
@@ -86,7 +86,7 @@ def timeline_named(name: str) -> Timeline:
 
 
 def timeline_of(runs: Sequence[Run]) -> Timeline:
-    """The timeline that runs have in common; a LogError if they have none."""
+    """Return the timeline that runs have in common; LogError if they have none."""
     axes = [axis_of(run) for run in runs]
     if len({(axis.name, axis.unit) for axis in axes}) > 1:
         raise LogError(
