@@ -43,16 +43,16 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     columns = np.empty((15, samples))
     tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
     by_samples = [np.empty((samples, 5)) for _ in range(3)]
-    room, fourbar_room = (compiled.sweep(driven, tables) for compiled in (crank_rocker, fourbar))
+    result, fourbar_result = (compiled.sweep(driven, tables) for compiled in (crank_rocker, fourbar))
     plan = compile_plan(load("crank_rocker"), COORDINATES)
     ways: dict[str, Callable[[], object]] = {
         CLOSED: closed_form(u, columns),
-        WHOLE: lambda: crank_rocker.sweep(driven, tables, room=room),
-        "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples, room=room),
-        ALONE: lambda: crank_rocker.sweep(driven, (tables[0], None, None), room=room),
+        WHOLE: lambda: crank_rocker.sweep(driven, tables, reuse=result),
+        "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples, reuse=result),
+        ALONE: lambda: crank_rocker.sweep(driven, (tables[0], None, None), reuse=result),
         "the same, q, qd, qdd, all arrays allocated": lambda: crank_rocker.sweep(driven, _allocated(samples)),
         "the same, by kinfmu.solve of a plan": lambda: solve(plan, crank_angle=u, engine="native"),
-        "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, room=fourbar_room),
+        "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, reuse=fourbar_result),
     }
     absent = ""
     for name, way in ((LOOP, _numba_loop), (PYLINKAGE, _pylinkage)):

@@ -1,4 +1,4 @@
-"""Assembly: putting the bodies together near a rough pose, regular and at the start of the drivers' laws."""
+"""Assembly: the closed pose near the start poses, regular and at the start of the drivers' laws."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AssemblyError, listed
 
 SINGULAR = 1e-6  # margin below which a start pose counts as singular: double roots are known to half the digits
-COMFORTABLE = 0.03  # margin below which a pose beside the start makes a better anchor
+COMFORTABLE = 0.03  # margin below which a pose near the start is a better anchor
 COMFORTABLE_WITHOUT_BRIDGES = 1e-3  # the same with several drivers: solved to round-off over the margin
-BESIDE = 0.1  # [rad, sizes]; how far beside a singular start pose the anchor is sought
-MOST_DENSE = 900  # coordinates; what needs all rows at once takes minutes beyond
-NEAR = 0.5  # [rad, sizes]; a pose as near as that to what the start poses give is the one that is meant
-_RESTARTS = 60  # of what the start poses leave out; blocks that alone can close in two ways each need a few
-_RESTARTS_TO_COME_NEARER = 15  # where the first pose is regular and only not near what is given
-_DENSE_RESTARTS = 8
-_LOOKS = 4  # random poses at which the structure of the rows is seen
+BESIDE = 0.1  # [rad, sizes]; distance from a singular start pose at which the anchor is sought
+MOST_DENSE = 900  # coordinates; with more, methods on all rows at once take minutes
+NEAR = 0.5  # [rad, sizes]; a pose within this distance of the start poses is accepted
+RESTARTS = 60  # random values of open start poses; blocks that close in two ways need a few each
+RESTARTS_TO_COME_NEARER = 15  # if the first pose is regular and only not near the start poses
+DENSE_RESTARTS = 8
+_LOOKS = 4  # random poses at which the structure of the rows is determined
 _TRUST = 10.0  # a correction of a prediction must be this much smaller than the margin: other branches are farther away
-_PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches beside a singular start pose are sought
-_NEARBY_STARTS = 6  # poses tried beside a start that does not close by a little
-_SPREAD = 0.3  # [rad, sizes]; how far they lie from the start pose
-_NEARLY = 0.01  # residual of a pose that may close beside the start
+_PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of BESIDE, at which branches near a singular start pose are sought
+_NEARBY_STARTS = 6  # poses tried near a start that almost closes
+_SPREAD = 0.3  # [rad, sizes]; their distance from the start pose
+_NEARLY = 0.01  # residual of a pose that almost closes
 
 
 class Assembled(NamedTuple):
@@ -62,7 +62,7 @@ def find_assembly(system: System) -> Assembly:
 
     Returns:
         The start values and the closed pose nearest to them. If that pose is singular or nearly so, the most regular
-        one of it and of poses a little beside it.
+        one of it and of poses near it.
 
     Raises:
         AssemblyError: The mechanism has more than MOST_DENSE coordinates and does not assemble block by block.
@@ -99,7 +99,7 @@ def start_values(system: System) -> StartValues:
 
 
 def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
-    """True if a straight line of driver values leads from a pose to others: no limit lies between."""
+    """Return True if a straight line of driver values leads from a pose to the target without a limit between."""
     _, u = followed(system, found.q, found.u, target)
     return np.array_equal(u, target)
 
@@ -114,7 +114,7 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
     order = in_order(system)
     found, trouble = _assembled_in_order(system, u, start.q, order)
     if order.blocks and (found is None or distance_from_start(system, start, found.q) > NEAR):
-        found = _assembled_from_random_starts(system, start, found, order)
+        found = assemble_from_random_starts(system, start, found, order)
     if found is not None:
         return found
     if len(system.coordinates) > MOST_DENSE:
@@ -125,7 +125,7 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
     q, gap = close(system, start.q, u)
     if gap > CLOSED:
         found = _assembled_beside(system, start) if gap < _NEARLY else None
-        return found if found or order.blocks else _assembled_from_random_starts(system, start, None, order)
+        return found if found or order.blocks else assemble_from_random_starts(system, start, None, order)
     found = _without_spare_rows(system, q, u) or Assembled(q, u, margin(system, q))
     if found.margin > comfortable(system):
         return found
@@ -141,7 +141,7 @@ def _assembled(system: System, start: StartValues) -> Assembled | None:
 
 
 def closes_beside(system: System, singular: Assembled) -> bool:
-    """True if a mechanism closes a little beside a singular pose."""
+    """Return True if a mechanism closes near a singular pose."""
     return any(_beside(system, singular, side) is not None for side in (1.0, -1.0))
 
 
@@ -156,7 +156,7 @@ def _beside(system: System, singular: Assembled, side: float) -> Assembled | Non
 
 
 def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
-    """Return the pose nearest to the start poses, a little beside them, from which the start is reached, if any.
+    """Return the pose nearest to the start poses, at slightly other driver values, that leads to the start, if any.
 
     Near a change point a rough pose may lie between the branches, where no row closes by a small gap; with redundant
     rows poses near it are tried too.
@@ -175,12 +175,12 @@ def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
 
 
 def comfortable(system: System) -> float:
-    """Margin from which a pose is a good anchor: with one driver outside a bridge's window."""
+    """Return the margin from which a pose is a good anchor: with one driver, outside a bridge's window."""
     return COMFORTABLE if len(system.mechanism.drivers) == 1 else COMFORTABLE_WITHOUT_BRIDGES
 
 
 def _without_spare_rows(system: System, q: FloatArray, u: FloatArray) -> Assembled | None:
-    """A closed pose with its margin by blocks, once rows that depend on earlier ones there are left out.
+    """Return a closed pose with its margin by blocks, without rows that depend on earlier ones there.
 
     None if that leaves no order of solving, as at a singular pose, or a block that is nearly singular.
     """
@@ -196,10 +196,10 @@ def _without_spare_rows(system: System, q: FloatArray, u: FloatArray) -> Assembl
 
 
 def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
-    """The order of solving rows (all if None), by index into System.rows.
+    """Return the order of solving rows (all if None), by index into System.rows.
 
     A row meets the coordinates along which its gradient does not vanish at every one of some random poses: at one pose
-    a cam that dwells does not show whom it leads.
+    a cam that dwells does not show which coordinate it moves.
     """
     rng = np.random.default_rng(1989)
     poses = rng.uniform(-3.0, 3.0, (_LOOKS, len(system.coordinates))) * system.column_scales
@@ -216,11 +216,13 @@ def in_order(system: System, rows: Sequence[int] | None = None) -> Ordered:
     )
 
 
-def _assembled_from_random_starts(
+def assemble_from_random_starts(
     system: System, start: StartValues, first: Assembled | None, order: Ordered
 ) -> Assembled | None:
-    """Of a first pose and regular ones from seeded random values of what the start poses leave out, the one that comes
-    nearest to what they give: the first that comes near, else the nearest of all.
+    """Return the pose nearest to the start poses, among a first pose and poses from random starts.
+
+    Random starts have seeded random values for what the start poses leave open. The first pose within NEAR is taken,
+    else the nearest of all.
     """
     u = start.u
     is_open = np.array([value is None for body in system.mechanism.moving_bodies for value in body.start])
@@ -234,7 +236,7 @@ def _assembled_from_random_starts(
     if len(is_open) > MOST_DENSE:
         return first
     nearest = first
-    restarts = _DENSE_RESTARTS if not order.blocks else _RESTARTS if first is None else _RESTARTS_TO_COME_NEARER
+    restarts = DENSE_RESTARTS if not order.blocks else RESTARTS if first is None else RESTARTS_TO_COME_NEARER
     for _ in range(restarts):
         rough = np.where(is_open, centre + spread * rng.uniform(-1.0, 1.0, len(is_open)), start.q)
         if order.blocks:
@@ -254,9 +256,9 @@ def _assembled_from_random_starts(
 def _assembled_in_order(
     system: System, u: FloatArray, start: FloatArray, order: Ordered
 ) -> tuple[Assembled, str] | tuple[None, str]:
-    """A rough pose closed block by block, or None and what stands in the way.
+    """Return a rough pose closed block by block, or None and the reason.
 
-    Never a pose that is nearly singular.
+    The pose is never nearly singular.
     """
     if order.unmatched_columns:
         return None, f"nothing determines {listed(system.coordinates[k] for k in order.unmatched_columns[:5])}"
@@ -272,13 +274,13 @@ def _assembled_in_order(
         if least <= comfortable(system):
             return None, f"the rows {listed(system.rows[k].name for k in rows[:5])} are singular there or nearly so"
     open_rows = np.flatnonzero(np.abs(Part(system).residual(q, u)) > CLOSED)
-    if len(open_rows):  # a cam that dwells at every random pose does not show whom it leads
+    if len(open_rows):  # a cam that dwells at every random pose does not show what it moves
         return None, f"the rows {listed(system.rows[k].name for k in open_rows[:5])} open when others close"
     return Assembled(q, u, least), ""
 
 
 def _block_margin(jacobian: FloatArray) -> float:
-    """Smallest over largest singular value; of a single row, where that says nothing, its slope."""
+    """Return the smallest over the largest singular value; of a single row its slope."""
     if jacobian.size == 1:
         return min(1.0, abs(float(jacobian[0, 0])))
     singular = np.linalg.svd(jacobian, compute_uv=False)

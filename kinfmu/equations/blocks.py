@@ -1,4 +1,4 @@
-"""The order of solving: blocks of rows and coordinates, each needing only those before it."""
+"""The order of solving: blocks of rows and coordinates, each needing only blocks before it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from scipy.sparse.csgraph import connected_components, maximum_bipartite_matchin
 
 
 class Ordered(NamedTuple):
-    """blocks: (rows, columns) in the order of solving; or, where no such order exists, what stands in its way.
+    """The order of solving, or the reason why there is none.
 
-    unmatched_rows, unmatched_columns: rows to spare and columns that nothing determines; no blocks then.
+    blocks: (rows, columns) in the order of solving; unmatched_rows, unmatched_columns: rows to spare and columns that
+    no row determines; then there are no blocks.
     """
 
     blocks: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
@@ -23,7 +24,7 @@ class Ordered(NamedTuple):
 
 
 def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int) -> Ordered:
-    """Blocks by matching rows to columns and taking strongly connected components (Dulmage-Mendelsohn, fine).
+    """Return the blocks: rows matched to columns, then strongly connected components (Dulmage-Mendelsohn, fine).
 
     meets: the columns that each row meets. Ties go to the earlier row, so that equal input gives equal order.
     """
@@ -53,7 +54,7 @@ def ordered_blocks(meets: Sequence[Sequence[int]], column_count: int) -> Ordered
 def _topological(
     component: Sequence[int], row_number: Iterable[int], needed: Iterable[int], members: Mapping[int, Sequence[int]]
 ) -> list[int]:
-    """Components in an order where each comes after those it needs; ties go to the earlier row of the file."""
+    """Return components so that each comes after those it needs; ties go to the earlier row of the file."""
     before: dict[int, set[int]] = {label: set() for label in members}
     after: dict[int, set[int]] = {label: set() for label in members}
     for a, b in zip(row_number, needed, strict=True):

@@ -1,4 +1,4 @@
-"""Closing: poses near a given one where all rows hold, and walks from one such pose to others."""
+"""Closing: poses near a given one where all rows hold, and motion from one such pose to others."""
 
 from __future__ import annotations
 
@@ -12,25 +12,33 @@ CLOSED = 1e-12  # residual relative to the mechanism's size at which a pose coun
 _DEPENDENT = 1e-6  # part of a row outside the span of others that counts as zero; so does a weight in a combination
 _APART = 1e-6  # [rad, sizes]; poses further apart are different branches
 _ITERATIONS = 200
-_SLOW, _SLOW_STEPS = 0.9, 4  # a residual that falls no further in so many steps close by does not close
+_SLOW, _SLOW_STEPS = 0.9, 4  # a small residual that falls more slowly in so many steps does not close
 _ROUNDED = 1e-14  # residual relative to the size that rounding leaves
 _FAR_FROM_SINGULAR = 1e-3  # least singular value over the largest; gradients keep the digits to tell what depends
-_LONGEST = 0.2  # [rad, sizes]; step on the way from the start poses to the start of the laws
-_SHORTEST = 1e-5  # the same; where steps get shorter a limit lies between
+_LONGEST = 0.2  # [rad, sizes]; step from the start poses to the start of the laws
+_SHORTEST = 1e-5  # the same; shorter steps mean a limit
 _STEEPEST = 10.0  # change of a coordinate over the longest step: a prediction of more is rejected
-_LESS = 0.5  # of the margin at the start of a way: what follows leads toward a limit
+_LESS = 0.5  # of the margin at the start of a path: beyond, the path leads toward a limit
 _DOUBLED = 8.0  # times the correction, where a step to second order is twice as long
 _CORRECTION = 0.02  # [rad, sizes]; a prediction that is corrected by more may have left the branch
-_SAME_WAY = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
-_RANK = 1e-9  # singular values below this fraction of the largest are directions that the rows do not see
+_SAME_DIRECTION = 0.8  # cosine between directions of motion a step apart; branches cross at wider angles
+_RANK = 1e-9  # singular values below this fraction of the largest count as zero
 
 
 def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
-    """The pose nearest to q where all rows of a system or of a part of it hold, and its residual relative to the size.
+    """Return the pose nearest to q where all rows hold, and its residual relative to the size.
 
-    Levenberg-Marquardt far away, the shortest Gauss-Newton step near by, so that redundant rows and singular points do
-    no harm; close to a dead centre, where that step goes too far, Levenberg-Marquardt again. Stops on the residual: a
-    residual above CLOSED means that the pose does not close.
+    Levenberg-Marquardt far away, the shortest Gauss-Newton step near a solution, so that redundant rows and singular
+    points do no harm; near a dead centre, where that step goes too far, Levenberg-Marquardt again.
+
+    Args:
+        part: A system or a part of it.
+        q: Rough pose, (columns of the part,).
+        u: Driver values, (d,).
+
+    Returns:
+        The pose and its residual; above CLOSED the pose does not close.
+
     """
     part = Part(part) if isinstance(part, System) else part
     best, residual = _straight(part, q, u)
@@ -67,7 +75,7 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
 
 
 def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pose and residual after one whole Gauss-Newton step if that closes linear rows, else as they are at q."""
+    """Return pose and residual after one whole Gauss-Newton step if that closes linear rows, else those at q."""
     residual = part.residual(q, u)
     if np.abs(residual).max(initial=0.0) == 0.0:
         return q.copy(), residual
@@ -78,11 +86,11 @@ def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, Flo
 
 
 def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:
-    """Up to `count` poses spread along the motion that the rows of a part leave, starting with the one nearest to q.
+    """Return up to `count` poses along the motion that the rows of a part leave, starting with the one nearest to q.
 
     Random directions of the null space of its Jacobian (seeded), `step` in radians and sizes. Where the motion ends or
     comes to a singular point, where other branches cross, it is followed from the first pose the other way. Empty if
-    the rows do not close near q; one pose if they leave no motion. Drivers among the rows stand at 0.
+    the rows do not close near q; one pose if they leave no motion. Drivers among the rows are at 0.
     """
     start, gap = close(part, q, np.zeros(len(part.system.mechanism.drivers)))
     if gap > CLOSED:
@@ -109,7 +117,7 @@ def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> 
 def _onward(
     part: Part, pose: FloatArray, free: FloatArray, direction: FloatArray, step: float, least: float
 ) -> FloatArray | None:
-    """A pose one step, or as much of it as can be gone, in a free direction; None where the motion ends.
+    """Return a pose one step, or as much of it as possible, in a free direction; None where the motion ends.
 
     It is not singular (`least`: see _freedom) and on the same branch, where the motion goes on in that direction.
     """
@@ -120,14 +128,14 @@ def _onward(
         if gap <= CLOSED:
             there, regular = _freedom(part.jacobian(ahead))
             more = there.shape[1] - free.shape[1]  # directions: less than 0 where a singular pose is left
-            if regular >= least and (more < 0 or (more == 0 and np.linalg.norm(there.T @ along) >= _SAME_WAY)):
+            if regular >= least and (more < 0 or (more == 0 and np.linalg.norm(there.T @ along) >= _SAME_DIRECTION)):
                 return ahead
         step /= 2.0
     return None
 
 
 def _freedom(jacobian: FloatArray) -> tuple[FloatArray, float]:
-    """The null space of a Jacobian (n, k), and the least of its other singular values over the largest."""
+    """Return the null space of a Jacobian (n, k), and the least of its other singular values over the largest."""
     _, singular, right = np.linalg.svd(jacobian)
     relative = singular / singular.max(initial=1e-300)
     rank = int((relative > _RANK).sum())
@@ -135,7 +143,7 @@ def _freedom(jacobian: FloatArray) -> tuple[FloatArray, float]:
 
 
 def null_space(matrix: FloatArray, small: float = _RANK) -> FloatArray:
-    """Orthonormal basis of the directions that a matrix maps to zero or to a small part of its norm, (n, k)."""
+    """Return an orthonormal basis of the directions that a matrix maps to (nearly) zero, (n, k)."""
     _, singular, right = np.linalg.svd(matrix)
     rank = int((singular > small * singular.max(initial=0.0)).sum())
     return np.asarray(right[rank:].T)
@@ -183,12 +191,12 @@ def followed(
 
 
 def reaches(system: System) -> FloatArray:
-    """What counts as one unit of each driver, (d,): a radian, or the mechanism's size."""
+    """Return one unit of each driver, (d,): a radian, or the mechanism's size."""
     return np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
 
 
 def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
-    """Rows of a matrix that are combinations of earlier rows, each with the earlier independent rows that it needs."""
+    """Return rows that are combinations of earlier rows, each with the earlier independent rows that it needs."""
     dependent: dict[int, list[int]] = {}
     independent: list[int] = []
     directions = np.zeros_like(gradients)  # orthonormal, one an independent row
@@ -213,7 +221,7 @@ def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
 
 
 def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatArray]:
-    """Closed poses at driver values u a little beside a singular pose, nearest first: one a branch that leaves it."""
+    """Return closed poses at driver values u near a singular pose, nearest first: one per branch that leaves it."""
     free = null_space(system.scaled_jacobian(singular), 1e-4)
     starts = [singular] + [
         singular + side * system.column_scales * direction for direction in free.T for side in (-0.2, 0.2)
@@ -233,6 +241,6 @@ def _reach(system: System, kind: str) -> float:
 
 
 def margin(system: System, q: FloatArray) -> float:
-    """Smallest over largest singular value of the scaled Jacobian of all rows: 0 at a singular point."""
+    """Return the smallest over the largest singular value of the scaled Jacobian of all rows: 0 at a singular point."""
     singular = np.linalg.svd(system.scaled_jacobian(q), compute_uv=False)
     return float(singular[-1] / singular[0]) if len(singular) == len(system.coordinates) else 0.0

@@ -1,4 +1,4 @@
-"""SolvePlan: what is computed, in what order, for the outputs asked for."""
+"""SolvePlan: what is computed, and in what order, for the outputs wanted."""
 
 from __future__ import annotations
 

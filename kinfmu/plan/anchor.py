@@ -15,10 +15,20 @@ from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, lis
 
 
 def find_anchor(system: System, assembly: Assembly) -> Assembled:
-    """The start pose closed, or a pose beside it if it is singular.
+    """Return the closed start pose, or a pose near it if it is singular.
 
-    Raises AssemblyError with the widest gap if the mechanism does not close, AmbiguousStartError if the start pose is
-    singular and several branches leave it, MobilityError if it is singular everywhere.
+    Args:
+        system: The equations of the mechanism.
+        assembly: Its start values and assembled pose.
+
+    Returns:
+        The anchor, from which every run is followed.
+
+    Raises:
+        AssemblyError: The mechanism does not close; the message has the widest gap.
+        AmbiguousStartError: The start pose is singular and several branches leave it.
+        MobilityError: The mechanism is singular near the start pose too.
+
     """
     start, found = assembly
     if found is None:
@@ -30,9 +40,7 @@ def find_anchor(system: System, assembly: Assembly) -> Assembled:
                 f"the start pose is singular ({_at(system, found.u)}), and the mechanism does not close on either side "
                 f"of it: start {names} elsewhere, or check the lengths"
             )
-        raise MobilityError(
-            f"[drivers] {names} do not determine the motion: it stays singular beside the start pose too"
-        )
+        raise MobilityError(f"[drivers] {names} do not determine the motion: it stays singular near the start pose too")
     if np.array_equal(found.u, start.u):
         return found  # the start pose itself
     closed, _ = close(system, start.q, start.u)
@@ -44,7 +52,7 @@ def find_anchor(system: System, assembly: Assembly) -> Assembled:
 
 
 def _does_not_close(system: System, start: StartValues) -> AssemblyError:
-    """The joint that is open widest where all give way alike, with its gap once the others are closed."""
+    """Return the error of the joint with the widest gap, with its gap once the others are closed."""
     u = start.u
     pose, _ = close(system, start.q, u)
     widest = system.rows[int(system.relative_gaps(system.residual(pose, u)).argmax())].owner
@@ -55,10 +63,10 @@ def _does_not_close(system: System, start: StartValues) -> AssemblyError:
     of_widest = [k for k, row in enumerate(system.rows) if row.owner == widest]
     worst = max(of_widest, key=lambda k: relative[k])
     same = [k for k in of_widest if system.rows[k].kind == system.rows[worst].kind]
-    gap = math.hypot(*(gaps[k] for k in same))
+    gap, unit = math.hypot(*(gaps[k] for k in same)), system.gap_unit(system.rows[worst])
     return AssemblyError(
         f"the mechanism does not close near its start pose ({_at(system, u)}): with the other joints closed, "
-        f"'{widest}' stays open by {gap:.4g} {system.gap_unit(system.rows[worst])}; check lengths and start poses",
+        f"'{widest}' does not close: gap {gap:.4g} {unit}; check lengths and start poses",
         joint=widest,
         gap=gap,
     )
@@ -66,26 +74,26 @@ def _does_not_close(system: System, start: StartValues) -> AssemblyError:
 
 def _ambiguous(system: System, start: StartValues, found: Assembled, leaving: list[FloatArray]) -> AmbiguousStartError:
     spread = np.ptp(np.array(leaving) / system.column_scales, axis=0)
-    tell = int(spread.argmax())
-    name, unit = system.coordinates[tell], system.mechanism.length_unit
-    values = " or ".join(_value(branch[tell], is_angle=name.endswith(".phi"), unit=unit) for branch in leaving)
+    widest = int(spread.argmax())
+    name, unit = system.coordinates[widest], system.mechanism.length_unit
+    values = " or ".join(_value(branch[widest], is_angle=name.endswith(".phi"), unit=unit) for branch in leaving)
     return AmbiguousStartError(
         f"the start pose is singular ({_at(system, start.u)}) and {len(leaving)} branches leave it: at "
-        f"{_at(system, found.u)} {name} can be {values}; give a start pose beside it, on the branch that is meant",
+        f"{_at(system, found.u)} {name} can be {values}; give a start pose near it, on the branch wanted",
         branches=leaving,
     )
 
 
 def _at(system: System, u: FloatArray) -> str:
-    """'crank = 1.047 rad (60 deg)': driver values for a message."""
-    said = []
+    """Return 'crank = 1.047 rad (60 deg)': driver values for a message."""
+    values = []
     for driver, value in zip(system.mechanism.drivers, u, strict=True):
         is_angle = driver.quantity.kind == "angle"
-        said.append(f"{driver.name} = {_value(value, is_angle=is_angle, unit=system.mechanism.length_unit)}")
-    return listed(said)
+        values.append(f"{driver.name} = {_value(value, is_angle=is_angle, unit=system.mechanism.length_unit)}")
+    return listed(values)
 
 
 def _value(value: float, *, is_angle: bool, unit: str) -> str:
-    """'1.0472 rad (60 deg)' or '12 mm', without what rounding leaves of a zero."""
+    """Return '1.0472 rad (60 deg)' or '12 mm'; values that rounding left of zero are 0."""
     value = round(float(value), 12) + 0.0
     return f"{value:.6g} rad ({math.degrees(value):.6g} deg)" if is_angle else f"{value:.6g} {unit}"

@@ -41,10 +41,8 @@ class Block:
     jacobian: tuple[tuple[Node, ...], ...]
     velocity: tuple[Node, ...]
     acceleration: tuple[Node, ...]
-    determinant_scale: float  # the largest |determinant| of J met over random poses: what counts as far from singular
-    usual: tuple[
-        float, ...
-    ]  # largest lengths met of the rows (of the columns, if tall) of J of three unknowns and more
+    determinant_scale: float  # the largest |determinant| of J over random poses, far from singular
+    usual: tuple[float, ...]  # of three unknowns and more: largest lengths of the rows (if tall, columns) of J
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -72,11 +70,11 @@ class Rates:
         self.both[rate] = acceleration
 
     def of(self, nodes: Sequence[Node], at_rest: Collection[Node] = ()) -> list[Node]:
-        """First derivatives, with the symbols `at_rest` standing still."""
+        """Return first derivatives; the symbols `at_rest` do not move."""
         return self.graph.derivative(nodes, self.first, at_rest)
 
     def second(self, nodes: Sequence[Node], unaccelerated: Collection[Node] = ()) -> list[Node]:
-        """Second derivatives, with the accelerations of the symbols `unaccelerated` zero."""
+        """Return second derivatives; the accelerations of the symbols `unaccelerated` are zero."""
         still = {self.first[symbol] for symbol in unaccelerated}
         return self.graph.derivative(self.of(nodes), self.both, still)
 
@@ -90,7 +88,7 @@ def build_block(
     fixed: Mapping[str, Node],
     anchor: Mapping[str, float],
 ) -> Block:
-    """Trace the rows of a block once and take everything from that trace.
+    """Return a block; its rows are traced once, and all its formulas come from that trace.
 
     anchor: values of all coordinates and parameters, by name of their symbols.
     """
@@ -98,7 +96,7 @@ def build_block(
     assigned = []
     for name, index in structure.assigned:
         value = given_value(tracer, row, index, name, known)
-        if value is None:  # found linear when the structure was found, so this is a fault of ours
+        if value is None:  # `find_structure` found it linear, so this cannot happen
             raise AssertionError(f"{system.rows[index].name} does not give {name}")
         known[name] = value
         (rate,), (acceleration,) = rates.of([value]), rates.second([value])
@@ -130,11 +128,11 @@ def build_block(
 
 
 def block_determinant(jacobian: NDArray[np.float64], usual: Sequence[float]) -> float:
-    """What the run time watches as the determinant of a block.
+    """Return the determinant of a block that the run time monitors.
 
     For one and two unknowns det J itself; from three on that of the rows scaled to unit length; for tall J the product
-    of R's diagonal over the column lengths. Since scaling hides a row (a column) that vanishes, as where all links of a
-    loop fall in line, both are times its length over the usual one.
+    of R's diagonal over the column lengths. Scaling hides a row (a column) that vanishes, as where all links of a loop
+    are in line, so both are multiplied by its length over the usual one.
     """
     m, k = jacobian.shape
     if m > k:
@@ -151,12 +149,12 @@ def block_determinant(jacobian: NDArray[np.float64], usual: Sequence[float]) -> 
 def _determinant_scale(
     jacobian: Sequence[Sequence[Node]], anchor: Mapping[str, float], size: float
 ) -> tuple[float, tuple[float, ...]]:
-    """The largest |determinant| over random poses, and the usual lengths of rows or columns."""
+    """Return the largest |determinant| over random poses, and the usual lengths of rows or columns."""
     if not jacobian:
         return 1.0, ()
     rng = np.random.default_rng(1989)
     flat = [entry for row in jacobian for entry in row]
-    met = {symbol.name: anchor[symbol.name] for symbol in symbols(flat)}
+    values = {symbol.name: anchor[symbol.name] for symbol in symbols(flat)}
     matrices = []
     for sample in range(_DETERMINANT_SAMPLES):
         turned = {
@@ -165,7 +163,7 @@ def _determinant_scale(
             else rng.uniform(-np.pi, np.pi)
             if name.endswith(".phi")
             else value + size * rng.uniform(-0.5, 0.5)
-            for name, value in met.items()
+            for name, value in values.items()
         }
         matrices.append(np.reshape(evaluate(flat, turned), (len(jacobian), -1)))
     m, k = matrices[0].shape
@@ -177,5 +175,5 @@ def _determinant_scale(
 
 
 def _rounded(scale: float) -> float:
-    """A scale: more digits would differ between machines."""
+    """Return a scale with two digits: more would differ between machines."""
     return float(f"{scale:.2g}") or 1.0

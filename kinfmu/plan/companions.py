@@ -1,4 +1,4 @@
-"""Companions: redundant rows that are solved along, by least squares, where the kept rows alone would be singular.
+"""Companions: redundant rows solved with a block, by least squares, where the kept rows alone would be singular.
 
 A row that is redundant as a constraint may still be what keeps a mechanism regular: of two rods that couple two wheels,
 a quarter turn apart, each is in its dead centre where the other is not. Set aside, it would leave singular points that
@@ -19,7 +19,7 @@ from kinfmu.equations.system import FloatArray, System
 
 _POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way
 _STEP = 0.2  # [rad, sizes]; between them
-_LOOKS = 3  # poses at which the combination of rows is seen that a redundant row is
+_LOOKS = 3  # poses at which the combination of rows is found that equals a redundant row
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others, or weight in a combination, that counts as zero
 _CLOSED = 1e-9  # residual relative to the size up to which a sampled pose counts as closed
 _SINGULAR = 1e-6  # singular value over the largest below which rows count as dependent
@@ -32,7 +32,7 @@ class BlockStructure:
     """Rows solved together, by index into System.rows.
 
     assigned: (coordinate, row) in the order of evaluation: the row gives the coordinate outright. unknowns: coordinates
-    left for Newton, with their rows; companions: redundant rows that are solved along by least squares.
+    left for Newton, with their rows; companions: redundant rows solved with them by least squares.
     """
 
     assigned: tuple[tuple[str, int], ...]
@@ -100,9 +100,9 @@ def with_companions(
 
 
 def _combinations(system: System, redundancy: Redundancy, pose: FloatArray) -> dict[int, set[int]]:
-    """Of each redundant row, the kept rows whose gradients give its own.
+    """Return for each redundant row the kept rows whose gradients give its own.
 
-    Kept rows are independent, so there is only one such combination, and none at a pose where they are singular.
+    The kept rows are independent, so there is only one such combination, and none at a pose where they are singular.
     """
     spare = [dependent.index for dependent in redundancy.redundant]
     found: dict[int, set[int]] = {index: set() for index in spare}
@@ -121,7 +121,7 @@ def _combinations(system: System, redundancy: Redundancy, pose: FloatArray) -> d
 def _needs(
     blocks: Sequence[BlockStructure], home: dict[str, int], meets: Callable[[int], Iterable[str]]
 ) -> list[set[int]]:
-    """Of each block, those whose coordinates its rows meet."""
+    """Return for each block the blocks whose coordinates its rows meet."""
     return [
         {home[name] for index in block.all_rows for name in meets(index) if name in home} - {k}
         for k, block in enumerate(blocks)
@@ -129,7 +129,7 @@ def _needs(
 
 
 def _hull(members: set[int], needs: Sequence[set[int]]) -> list[int]:
-    """The members and every block on a way between two of them, in order."""
+    """Return the members and every block on a path between two of them, in order."""
     if not members:
         return []
     behind: list[bool] = []  # a member, or needs one, directly or through others
@@ -145,7 +145,7 @@ def _hull(members: set[int], needs: Sequence[set[int]]) -> list[int]:
 
 
 def _behind(members: set[int], needs: Sequence[set[int]]) -> set[int]:
-    """Blocks with those that they need, directly or through others."""
+    """Return blocks with those that they need, directly or through others."""
     found = set(members)
     for k in reversed(range(len(needs))):
         found |= needs[k] if k in found else set()
@@ -153,7 +153,7 @@ def _behind(members: set[int], needs: Sequence[set[int]]) -> set[int]:
 
 
 def _whole(blocks: Sequence[BlockStructure], index: int) -> BlockStructure:
-    """Blocks as one, with a row among its companions."""
+    """Return blocks as one, with a row among its companions."""
     companions = dict.fromkeys(row for block in blocks for row in block.companions)
     return BlockStructure(
         tuple(pair for block in blocks for pair in block.assigned),
@@ -166,7 +166,7 @@ def _whole(blocks: Sequence[BlockStructure], index: int) -> BlockStructure:
 def _merged(
     blocks: Sequence[BlockStructure], hull: Sequence[int], needs: Sequence[set[int]], whole: BlockStructure
 ) -> list[BlockStructure]:
-    """The blocks with `whole` in place of those of the hull."""
+    """Return the blocks with `whole` in place of those of the hull."""
     later = set(hull)  # what needs the hull
     for k, needed in enumerate(needs):
         if needed & later:
@@ -183,7 +183,7 @@ def _regular_only_with(
     before: Sequence[BlockStructure],
     pose: FloatArray,
 ) -> bool:
-    """True if blocks are singular somewhere on the motion where the same blocks with one more companion are regular.
+    """Return True if blocks are singular somewhere on the motion where one more companion makes them regular.
 
     Only the bodies that the blocks' joints join move, and all joints between them hold. There is no gain where a block
     before them is singular too.
@@ -234,12 +234,12 @@ def _motion(part: Part, q: FloatArray, rank: int, count: int) -> Iterator[FloatA
 
 
 def _free(part: Part, q: FloatArray, rank: int) -> FloatArray:
-    """Directions that rows of a rank leave free, (n, n - rank)."""
+    """Return the directions that rows of a rank leave free, (n, n - rank)."""
     return np.asarray(np.linalg.svd(part.jacobian(q))[2][rank:].T)
 
 
 def _closed(part: Part, q: FloatArray, rank: int) -> FloatArray | None:
-    """The pose near by where all rows hold, by Gauss-Newton steps of their rank on the motion; None if there is none.
+    """Return the near pose where all rows hold, by Gauss-Newton steps of their rank on the motion; None if none.
 
     Off the motion redundant rows contradict each other a little: what they add to the rank there must not count.
     """
@@ -256,7 +256,7 @@ def _closed(part: Part, q: FloatArray, rank: int) -> FloatArray | None:
 
 
 def _jacobians(system: System, blocks: Sequence[BlockStructure], pose: FloatArray) -> list[FloatArray]:
-    """Of each block, all rows over its coordinates, scaled to pure numbers."""
+    """Return for each block the Jacobian of all its rows over its coordinates, scaled to pure numbers."""
     place = {name: k for k, name in enumerate(system.coordinates)}
     columns = [[place[name] for name in block.coordinates] for block in blocks]
     return [
@@ -265,10 +265,10 @@ def _jacobians(system: System, blocks: Sequence[BlockStructure], pose: FloatArra
 
 
 def _only(system: System, row: int, columns: set[int]) -> bool:
-    """True if a row meets no other columns."""
+    """Return True if a row meets no other columns."""
     return columns.issuperset(system.members[system.member_of[row]].columns)
 
 
 def _least(jacobians: Sequence[FloatArray]) -> float:
-    """The least singular value of all."""
+    """Return the least singular value of all."""
     return min(float(np.linalg.svd(jacobian, compute_uv=False)[-1]) for jacobian in jacobians)

@@ -1,4 +1,4 @@
-"""Conditions: what numbers that follow from parameters must fulfil, where parameters are set without the file."""
+"""Conditions on numbers that follow from parameters, for parameters set at run time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinfmu.units import Quantity
 
 
 class PlanCondition(NamedTuple):
-    """What messages call a number, its node, of parameters alone, and what it must be (see joints' Condition)."""
+    """A condition on a number: its name in messages, its node (of parameters alone), and what is required."""
 
     label: str
     node: Node
@@ -20,7 +20,7 @@ class PlanCondition(NamedTuple):
 
 
 def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition, ...]:
-    """The conditions on the numbers of a mechanism that are written as expressions; `check` looks at the others."""
+    """Return the conditions on numbers written as expressions; others are checked when the file is read."""
     found = [
         PlanCondition(f"[joints.{joint.name}] {key}", value, required)
         for joint in tracer.joints

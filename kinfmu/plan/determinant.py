@@ -12,11 +12,17 @@ _Terms = dict[tuple[str, Frequencies], float]  # ('sin' or 'cos', argument) -> c
 
 
 def determinant_formula(block: Block, parameters: Mapping[str, float] | None = None) -> str | None:
-    """det J of a 1 x 1 or 2 x 2 block as a sum of sines and cosines of sums of angles, or None if it is no such sum.
+    """Return det J of a 1 x 1 or 2 x 2 block as a sum of sines and cosines of sums of angles.
 
-    parameters: their values, by the names of their symbols.
+    Products become sums (sin a cos b = (sin(a + b) + sin(a - b)) / 2), so that equal formulas are equal texts.
 
-    Products become sums (sin a cos b = (sin(a + b) + sin(a - b)) / 2), so that equal formulas read the same.
+    Args:
+        block: The block.
+        parameters: Values of the parameters, by the names of their symbols.
+
+    Returns:
+        The formula, or None if det J is no such sum.
+
     """
     jacobian = block.jacobian
     if len(jacobian) != len(block.unknowns) or len(jacobian) not in (1, 2):
@@ -26,7 +32,7 @@ def determinant_formula(block: Block, parameters: Mapping[str, float] | None = N
     else:
         node = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0]
     terms = _harmonics(node, parameters or {})
-    return None if terms is None else _written(terms)
+    return None if terms is None else _text(terms)
 
 
 def _harmonics(root: Node, parameters: Mapping[str, float]) -> _Terms | None:
@@ -75,7 +81,7 @@ def _product(a: _Terms, b: _Terms) -> _Terms:
 
 
 def _term(function: str, x: Frequencies, y: Frequencies, sign: int) -> _Terms:
-    """One sine or cosine of x + sign y, its argument written with a positive first multiple."""
+    """Return one sine or cosine of x + sign y; the first multiple in its argument is positive."""
     argument = dict(x)
     for name, multiple in y:
         argument[name] = argument.get(name, 0) + sign * multiple
@@ -88,7 +94,7 @@ def _term(function: str, x: Frequencies, y: Frequencies, sign: int) -> _Terms:
     return {(function, items): 1.0}
 
 
-def _written(terms: _Terms) -> str:
+def _text(terms: _Terms) -> str:
     words = []
     for (function, argument), coefficient in sorted(terms.items(), key=lambda item: (-abs(item[1]), item[0])):
         size = abs(coefficient)

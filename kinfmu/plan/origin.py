@@ -1,4 +1,4 @@
-"""The plan's own origin: a mechanism far from the world's would lose the digits that its offset takes."""
+"""The plan's own origin: far from the world's origin, the offset of a mechanism costs digits."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned a
 
 
 def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
-    """The mechanism as seen from its own origin, and where that lies in the world [length].
+    """Return the mechanism as seen from its own origin, and the place of that origin in the world [length].
 
-    The origin is the first ground point if the mechanism lies far off, else the world's (also where a driver or a law
-    leads a coordinate of the world): constraints do not depend on it, and rounding then is relative to the size and not
-    to the offset. Points move by decimal numbers: of a pin at 1000000.7 the double beside it has lost what counts.
+    The origin is the first ground point if the mechanism is far away, else the world's (also if a driver or a law
+    prescribes a coordinate in the world). Constraints do not depend on it, and rounding is then relative to the size
+    and not to the offset. Points are moved as decimal numbers: the double nearest to 1000000.7 has lost digits.
     """
     ground = next(body for body in mechanism.bodies if body.is_ground)
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
@@ -28,9 +28,9 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
 
 
 def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
-    """The same mechanism elsewhere: ground points, start poses and absolute joints, their expressions too."""
-    bodies, written = [], mechanism.with_expressions()
-    for body in written.bodies:
+    """Return the mechanism at another place: ground points, start poses and absolute joints, with their expressions."""
+    bodies, source = [], mechanism.with_expressions()
+    for body in source.bodies:
         if body.is_ground:
             points = {
                 name: Point(decimal_sum(point.x, dx), decimal_sum(point.y, dy)) for name, point in body.points.items()
@@ -40,5 +40,5 @@ def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:
             x, y, phi = body.start
             start = Start(None if x is None else decimal_sum(x, dx), None if y is None else decimal_sum(y, dy), phi)
             bodies.append(replace(body, start=start))
-    joints = tuple(joint.moved(dx, dy) for joint in written.joints)
+    joints = tuple(joint.moved(dx, dy) for joint in source.joints)
     return replace(mechanism, bodies=tuple(bodies), joints=joints)

@@ -29,7 +29,7 @@ from kinfmu.units import Quantity
 
 
 class DriverInfo(NamedTuple):
-    """A driver as the world sees it: names of its inputs for value, speed and acceleration, and what it measures."""
+    """A driver seen from outside: names of its inputs for value, speed and acceleration, and its quantity."""
 
     name: str
     inputs: tuple[str, str, str]
@@ -56,14 +56,25 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SolvePlan:
-    """A value: everything needed to print the code of a mechanism. Equal plans have equal `text`.
+    """A value: all that is needed to print the code of a mechanism. Equal plans have equal `text`.
 
-    origin: where the plan's own origin lies in the world; only outputs, `fixed` and start values know of the world's.
-    outputs: the generalized coordinates q, then the points of interest; fixed_nodes: coordinates that never move, as
-    constants or formulas of parameters; blocks in the order of solving; watches: rows set aside as redundant, relative
-    to the size; conditions: what parameters set at run time must leave true; laws: u, ud, udd of each driver over the
-    symbol `time`; jumps: times at which one of them jumps, each with the period after which it does again, 0 if once;
-    anchor: an assembled, regular pose.
+    Attributes:
+        mechanism: The mechanism that is planned.
+        size: Of the mechanism [length]; residuals are relative to it.
+        origin: Place of the plan's own origin in the world; only outputs, `fixed` and start values are in the world.
+        drivers: Names and quantities of the drivers, in file order.
+        law_constants: Constants of the laws, settable at run time.
+        parameters: Parameters of the geometry, settable at run time.
+        laws: u, ud, udd of each driver over the symbol `time`.
+        jumps: Times at which a law jumps, each with the period after which it jumps again, 0 if once.
+        blocks: Rows solved together, in the order of solving.
+        outputs_motion: The outputs: the generalized coordinates q, then the points of interest.
+        coordinate_count: How many of the outputs are generalized coordinates.
+        fixed_nodes: Coordinates that never move, as constants or formulas of parameters.
+        watches: Redundant rows, relative to the size, whose residuals are monitored.
+        conditions: Conditions that parameters set at run time must keep.
+        anchor: An assembled, regular pose.
+
     """
 
     mechanism: Mechanism
@@ -122,7 +133,7 @@ class SolvePlan:
 
     @cached_property
     def text(self) -> str:
-        """The plan as text, the same for equal plans: its nodes numbered in order, then what is made of them."""
+        """The plan as text, equal for equal plans: its nodes numbered in order, then what is made of them."""
         number = {node: k for k, node in enumerate(self.nodes)}
         lines = [f"plan {self.mechanism.name} size {self.size!r} anchor {self.anchor_values!r}"]
         for node, k in number.items():
@@ -134,7 +145,7 @@ class SolvePlan:
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
-        lines += [f"condition {name} {number[node]} {meant}" for name, node, meant in self.conditions]
+        lines += [f"condition {name} {number[node]} {required}" for name, node, required in self.conditions]
         lines += [f"{self.law_constants} {self.parameters} {self.drivers} {self.coordinate_count}"]
         return "\n".join(lines)
 
@@ -158,13 +169,13 @@ class SolvePlan:
         return tuple(map(float, self.anchor.u)), tuple(z)
 
     def depends(self, output: str) -> tuple[int, ...]:
-        """Drivers (by position) on which an output depends structurally."""
+        """Return the drivers (by position) on which an output depends structurally."""
         behind = self._behind[output]
         return tuple(k for k, driver in enumerate(self.drivers) if driver.inputs[0] in behind)
 
     @cached_property
     def block_drivers(self) -> tuple[int, ...]:
-        """The driver (by position) that each solved block depends on, itself and through others; -1: several.
+        """The driver (by position) on which each solved block depends, itself or through others; -1: several.
 
         Structurally. A block that depends on none counts as one of the first driver's.
         """
@@ -187,7 +198,7 @@ class SolvePlan:
         return self.has_tracks and min(self.block_drivers) < 0
 
     def parameters_of(self, name: str) -> tuple[str, ...]:
-        """Parameters on which an output or a fixed coordinate depends structurally, in file order."""
+        """Return the parameters on which an output or a fixed coordinate depends structurally, in file order."""
         behind = self._behind[name]
         return tuple(p.name for p in self.parameters if parameter_symbol(p.name) in behind)
 
@@ -195,8 +206,8 @@ class SolvePlan:
     def _behind(self) -> dict[str, frozenset[str]]:
         """Inputs and parameters, by the names of their symbols, behind each output and each fixed coordinate."""
         behind = self._behind_coordinates
-        told = {motion.name: _behind_all([motion.position], behind) for motion in self.outputs_motion}
-        return told | {name: _behind_all([node], behind) for name, node in self.fixed_nodes.items()}
+        found = {motion.name: _behind_all([motion.position], behind) for motion in self.outputs_motion}
+        return found | {name: _behind_all([node], behind) for name, node in self.fixed_nodes.items()}
 
     @cached_property
     def _behind_coordinates(self) -> dict[str, frozenset[str]]:
@@ -215,7 +226,7 @@ def _behind_all(nodes: Sequence[Node], behind: Mapping[str, frozenset[str]]) -> 
 
 
 def _nodes(block: Block) -> list[Node]:
-    """All nodes of a block, those of the position stage first."""
+    """Return all nodes of a block, those of the position stage first."""
     nodes = [motion[0] for _, motion in block.assigned]
     nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
     nodes += [node for _, motion in block.assigned for node in motion[1:]]
@@ -227,9 +238,22 @@ def _position_count(block: Block) -> int:
 
 
 def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> SolvePlan:
-    """The plan for a mechanism, for all its outputs or only those named: unread loops are not solved.
+    """Return the plan of a mechanism.
 
-    Raises InconsistentError, MobilityError, AssemblyError or AmbiguousStartError.
+    Args:
+        mechanism: The mechanism.
+        outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
+
+    Returns:
+        The plan, with the parameters of the geometry and the constants of the laws settable.
+
+    Raises:
+        InconsistentError: Joints contradict each other.
+        MobilityError: There are not as many drivers as degrees of freedom, or the drivers do not determine the motion.
+        AssemblyError: The mechanism does not close near its start pose.
+        AmbiguousStartError: The start pose is singular and several branches leave it.
+        RequestError: An output is unknown.
+
     """
     local, origin = localized(mechanism)
     system = System(local)
@@ -243,7 +267,22 @@ def plan_from(
     redundancy: Redundancy,
     outputs: Sequence[str] | None = None,
 ) -> SolvePlan:
-    """The plan, when redundancy is known already; system: of the mechanism as seen from its `origin`."""
+    """Return the plan of a mechanism whose redundancy is known.
+
+    Args:
+        mechanism: The mechanism in the world.
+        system: The equations of the mechanism as seen from `origin`.
+        origin: The plan's own origin in the world, as `localized` returns it.
+        redundancy: Of the system, with its assembly.
+        outputs: As in `compile_plan`.
+
+    Returns:
+        The plan.
+
+    Raises:
+        KinfmuError: As in `compile_plan`.
+
+    """
     local = system.mechanism
     refuse_inconsistent(system, redundancy)
     refuse_mobility(system, redundancy)
@@ -294,9 +333,9 @@ def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
     for dependent in redundancy.inconsistent:
         unit = system.gap_unit(dependent.row)
         raise InconsistentError(
-            f"[joints.{dependent.row.owner}] contradicts the other joints: "
-            f"{listed(dependent.implied_by_joints) if dependent.implied_by_joints else 'all'} leave its row "
-            f"'{dependent.row.label}' open by {abs(dependent.gap):.6g} {unit}, whatever the pose; "
+            f"[joints.{dependent.row.owner}] contradicts the other joints: with "
+            f"{listed(dependent.implied_by_joints) if dependent.implied_by_joints else 'all of them'} closed, row "
+            f"'{dependent.row.label}' does not close: gap {abs(dependent.gap):.6g} {unit} in every pose; "
             f"change a dimension by that gap or remove the joint",
             joint=dependent.row.owner,
             gap=dependent.gap,
@@ -339,13 +378,13 @@ def refuse_negative_distances(system: System, start: StartValues) -> None:
 
 
 def _loose(system: System, redundancy: Redundancy) -> list[str]:
-    """Bodies that joints and drivers together do not hold."""
+    """Return the bodies that joints and drivers together do not hold."""
     rows = [*redundancy.kept, *range(system.joint_row_count, len(system.rows))]
     start = redundancy.assembly.start.q
     pose = next(iter(motion_samples(Part(system, redundancy.kept), start, 1)), start)
     free = null_space(system.scaled_jacobian(pose)[rows])
     moves = {
-        name.partition(".")[0] for name, way in zip(system.coordinates, free, strict=True) if abs(way).max() > 1e-6
+        name.partition(".")[0] for name, move in zip(system.coordinates, free, strict=True) if abs(move).max() > 1e-6
     }
     return [body.name for body in system.mechanism.moving_bodies if body.name in moves]
 
@@ -359,7 +398,7 @@ def _are(drivers: Sequence[str]) -> str:
 def _outputs(
     mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
 ) -> tuple[list[Motion], int, dict[str, Node]]:
-    """Outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
+    """Return outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":
         wanted = [name for name in mechanism.coordinate_names if name not in known]
     elif mechanism.coordinates == "all":
@@ -409,7 +448,7 @@ def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
 
 
 def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
-    """Parameters that are numbers of their own; what follows from them is computed."""
+    """Return the parameters that are numbers of their own; those with an expression follow from them."""
     return tuple(
         PlanParameter(name, float(parameter.value), parameter.quantity or Quantity("number"), parameter.description)
         for name, parameter in mechanism.parameters.items()
@@ -418,7 +457,7 @@ def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
 
 
 def _law_constants(mechanism: Mechanism, tracer: Tracer) -> Iterator[tuple[Driver, dict[str, Value]]]:
-    """Each driver with the constants of its law: symbols, but formulas of parameters where they are written so."""
+    """Yield each driver with the constants of its law: symbols, or formulas of parameters if written so."""
     for driver, traced in zip(mechanism.drivers, tracer.drivers, strict=True):
         yield (
             driver,
@@ -432,7 +471,7 @@ def _law_constants(mechanism: Mechanism, tracer: Tracer) -> Iterator[tuple[Drive
 
 
 def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...]:
-    """Times at which what drives jumps, each with its period."""
+    """Return the times at which a law jumps, each with its period."""
     found = []
     for driver, constants in _law_constants(mechanism, tracer):
         jumps = driver.law.jumps(**constants)

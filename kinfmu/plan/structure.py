@@ -21,8 +21,10 @@ from kinfmu.plan.trace import Tracer, is_parameter
 
 @dataclass(frozen=True)
 class Structure:
-    """fixed: coordinates that joints hold at a constant or a formula of parameters, in file order; blocks: in the order
-    of solving.
+    """The order of solving.
+
+    fixed: coordinates that joints hold at a constant or a formula of parameters, in file order; blocks: in the order of
+    solving.
     """
 
     fixed: Mapping[str, Node]
@@ -30,7 +32,7 @@ class Structure:
 
 
 class RowTracer:
-    """Rows of the system by index, traced with what is known so far."""
+    """The rows of a system by index, traced with the coordinates known so far."""
 
     def __init__(self, system: System, tracer: Tracer) -> None:
         self.tracer = tracer
@@ -47,7 +49,7 @@ class RowTracer:
 
 
 def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose: FloatArray) -> Structure:
-    """Order of solving the kept joint rows and the driver rows; redundant rows may join a block as companions.
+    """Return the order of solving the kept joint rows and the driver rows; redundant rows may become companions.
 
     pose: closed, (n,).
     """
@@ -67,7 +69,7 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
         spare = [system.rows[open_rows[k]].name for k in order.unmatched_rows]
         raise MobilityError(f"nothing determines {listed(missed)}; rows to spare: {listed(spare)}")
     blocks = [
-        _torn(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
+        _with_assignments(tracer, row, known, [open_rows[k] for k in rows], [unknown[k] for k in columns])
         for rows, columns in order.blocks
     ]
 
@@ -78,14 +80,14 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:
-    """c where the row is c * symbol + rest, with a constant c != 0 and a rest free of the symbol; else None."""
+    """Return c if the row is c * symbol + rest, with a constant c != 0 and a rest free of the symbol; else None."""
     graph = row.graph
     (slope,) = graph.derivative([row], {symbol: graph.constant(1.0)})
     return slope.constant or None
 
 
 def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Mapping[str, Node]) -> Node | None:
-    """What a row gives outright for a coordinate: -rest / c, or None if it does not."""
+    """Return what a row gives outright for a coordinate: -rest / c, or None if it does not."""
     coefficient = linear_coefficient(row(index, known), tracer.symbols[name])
     if coefficient is None:
         return None
@@ -94,7 +96,7 @@ def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Ma
 
 
 def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]) -> tuple[dict[str, Node], set[int]]:
-    """Coordinates that the kept joint rows fix, in file order, and the rows used up by that."""
+    """Return the coordinates that the kept joint rows fix, in file order, and the rows used for that."""
     values: dict[str, Node] = {}
     used: set[int] = set()
     touching: dict[str, list[int]] = {}  # body -> rows
@@ -121,14 +123,14 @@ def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[in
     return {name: values[name] for name in system.coordinates if name in values}, used
 
 
-def _torn(
+def _with_assignments(
     tracer: Tracer,
     row: RowTracer,
     known: Mapping[str, Node],
     rows: Sequence[int],
     columns: Sequence[str],
 ) -> BlockStructure:
-    """Assignments taken out of a block: rows that give a coordinate outright and do not need each other in turn."""
+    """Return a block with assignments: rows that give a coordinate outright, without circles among them."""
     needs: dict[str, set[str]] = {}  # assigned coordinate -> coordinates of the block in its row
     assigned: dict[str, int] = {}
     for index in rows:
@@ -156,7 +158,7 @@ def _torn(
 
 
 def _reaches(needs: Mapping[str, set[str]], start: set[str], goal: str) -> bool:
-    """True if an assignment among `start` needs `goal`, directly or through others."""
+    """Return True if an assignment among `start` needs `goal`, directly or through others."""
     stack, seen = list(start), set(start)
     while stack:
         name = stack.pop()

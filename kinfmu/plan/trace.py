@@ -13,19 +13,19 @@ from kinfmu.mechanism.body import GROUND_NAME
 
 
 def parameter_symbol(name: str) -> str:
-    """Name of a parameter's symbol: a full stop at the end, which no coordinate and no input has."""
+    """Return the name of a parameter's symbol: it ends in a full stop, as no coordinate or input does."""
     return f"{name}."
 
 
 def is_parameter(symbol: Node) -> bool:
-    """True for the symbol of a parameter."""
+    """Return True for the symbol of a parameter."""
     return symbol.name.endswith(".")
 
 
 class Tracer:
-    """Turns joints, drivers and points into nodes of one graph.
+    """Joints, drivers and points as nodes of one graph.
 
-    Every coordinate, every driver value and every parameter is a symbol there.
+    Every coordinate, every driver value and every parameter is a symbol of it.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:

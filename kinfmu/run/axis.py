@@ -1,4 +1,4 @@
-"""The axis of a run: time, or what takes its place where driver values were given instead of times."""
+"""The axis of a run: time, or a driver's value or the sample number if driver values were given."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DEGREE = ANGLES["deg"]
 _LARGE = 1e9  # [rad]; larger angles stay in radians
 
 
-class Samples(Protocol):
+class HasAxis(Protocol):
     """The fields of a run that determine its axis, as kinfmu.Run describes them."""
 
     @property
@@ -39,11 +39,11 @@ class Samples(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """What pictures and reports of a run have in the place of time.
+    """The quantity over which pictures and reports show a run.
 
     name: 't', the name of a driver, or 'sample'; unit: 's', 'deg', the unit of length, or ''; factor: of the unit into
     the one used inside; values: (n,) in the unit, in ascending or descending order; span: their range in the unit used
-    inside, which is that of the rates; per: what rates are derivatives by, 'time', or 'angle' or 'length' of the
+    inside, which is that of the rates; per: what rates are derivatives by: 'time', or 'angle' or 'length' of the
     driver; rates: a sentence on them, empty where they are derivatives by the axis of a run over time.
     """
 
@@ -67,25 +67,25 @@ class Axis:
         return self.unit == "s"
 
     def at(self, t: FloatArray) -> FloatArray:
-        """Values of the axis, in its unit, at times of the run."""
+        """Return values of the axis, in its unit, at times of the run."""
         return np.interp(t, self.t, self.values) if len(self.t) and not self.is_time else t
 
     def place(self, t: float) -> str:
-        """'37 s', 'crank = 45 deg' or 'sample 45': a time of the run, for people."""
+        """Return '37 s', 'crank = 45 deg' or 'sample 45': a time of the run as text."""
         value = f"{float(self.at(np.array([t]))[0]):.6g}"
         if self.is_time:
             return f"{value} s"
         return f"{self.name} = {value} {self.unit}" if self.unit else f"{self.name} {value}"
 
     def range(self) -> str:
-        """'t = 0 to 180 s', 'crank = 0 to 360 deg' or 'sample 0 to 360'; '' without samples."""
+        """Return 't = 0 to 180 s', 'crank = 0 to 360 deg' or 'sample 0 to 360'; '' without samples."""
         if not len(self.values):
             return ""
         first, last = (f"{value:.6g}" for value in (self.values[0], self.values[-1]))
         return f"{self.name} = {first} to {last} {self.unit}" if self.unit else f"{self.name} {first} to {last}"
 
 
-def axis_of(run: Samples) -> Axis:
+def axis_of(run: HasAxis) -> Axis:
     """Return the axis of a run, as its field `axis` names it."""
     if run.axis == TIME or run.axis not in (SAMPLE, *run.input_names[::3]):
         return Axis("t", "s", 1.0, run.t, _span(run.t), "time", "", run.t)
@@ -106,7 +106,7 @@ def axis_of(run: Samples) -> Axis:
     return Axis(driver, unit, factor, values, span, per, rates, run.t)
 
 
-def rates_per(run: Samples) -> str:
+def rates_per(run: HasAxis) -> str:
     """Return what the rates of a run are derivatives by: 'time', or 'angle' or 'length' of the driver on its axis.
 
     They are derivatives by the driver where it has speed 1 and acceleration 0, and the others are at rest.
@@ -121,7 +121,7 @@ def rates_per(run: Samples) -> str:
 
 
 def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
-    """Return the axis of a run by inputs: the one value that changes, if it is monotonic, else the samples.
+    """Return the axis of a run by inputs: the only value that changes, if it is monotonic, else the samples.
 
     u: (n, d) values of the drivers; names: of these inputs, (d,).
     """
@@ -137,7 +137,7 @@ def _is_monotonic(values: FloatArray) -> bool:
 
 
 def _driver(name: str) -> tuple[str, str]:
-    """Name of the driver of an input such as 'crank_angle', and 'angle' or 'length'."""
+    """Return the driver of an input such as 'crank_angle', and 'angle' or 'length'."""
     driver, _, kind = name.rpartition("_")
     return driver, "angle" if kind == "angle" else "length"
 
@@ -146,8 +146,8 @@ def _span(values: FloatArray) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
 
 
-def _at_speeds(run: Samples) -> str:
-    """'Rates are at the speed crank = 3 rad/s.': where each driver has one speed, else that they are at those given."""
+def _at_speeds(run: HasAxis) -> str:
+    """Return 'Rates are at the speed crank = 3 rad/s.' if each driver has one speed, else that speeds were given."""
     shown = []
     for name in run.input_names[::3]:
         driver, kind = _driver(name)

@@ -1,4 +1,4 @@
-"""Which columns of a run are kept, and at which samples: what is not kept need not be computed."""
+"""Channels: which columns of a run are kept, and at which samples; others are not computed."""
 
 from __future__ import annotations
 
@@ -12,49 +12,67 @@ from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
 from kinfmu.units import derivative_name
 
-ALWAYS = ("time", "solver.status")  # without them nobody can tell what a sample is
+ALWAYS = ("time", "solver.status")  # without them a sample has no meaning
 DRAWN = "drawn"
 GROUPS_OF_COORDINATES = ("q", "points", "all")
-ROUNDING = 1e-9  # of a period: what a sample may come early
+ROUNDING = 1e-9  # of a period: a sample may be early by this
 
 
 def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
-    """The columns of `run`, with or without samples, that `names` do not choose; none if they are None.
+    """Return the columns of a run that `names` do not choose.
 
-    Names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'residual',
-    'iterations', 'margin', 'error', 'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the topics
-    of an MCAP file that viewers draw by themselves. A minus in front leaves out: ['-error', '-margin'] is all but
-    those. Time and status are always kept, and the inputs of a run over these.
+    Args:
+        run: The run, with or without samples.
+        names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'residual',
+            'iterations', 'margin', 'error', 'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the
+            topics of an MCAP file that viewers draw by themselves. A minus in front leaves out: ['-error', '-margin']
+            is all but those. None: all.
+
+    Returns:
+        Names of the absent columns. Time and status are always kept, and the inputs of a run over these.
+
+    Raises:
+        RequestError: A name is unknown.
+
     """
     groups = _groups(run)
     columns = [place.name for place in run.places()]
-    kept = _kept(names, lambda name: _named(name, groups, columns))
+    kept = _kept(names, lambda name: _chosen(name, groups, columns))
     return frozenset({*columns} - kept - {*ALWAYS, *_of_axis(run)}) | run.absent if names is not None else run.absent
 
 
 def _of_axis(run: Run) -> tuple[str, ...]:
-    """The inputs that the axis of a run and its rates are known by."""
+    """Return the inputs that the axis of a run and its rates depend on."""
     return () if run.axis == TIME else run.input_names
 
 
 def is_drawn(names: Sequence[str] | None) -> bool:
-    """True if `names` choose the topics that viewers draw by themselves."""
+    """Return True if `names` choose the topics that viewers draw by themselves."""
     return DRAWN in _kept(names, lambda name: {DRAWN} if name in ("all", DRAWN) else set())
 
 
-def _kept(names: Sequence[str] | None, named: Callable[[str], set[str]]) -> set[str]:
-    """What is left after each name has added what it stands for, or taken it away."""
-    kept = set(named("all")) if names is None or (names and names[0].startswith("-")) else set()
+def _kept(names: Sequence[str] | None, columns_of: Callable[[str], set[str]]) -> set[str]:
+    """Return what is kept after each name has added its columns or removed them."""
+    kept = set(columns_of("all")) if names is None or (names and names[0].startswith("-")) else set()
     for name in names or ():
-        found = named(name.removeprefix("-"))
+        found = columns_of(name.removeprefix("-"))
         kept = kept - found if name.startswith("-") else kept | found
     return kept
 
 
 def kept_samples(t: FloatArray, rate: float | None) -> IntArray:
-    """Places of the samples at times t (n,) [s] that are kept at `rate` [1/s]: the first in every period, and the last.
+    """Return the places of the samples kept at a rate: the first in every period, and the last.
 
-    All if rate is None.
+    Args:
+        t: (n,) times [s].
+        rate: Samples kept per second [1/s]; None: all.
+
+    Returns:
+        Indices of the samples.
+
+    Raises:
+        RequestError: The rate is not positive and finite.
+
     """
     if rate is None or not len(t):
         return np.arange(len(t))
@@ -67,24 +85,45 @@ def kept_samples(t: FloatArray, rate: float | None) -> IntArray:
 
 
 def select(run: Run, channels: Sequence[str] | None = None, rate: float | None = None) -> Run:
-    """The part of a run that `absent_columns` and `kept_samples` tell of; what is left out is not computed for it."""
+    """Return a run with the columns and samples of `absent_columns` and `kept_samples`; the rest is not computed.
+
+    Args:
+        run: The run.
+        channels: Names as in `absent_columns`.
+        rate: As in `kept_samples` [1/s].
+
+    Returns:
+        The part of the run.
+
+    Raises:
+        RequestError: A name is unknown, or the rate is not positive and finite.
+
+    """
     rows = kept_samples(run.t, rate)
     part = run if len(rows) == len(run) else run.part(rows, events=run.events)
     return part.without(absent_columns(run, channels))
 
 
 def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
-    """The coordinates of which `names` choose a column, in the order named.
+    """Return the coordinates of which `names` choose a column, in the order named.
 
-    Names: as those of `absent_columns`, 'coupler.vx' chooses 'coupler.x'; fixed coordinates by their own. Raises a
-    RequestError for a name that is not known, or that chooses no coordinate.
+    Args:
+        run: The run.
+        names: As in `absent_columns`; 'coupler.vx' chooses 'coupler.x'. Fixed coordinates by their own names.
+
+    Returns:
+        Names of the coordinates.
+
+    Raises:
+        RequestError: A name is unknown or chooses no coordinate.
+
     """
     owners = {derivative_name(name, order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
     groups, columns = _groups(run), [place.name for place in run.places()]
     kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
     for name in names:
         if name.startswith("-"):
-            left_out = _named(name[1:], groups, columns)
+            left_out = _chosen(name[1:], groups, columns)
             kept = {column: None for column in kept if column not in left_out}
         else:
             found = _of_coordinates(name, owners, groups, columns)
@@ -95,7 +134,7 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
 def _of_coordinates(
     name: str, owners: Mapping[str, str], groups: dict[str, set[str]], columns: Sequence[str]
 ) -> set[str]:
-    """The columns of coordinates under a name, those that were not kept too; an error if there are none."""
+    """Return the columns of coordinates that a name chooses, also those not kept; an error if there are none."""
     found = {name} if name in owners else groups.get(name, {column for column in columns if fnmatchcase(column, name)})
     if found.isdisjoint(owners):
         known = dict.fromkeys(owners.values())
@@ -107,7 +146,7 @@ def _of_coordinates(
 
 
 def _groups(run: Run) -> dict[str, set[str]]:
-    """Columns by the name of their group."""
+    """Return columns by the name of their group."""
     points = run.outputs[run.coordinate_count :]
     every = {place.name for place in run.places(kept=False)}
     return {
@@ -126,8 +165,8 @@ def _groups(run: Run) -> dict[str, set[str]]:
     }
 
 
-def _named(name: str, groups: dict[str, set[str]], columns: Sequence[str]) -> set[str]:
-    """The columns of a group, or those that match; an error if there are none."""
+def _chosen(name: str, groups: dict[str, set[str]], columns: Sequence[str]) -> set[str]:
+    """Return the columns of a group, or those that match; an error if there are none."""
     if name in groups:
         return groups[name]
     found = {column for column in columns if fnmatchcase(column, name)}

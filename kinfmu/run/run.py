@@ -52,8 +52,8 @@ class Column(NamedTuple):
     values: NDArray[Any]  # (n,)
 
 
-class Place(NamedTuple):
-    """Where a column stands: in a table of the run, by the name of the field."""
+class ColumnPlace(NamedTuple):
+    """The place of a column: a table of the run, by the name of the field, and the number of its column."""
 
     name: str
     unit: str
@@ -80,7 +80,7 @@ class Run:
     1 / condition; error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the
     size; watch: (n, w) residual of the rows set aside as redundant, relative to the size. margin and error may be given
     as functions that compute them when they are first read.
-    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in all that tells how good they are.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics.
     absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
     mechanism_source: the mechanism with the parameters set, or its TOML text as a file holds it, empty if unknown.
     axis: what pictures and reports show the samples over: 'time'; of driver values given instead of times the input
@@ -160,7 +160,7 @@ class Run:
         return np.asarray(self.status <= Status.BRIDGED)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All tables as numbers, for copies and for other processes."""
+        """Return all tables as numbers, for copies and for other processes."""
         return {**self.__dict__, "margin": self.margin, "error": self.error}
 
     def __repr__(self) -> str:
@@ -173,22 +173,22 @@ class Run:
         return len(self.t)
 
     def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
-        """Some of the samples, with these events; what was not computed yet is not computed for it."""
+        """Return some of the samples, with these events; lazy tables stay lazy."""
 
-        def late(name: str) -> Any:
+        def lazy(name: str) -> Any:
             table = self.__dict__[name]
             return (lambda: getattr(self, name)[rows]) if callable(table) else table[rows]
 
         tables = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "watch")
         parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
-        return replace(self, **parts, margin=late("margin"), error=late("error"), events=events)
+        return replace(self, **parts, margin=lazy("margin"), error=lazy("error"), events=events)
 
     def replaced(self, **fields: Any) -> Run:
         """Return the run with other fields; margins and errors that are not computed yet stay so."""
         return replace(self, **{name: self.__dict__[name] for name in ("margin", "error")} | fields)
 
     def without(self, names: Iterable[str]) -> Run:
-        """The run without columns of these names: their places hold NaN, 0 where they count, and none is computed."""
+        """Return the run without columns of these names: their places hold NaN (counts: 0), and none is computed."""
         absent = self.absent | frozenset(names)
         tables: dict[str, Any] = {}
         for name, group in groupby(self.places(kept=False), key=lambda place: place.table):
@@ -203,62 +203,79 @@ class Run:
         return self.replaced(**tables, absent=absent)
 
     def columns(self) -> Iterator[Column]:
-        """Every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
+        """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
         for place in self.places():
             yield Column(place.name, place.unit, self._column(place))
 
-    def places(self, *, kept: bool = True) -> Iterator[Place]:
-        """Names, units and places of the columns, in their order; kept=False: those that were not kept, too."""
+    def places(self, *, kept: bool = True) -> Iterator[ColumnPlace]:
+        """Yield names, units and places of the columns, in their order; kept=False: also those that were not kept."""
         for place in self._places():
             if not (kept and place.name in self.absent):
                 yield place
 
-    def _places(self) -> Iterator[Place]:
+    def _places(self) -> Iterator[ColumnPlace]:
         per = rates_per(self)
-        yield Place("time", "s" if self.axis == TIME else "1", "t", None)
+        yield ColumnPlace("time", "s" if self.axis == TIME else "1", "t", None)
         for k, name in enumerate(self.input_names):
-            yield Place(name, self.input_unit(name), "inputs", k)
+            yield ColumnPlace(name, self.input_unit(name), "inputs", k)
         for order, table in enumerate(("values", "rates", "accelerations")):
             for k, name in enumerate(self.outputs):
                 unit = unit_of(quantity_of(name, order, per), self.length_unit)
-                yield Place(derivative_name(name, order), unit, table, k)
+                yield ColumnPlace(derivative_name(name, order), unit, table, k)
         for name in ("status", "residual", "iterations", "margin"):
-            yield Place(f"solver.{name}", "1", name, None)
+            yield ColumnPlace(f"solver.{name}", "1", name, None)
         for k, name in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
-            yield Place(name, "1", "error", k)
+            yield ColumnPlace(name, "1", "error", k)
         for k, name in enumerate(self.watch_names):
-            yield Place(f"watch.{name}", "1", "watch", k)
+            yield ColumnPlace(f"watch.{name}", "1", "watch", k)
 
-    def _column(self, place: Place) -> NDArray[Any]:
+    def _column(self, place: ColumnPlace) -> NDArray[Any]:
         table: NDArray[Any] = getattr(self, place.table)
         return table if place.column is None else table[:, place.column]
 
     def to_arrow(self) -> Any:
-        """The columns as a pyarrow.Table, with the unit of each in the metadata of its field.
+        """Return the columns as a pyarrow.Table, with the unit of each in the metadata of its field.
 
-        This, to_pandas and to_polars raise a MissingPackageError without their package.
+        Raises:
+            MissingPackageError: pyarrow is not installed.
+
         """
         return arrow_table(self.columns())
 
     def to_pandas(self) -> Any:
-        """The columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
+        """Return the columns as a pandas.DataFrame, with the units by column in `attrs["units"]`.
+
+        Raises:
+            MissingPackageError: pandas is not installed.
+
+        """
         frame = _optional("pandas").DataFrame({column.name: column.values for column in self.columns()})
         frame.attrs["units"] = {place.name: place.unit for place in self.places()}
         return frame
 
     def to_polars(self) -> Any:
-        """The columns as a polars.DataFrame."""
+        """Return the columns as a polars.DataFrame.
+
+        Raises:
+            MissingPackageError: polars is not installed.
+
+        """
         return _optional("polars").DataFrame({column.name: column.values for column in self.columns()})
 
     def input_unit(self, name: str) -> str:
-        """Unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
+        """Return the unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
         first = self.input_names[self.input_names.index(name) // 3 * 3]
         kind = "angle" if first.endswith("_angle") else "length"
         order = ("speed", "acceleration").index(name.rpartition("_")[2]) + 1 if name != first else 0
         return unit_of(quantity_of(".phi" if kind == "angle" else ".x", order), self.length_unit)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """The column of that name, (n,); a fixed coordinate is a column of its constant, its rates are zero."""
+        """Return the column of a name, (n,); of a fixed coordinate its constant, with rates of zero.
+
+        Raises:
+            KinfmuError: The run has no such column, or it was not kept.
+
+        """
         if not isinstance(name, str):
             raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
         for fixed, value in self.fixed.items():
@@ -276,7 +293,7 @@ class Run:
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:
-    """Columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
+    """Return columns as a pyarrow.Table, without nulls, with the unit of each in the metadata of its field."""
     pa = _optional("pyarrow")
     arrays, fields = [], []
     for column in columns:
@@ -286,7 +303,7 @@ def arrow_table(columns: Iterable[Column]) -> Any:
 
 
 def _optional(package: str) -> Any:
-    """A package that is not installed with kinfmu."""
+    """Import a package that is not installed with kinfmu."""
     try:
         return import_module(package)
     except ImportError:
@@ -294,13 +311,13 @@ def _optional(package: str) -> Any:
 
 
 class Sink(Protocol):
-    """Takes a run piece by piece: `begin`, `add` again and again, `end`; nothing is called after an error."""
+    """A receiver of a run in parts: `begin`, `add` for each part, `end`; not called again after an error."""
 
     def begin(self, run: Run) -> None:
-        """The run before its first sample: names, units, constants, mechanism."""
+        """Receive the run before its first sample: names, units, constants, mechanism."""
 
     def add(self, run: Run) -> None:
-        """The next samples, and the events since the last call."""
+        """Receive the next samples, and the events since the last call."""
 
     def end(self, run: Run, reason: str) -> None:
-        """The whole run; reason: why it ended early, if none of its events says so."""
+        """Receive the whole run; reason: why it ended early, if none of its events has the reason."""

@@ -1,4 +1,4 @@
-"""Angles that were wrapped into one turn, followed the short way."""
+"""Unwrapping of angles that were wrapped into one turn."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from kinfmu.solver.python.turns import TURN, turned
 
-_HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, but for rounding, is taken as it stands
+_HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, within rounding, is unchanged
 
 
 def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same angles, each moved by whole turns so that it lies within half a turn of the one before.
+    """Return the angles, each moved by whole turns to within half a turn of the one before.
 
         350, 10, 350 deg -> 350, 370, 350 deg
 
-    angles: (n,) [rad]; the first is taken as it stands.
+    angles: (n,) [rad]; the first is unchanged.
     """
     steps = np.diff(angles) / TURN
     back = np.sign(steps) * np.ceil(np.abs(steps) - _HALF)  # [turns]
@@ -24,5 +24,5 @@ def unwrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def is_long(steps: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which steps between angles [rad] are longer than half a turn, so that the short way is another one."""
+    """Return which steps between angles [rad] are longer than half a turn, so that unwrapping changes them."""
     return np.abs(steps) > _HALF * TURN

@@ -1,4 +1,4 @@
-"""Parameters set in a mechanism: the pose of the mechanism as written is followed to them."""
+"""Parameters set in a mechanism, with its start pose followed from the parameters as written."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Settings = Mapping[str, float | str]
 class Continued(NamedTuple):
     """A mechanism with parameters set.
 
-    message: why the written pose cannot be followed to them, so that the mechanism is assembled anew from its start
-    poses; empty if it can.
+    message: the reason if continuation does not reach them and the mechanism is assembled anew from its start poses;
+    empty if it does.
     """
 
     mechanism: Mechanism
@@ -63,7 +63,7 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
 
 
 def settable(mechanism: Mechanism, settings: Settings) -> Mechanism:
-    """Return the mechanism as written; parameters that are set although an expression gives them are numbers."""
+    """Return the mechanism as written, with numbers for the expressions of parameters that are set."""
     derived = [name for name, parameter in mechanism.parameters.items() if parameter.expression and name in settings]
     return mechanism.with_parameters({name: float(mechanism.parameters[name].value) for name in derived})
 
@@ -74,7 +74,7 @@ def bound_values(plan: SolvePlan, mechanism: Mechanism) -> tuple[float, ...]:
 
 
 def anew(message: str) -> str:
-    """Return the note about parameters to which the written pose cannot be followed."""
+    """Return the note about parameters that continuation does not reach."""
     return f"{message}; the mechanism is assembled anew from its start poses"
 
 
@@ -84,7 +84,7 @@ def law_starts(mechanism: Mechanism) -> tuple[float, ...]:
 
 
 def at_law_start(solver: Solver, mechanism: Mechanism) -> Pose:
-    """Return the pose at the start of the laws, followed from the anchor: a pose without numbers if that fails."""
+    """Return the pose at the start of the laws, followed from the anchor; without numbers if that fails."""
     start = law_starts(mechanism)
     return (
         failed(solver.anchor, start, Status.OUTSIDE, solver.message)

@@ -1,4 +1,4 @@
-"""What an engine tells of the samples of a sweep, besides the tables that it fills."""
+"""Engines: per-sample diagnostics of a sweep, and what every engine can do."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ Tables = tuple[FloatArray, FloatArray, FloatArray]  # (n, m) values, rates and a
 
 
 class SweepResult(NamedTuple):
-    """Arrays as in Run; margin and error as functions that compute them. failures: the first sample of each stretch
-    without numbers, and why.
+    """Per-sample diagnostics as in Run; margin and error are functions that compute them.
+
+    failures: the first sample of each interval without numbers, and the reason.
     """
 
     status: IntArray
@@ -26,14 +27,14 @@ class SweepResult(NamedTuple):
 
 
 class Engine(Protocol):
-    """Something that solves a plan at many samples. order: how it likes its tables; fixed: what never moves."""
+    """A solver of a plan at many samples. order: of the fastest tables; fixed: coordinates that never move."""
 
     name: str
     order: Literal["C", "F"]
     fixed: Mapping[str, float]
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
-        """Driver values, speeds and accelerations at times, by the laws."""
+        """Return driver values, speeds and accelerations at times, by the laws."""
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
-        """Fill the tables; what cannot be reached is NaN there."""
+        """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""

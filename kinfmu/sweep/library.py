@@ -20,9 +20,9 @@ from kinfmu.solver.python.status import Status
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # lanes need them; the arithmetic is the same
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # lanes need them; results are equal
 MESSAGE = 480  # characters, as KF_MESSAGE
-MOST_FAILURES = 1000  # stretches without numbers whose reasons are kept
+MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 
 _double = ctypes.c_double
 _numbers = ctypes.POINTER(_double)
@@ -57,11 +57,11 @@ class _Job(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What a sweep tells besides its tables: see Run. outcomes: (n, 2), status and iterations.
+class LibraryResult:
+    """Per-sample diagnostics of a sweep, as in Run.
 
-    failures: first sample and message of each stretch without numbers, and after MOST_FAILURES of them how many more
-    there are; side_by_side: how many samples went through lanes.
+    outcomes: (n, 2), status and iterations; failures: first sample and message of each interval without numbers, and
+    after MOST_FAILURES of them how many more there are; side_by_side: how many samples were solved in lanes.
     """
 
     outcomes: NDArray[np.int32]
@@ -72,7 +72,12 @@ class Told:
 
 
 class Library:
-    """The compiled model and solver of a plan. CompilerError if it cannot be compiled, kept or loaded."""
+    """The compiled model and solver of a plan.
+
+    Raises:
+        CompilerError: It cannot be compiled, cached or loaded.
+
+    """
 
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
@@ -94,13 +99,13 @@ class Library:
     def drive(
         self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, d) driver values, speeds and accelerations at times; parameters: those of the plan if none."""
+        """Return (n, d) driver values, speeds and accelerations at times; default parameters: those of the plan."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
         values = parameters or [parameter.value for parameter in self.plan.parameters]
         given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
         if not self._library.kf_drive_all(ctypes.c_int64(len(times)), _start(times), *given, *map(_start, driven)):
-            raise KinfmuError("these parameters cannot be had")
+            raise KinfmuError("these parameters have no solution")
         return driven  # type: ignore[return-value]  # three of them
 
     def sweep(
@@ -109,26 +114,41 @@ class Library:
         tables: Sequence[FloatArray | None],
         parameters: Sequence[float] = (),
         tolerance: float = 1e-9,
-        room: Told | None = None,
-    ) -> Told:
-        """Fill tables (n, outputs) of values, rates and accelerations at (n, d) driver values, speeds, accelerations.
+        reuse: LibraryResult | None = None,
+    ) -> LibraryResult:
+        """Fill tables of values, rates and accelerations; NaN for samples that cannot be reached.
 
-        A table may be laid out by samples or by outputs; None: not wanted. Where the samples cannot be reached it is
-        NaN. room: what a sweep of as many samples told, whose arrays are written over.
+        Args:
+            driven: (n, d) driver values, speeds and accelerations.
+            tables: Three arrays (n, outputs), by samples or by outputs; None: not wanted.
+            parameters: Values to set by continuation; default: those of the plan.
+            tolerance: Residual relative to the size above which a sample is not ok.
+            reuse: Result of an earlier sweep of as many samples, whose arrays are overwritten.
+
+        Returns:
+            The diagnostics.
+
+        Raises:
+            KinfmuError: Memory runs out, the parameters have no solution, or the arrays to reuse have other shapes.
+
         """
         count, watches = len(driven[0]), len(self.plan.watches)
-        if room is None:
-            whole = np.empty((2, count))  # in one piece: the system hands large pieces over faster
-            told = Told(whole[0].view(np.int32).reshape(count, 2), whole[1], np.empty((count, watches)), (), 0)
-        elif room.watch.shape == (count, watches):
-            told = room
+        if reuse is None:
+            whole = np.empty((2, count))  # one allocation: the system provides large ones faster
+            result = LibraryResult(
+                whole[0].view(np.int32).reshape(count, 2), whole[1], np.empty((count, watches)), (), 0
+            )
+        elif reuse.watch.shape == (count, watches):
+            result = reuse
         else:
-            raise KinfmuError(f"room for {room.watch.shape} samples and rows set aside, not for {(count, watches)}")
+            raise KinfmuError(
+                f"the result to reuse has {reuse.watch.shape} samples and watches, not {(count, watches)}"
+            )
         failures = np.zeros(MOST_FAILURES, dtype=np.int64)
         messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
         job = self._job(driven, tables)
-        job.outcomes = told.outcomes.ctypes.data_as(ctypes.c_void_p)
-        job.residual, job.watches = _start(told.residual), _start(told.watch)
+        job.outcomes = result.outcomes.ctypes.data_as(ctypes.c_void_p)
+        job.residual, job.watches = _start(result.residual), _start(result.watch)
         job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
         job.messages = ctypes.cast(messages, ctypes.c_char_p)
         with _Memory(self._library, self._refusal(count), tolerance, parameters) as memory:
@@ -140,12 +160,12 @@ class Library:
             failed.append((sample, text.decode()))
         more = job.failure_count - MOST_FAILURES
         if more > 0:
-            bad = told.outcomes[:, 0] > Status.BRIDGED
+            bad = result.outcomes[:, 0] > Status.BRIDGED
             first = int(np.flatnonzero(bad & ~np.concatenate([[False], bad[:-1]]))[MOST_FAILURES])
             failed.append(
-                (first, f"{more} more stretches without numbers begin here or later: {MOST_FAILURES} are told")
+                (first, f"{more} more intervals without numbers begin here or later; {MOST_FAILURES} are reported")
             )
-        return replace(told, failures=tuple(failed), side_by_side=job.side_by_side)
+        return replace(result, failures=tuple(failed), side_by_side=job.side_by_side)
 
     def diagnose(
         self,
@@ -154,7 +174,7 @@ class Library:
         parameters: Sequence[float] = (),
         tolerance: float = 1e-9,
     ) -> tuple[FloatArray, FloatArray]:
-        """Margins (n,) and estimated errors (n, 3) of samples that were swept, with these outcomes; NaN if not good."""
+        """Return margins (n,) and estimated errors (n, 3) of swept samples with these outcomes; NaN if not good."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
         job = self._job(driven, (None, None, None))
         job.outcomes = outcomes.ctypes.data_as(ctypes.c_void_p)
@@ -166,12 +186,12 @@ class Library:
     def _refusal(self, count: int) -> str:
         return (
             f"no memory is left for a sweep of {count} samples of '{self.plan.mechanism.name}' by the native engine, "
-            "which may need 200 MB beside its tables; sweep fewer samples at a time, or with engine 'python'"
+            "which may need 200 MB in addition to its tables; sweep fewer samples at a time, or with engine 'python'"
         )
 
     def _job(self, driven: tuple[FloatArray, ...], tables: Sequence[FloatArray | None]) -> _Job:
         job = _Job(count=len(driven[0]))
-        job.given = [np.ascontiguousarray(table) for table in driven]  # to live as long as what points at them
+        job.given = [np.ascontiguousarray(table) for table in driven]  # kept alive while the job points to them
         job.u, job.ud, job.udd = map(_start, job.given)
         for k, table in enumerate(tables):
             if table is not None:
@@ -181,7 +201,7 @@ class Library:
 
 
 class _Memory:
-    """Memory of a sweep, with its parameters bound. refusal: what to say if there is none."""
+    """Memory of a sweep, with its parameters bound. refusal: the message if there is none."""
 
     def __init__(self, library: Any, refusal: str, tolerance: float, parameters: Sequence[float]) -> None:
         self._library = library

@@ -16,9 +16,17 @@ from kinfmu.sweep.library import Library
 
 
 class NativeEngine:
-    """A plan's library. parameters: values reached from those of the plan, or nothing; fixed: as Engine has it.
+    """The engine of a plan's compiled library.
 
-    CompilerError if there is no compiler, or if the library cannot be compiled, kept or loaded.
+    Args:
+        plan: The plan.
+        parameters: Values to set by continuation from those of the plan; empty: those of the plan.
+        fixed: Coordinates that never move, by name.
+        tolerance: Residual relative to the size above which a sample is not ok.
+
+    Raises:
+        CompilerError: There is no compiler, or the library cannot be compiled, cached or loaded.
+
     """
 
     name = "native"
@@ -33,28 +41,28 @@ class NativeEngine:
         self.fixed = fixed
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
-        """Driver values, speeds and accelerations at times, by the laws."""
+        """Return driver values, speeds and accelerations at times, by the laws."""
         return self._library.drive(times, constants, self._parameters)
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
-        """Fill the tables; what cannot be reached is NaN there."""
+        """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
         plain = all(
             table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
         )
         filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
-        told = self._library.sweep(driven, filled, self._parameters, self._tolerance)
+        result = self._library.sweep(driven, filled, self._parameters, self._tolerance)
         for table, values in zip(tables, filled, strict=True):
             if table is not values:
                 table[:] = values
-        late = _LazyDiagnostics(self._library, driven, told.outcomes, self._parameters, self._tolerance)
+        lazy = _LazyDiagnostics(self._library, driven, result.outcomes, self._parameters, self._tolerance)
         return SweepResult(
-            status=told.outcomes[:, 0].astype(np.int64),
-            iterations=told.outcomes[:, 1].astype(np.int64),
-            residual=told.residual,
-            watch=told.watch,
-            margin=lambda: late.diagnosed[0],
-            error=lambda: late.diagnosed[1],
-            failures=told.failures,
+            status=result.outcomes[:, 0].astype(np.int64),
+            iterations=result.outcomes[:, 1].astype(np.int64),
+            residual=result.residual,
+            watch=result.watch,
+            margin=lambda: lazy.diagnosed[0],
+            error=lambda: lazy.diagnosed[1],
+            failures=result.failures,
         )
 
 

@@ -16,7 +16,7 @@ _GAP = float("nan")
 
 
 class PoseHistory:
-    """Poses of the samples of a run, as the unknowns that they were found with; a bridge's poses as they are.
+    """The poses of a run's samples, kept as their unknowns; poses of bridges are kept whole.
 
     driven: u, ud, udd of the drivers, (n, d) each.
     """
@@ -27,20 +27,20 @@ class PoseHistory:
         self._found: list[Pose | Vector | None] = []
 
     def add(self, pose: Pose) -> None:
-        """The next sample's pose."""
+        """Add the next sample's pose."""
         self._found.append(
             None if not pose.good else pose if pose.bridge is not None or (pose.tracks and pose.status) else pose.z
         )
 
     def margins(self) -> FloatArray:
-        """(n,) margin of each sample, NaN where it holds no numbers."""
+        """Return (n,) margins; NaN for samples without numbers."""
         table = np.full(len(self._found), np.nan)
         for k, pose, _, _ in self._poses():
             table[k] = self._solver.margin(pose)
         return table
 
     def errors(self) -> FloatArray:
-        """(n, 3) estimated errors of q, qd, qdd of each sample, NaN where it holds no numbers."""
+        """Return (n, 3) estimated errors of q, qd, qdd; NaN for samples without numbers."""
         table = np.full((len(self._found), 3), np.nan)
         for k, pose, ud, udd in self._poses():
             table[k] = self._solver.errors(pose, ud, udd)
@@ -55,7 +55,7 @@ class PoseHistory:
 
 
 class PythonEngine:
-    """Follows each sample from the last good one."""
+    """The engine that follows each sample from the last good one by the generated Python."""
 
     name = "python"
     order: Literal["C", "F"] = "C"
@@ -65,20 +65,20 @@ class PythonEngine:
         self.fixed: Mapping[str, float] = solver.model.FIXED
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
-        """Driver values, speeds and accelerations at times, by the laws."""
+        """Return driver values, speeds and accelerations at times, by the laws."""
         model, values = self._solver.model, tuple(constants)
         driven = np.array([model.drive(t, values) for t in times.tolist()], dtype=float)  # (n, 3, d)
         driven = driven.reshape(len(times), 3, len(model.DRIVERS))
         return driven[:, 0], driven[:, 1], driven[:, 2]
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
-        """Fill the tables; what cannot be reached is NaN there."""
+        """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
         solver = self._solver
         n, m = tables[0].shape
         watch_count = len(solver.model.WATCHES)
         gap: Vector = (_GAP,) * (3 * m)
         motions: list[Vector] = []
-        told, watches, failures = [], [], []
+        outcomes, watches, failures = [], [], []
         history = PoseHistory(solver, driven)
         good, failing = solver.anchor, False
         for k, (u, ud, udd) in enumerate(zip(*(map(tuple, table.tolist()) for table in driven), strict=True)):
@@ -86,20 +86,20 @@ class PythonEngine:
             history.add(pose)
             if pose.good:
                 good, failing = pose, False
-                told.append((pose.status, pose.residual, pose.iterations))
+                outcomes.append((pose.status, pose.residual, pose.iterations))
                 motions.append(solver.motion(pose, ud, udd))
                 watches.append(solver.watch(pose))
             else:
                 if not failing:
                     failures.append((k, pose.message))
                 failing = True
-                told.append((pose.status, _GAP, 0))
+                outcomes.append((pose.status, _GAP, 0))
                 motions.append(gap)
                 watches.append((_GAP,) * watch_count)
         whole = np.array(motions, dtype=float).reshape(n, 3, m)
         for k, array in enumerate(tables):
             array[:] = whole[:, k]
-        diagnostics = np.array(told, dtype=float).reshape(n, 3)
+        diagnostics = np.array(outcomes, dtype=float).reshape(n, 3)
         return SweepResult(
             status=diagnostics[:, 0].astype(np.int64),
             iterations=diagnostics[:, 2].astype(np.int64),

@@ -1,4 +1,4 @@
-"""solve(): a mechanism over many samples, as a Run."""
+"""`solve`: a mechanism at many samples, as a Run."""
 
 from __future__ import annotations
 
@@ -45,24 +45,35 @@ def solve(
     out: Tables | None = None,
     **inputs: ArrayLike,
 ) -> Run:
-    """Positions, velocities and accelerations at the given times, or at the given driver values.
+    """Solve positions, velocities and accelerations at times, or at driver values.
 
-    t: (n,) times [s] at which the laws of the file drive; those of the file's run if neither t nor inputs are given. Or
-    the inputs by name, such as crank_angle=(n,) with crank_speed= and crank_acceleration=, arrays or numbers (speed 1
-    and acceleration 0 if not given, so that rates are per unit of the driver; t then counts the samples, and the axis
-    of pictures is the driver's value).
-    parameters: those of the mechanism and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"};
-    other geometry is reached by continuation from the pose of the geometry as written; what cannot be reached is
-    assembled anew, with an event of level "info". outputs: names to solve for, all
-    if None; what they do not need is not solved. engine: 'python'; 'native', generated C, compiled when first needed
-    and then kept; or 'auto', native where there are samples enough to pay for compiling and a compiler is there.
-    tolerance: residual relative to the size above which a sample is not ok; positive. wrap: angles given as inputs are
-    followed the short way where they jump by a turn, from 2 pi to 0; without it such a jump is a turn back. out: three
-    arrays (n, outputs), by samples or by outputs (order="F": faster), that take values, rates and accelerations.
+    Samples that cannot be reached are NaN with a status of 3 to 5 and an event with the reason; the run continues from
+    the last good sample.
 
-    Samples that cannot be reached are NaN with a status of 3 to 5 and an event that says why; the run goes on from the
-    last good sample. Raises a RequestError for what is not there or cannot be meant, and what compiling a plan raises
-    for a mechanism that cannot be solved; a CompilerError if engine 'native' is asked for and there is no compiler.
+    Args:
+        mechanism: The mechanism, or its plan from `compile_plan`.
+        t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
+        parameters: Values of parameters and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"}.
+            Other geometry is reached by continuation from the pose of the geometry as written; if that fails, the
+            mechanism is assembled anew, with an event of level "info".
+        outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
+        engine: 'python'; 'native', generated C, compiled on first use and then cached; or 'auto', native if there are
+            enough samples to pay for compiling and a compiler is found.
+        tolerance: Residual relative to the size above which a sample is not ok; positive.
+        wrap: Unwrap angles given as inputs: a jump from 2 pi to 0 goes on forwards. Without it such a jump turns back.
+        out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
+        **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and crank_acceleration=,
+            arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per unit of the driver. The
+            run's t then counts the samples, and its axis is the driver's value.
+
+    Returns:
+        The run, with a status for every sample.
+
+    Raises:
+        RequestError: A name is unknown or a value is invalid.
+        KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
+        CompilerError: The engine is 'native' and no compiler is found, or it fails.
+
     """
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
@@ -77,7 +88,7 @@ def solve(
         plan = compile_plan(mechanism, outputs)
     constants, geometry = _settings(plan, parameters or {})
     own = {name: value for name, value in (parameters or {}).items() if name not in geometry}
-    plan, bound, solver, anew_note = _set(plan, geometry, own, tolerance, by_law=not inputs)
+    plan, bound, solver, anew_note = _with_settings(plan, geometry, own, tolerance, by_law=not inputs)
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
@@ -94,14 +105,19 @@ def solve(
         driven = _with_values(chosen.drive(times, tuple(constants.values())))
     else:
         _refuse_huge(plan, driven)
-    run = _swept(plan, chosen, times, driven, out, constants).replaced(axis=axis)
+    run = _run_of(plan, chosen, times, driven, out, constants).replaced(axis=axis)
     if anew_note and len(times):
         run = run.replaced(events=(Event(float(times[0]), "info", anew_note), *run.events))
     return run
 
 
 def run_times(run: RunSettings) -> FloatArray:
-    """(n,) start + k step up to stop, which is included where a step hits it."""
+    """Return (n,) times start + k step up to stop, which is included if a step hits it.
+
+    Raises:
+        KinfmuError: There are more than MOST_SAMPLES of them.
+
+    """
     if (run.stop - run.start) / run.step > MOST_SAMPLES:
         raise KinfmuError(
             f"[run] {run.start:g} to {run.stop:g} s in steps of {run.step:g} s: more than {MOST_SAMPLES} samples"
@@ -111,7 +127,7 @@ def run_times(run: RunSettings) -> FloatArray:
 
 
 def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[str, float], dict[str, float | str]]:
-    """Law constants by name, with those given in place of the file's; and the parameters of the mechanism given."""
+    """Return law constants by name, those given in place of the file's, and the given parameters of the mechanism."""
     constants = {constant.name: constant.value for constant in plan.law_constants}
     quantities = {constant.name: constant.quantity for constant in plan.law_constants}
     positive = {constant.name for constant in plan.law_constants if constant.is_positive}
@@ -129,7 +145,7 @@ def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[s
     return constants, geometry
 
 
-def _set(
+def _with_settings(
     plan: SolvePlan,
     geometry: Mapping[str, float | str],
     constants: Mapping[str, float | str],
@@ -137,21 +153,25 @@ def _set(
     *,
     by_law: bool,
 ) -> tuple[SolvePlan, Vector, Solver | None, str]:
-    """The plan with other values of parameters written, the values to be bound (none: those of the plan), a solver if
-    there is one already, followed from the plan's anchor, and a note if it could not be followed (else empty).
+    """Set parameters of a plan.
 
-    What continuation does not reach is planned anew, as a file with these values would be: that assembles, or says
-    which joint stays open by how much.
+    If continuation from the plan's anchor does not reach them, the mechanism is planned anew, as a file with these
+    values would be.
+
+    Returns:
+        The plan, whose mechanism has the parameters; the values to bind (none: those of the plan); a solver if there is
+        one already; and a note if continuation failed, else ''.
+
     """
-    written = plan.mechanism
+    source = plan.mechanism
     settings = {**geometry, **constants}
     if not settings:
         return plan, (), None, ""
-    changed = written.with_parameters(settings)
-    if not geometry and (not by_law or law_starts(changed) == law_starts(written)):
+    changed = source.with_parameters(settings)
+    if not geometry and (not by_law or law_starts(changed) == law_starts(source)):
         return plan, (), None, ""
-    if any(written.parameters[name].expression is not None for name in geometry):
-        followed = continued(written, settings)
+    if any(source.parameters[name].expression is not None for name in geometry):
+        followed = continued(source, settings)
         return compile_plan(followed.mechanism, plan.outputs), (), None, followed.message
     values = bound_values(plan, changed)
     solver = with_parameters(load_module(plan), values, tolerance)
@@ -159,11 +179,11 @@ def _set(
         start = at_law_start(solver, changed)
         if not start.good:
             return compile_plan(changed, plan.outputs), (), None, anew(start.message)
-    return replace(plan, mechanism=written.with_parameters(geometry)), values, solver, ""
+    return replace(plan, mechanism=source.with_parameters(geometry)), values, solver, ""
 
 
 def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, tolerance: float, count: int) -> Engine:
-    """The engine of a name; `auto` takes the native one where it pays and can be had."""
+    """Return the engine of a name; `auto` is the native one if it pays and a compiler is found."""
     work = count * max(1, len(plan.blocks))
     if name == "native" or (name == "auto" and work >= WORTH_COMPILING):
         from kinfmu.sweep.native_engine import NativeEngine
@@ -178,9 +198,19 @@ def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, to
 
 
 def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: bool = False) -> tuple[FloatArray, ...]:
-    """Sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
+    """Return sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
 
-    wrap: angles are followed the short way.
+    Args:
+        plan: Its drivers have the inputs.
+        inputs: Arrays (n,) or numbers by name, such as crank_angle [rad].
+        wrap: Unwrap angles.
+
+    Returns:
+        Times (n,), values, speeds and accelerations (n, d).
+
+    Raises:
+        RequestError: An input is unknown, missing or invalid, or the lengths differ.
+
     """
     known = [name for driver in plan.drivers for name in driver.inputs]
     for name in inputs:
@@ -209,7 +239,7 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
 
 
 def _with_values(driven: Driven) -> Driven:
-    """Return what laws drive; NaN where a law has no value, or has rates whose squares no float holds."""
+    """Return the driver values; NaN where a law has no value, or has rates whose squares overflow."""
     u, ud, udd = driven
     if _is_within(ud, LARGEST_RATE) and _is_within(udd, LARGEST_RATE):
         return driven
@@ -218,7 +248,7 @@ def _with_values(driven: Driven) -> Driven:
 
 
 def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:
-    """Raise a RequestError for a speed or an acceleration of a driver whose square no float holds."""
+    """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
     for order in (1, 2):
         if not _is_within(driven[order], LARGEST_RATE):
             sample, number = np.argwhere(np.abs(driven[order]) > LARGEST_RATE)[0]
@@ -245,7 +275,7 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     return column
 
 
-def _swept(
+def _run_of(
     plan: SolvePlan,
     engine: Engine,
     times: FloatArray,
@@ -254,10 +284,9 @@ def _swept(
     constants: Mapping[str, float],
 ) -> Run:
     tables = _tables(out, (len(times), len(plan.outputs)), engine.order)
-    told = engine.sweep(driven, tables)
-    inputs = np.stack(driven, axis=2).reshape(
-        len(times), 3 * len(plan.drivers)
-    )  # value, speed, acceleration of each driver
+    result = engine.sweep(driven, tables)
+    width = 3 * len(plan.drivers)  # value, speed, acceleration of each driver
+    inputs = np.stack(driven, axis=2).reshape(len(times), width)
     return Run(
         t=times,
         outputs=plan.outputs,
@@ -268,13 +297,13 @@ def _swept(
         fixed=engine.fixed,
         input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
         inputs=inputs,
-        status=told.status,
-        iterations=told.iterations,
-        residual=told.residual,
-        margin=told.margin,
-        error=told.error,
+        status=result.status,
+        iterations=result.iterations,
+        residual=result.residual,
+        margin=result.margin,
+        error=result.error,
         watch_names=plan.watch_names,
-        watch=told.watch,
+        watch=result.watch,
         length_unit=plan.mechanism.length_unit,
         mechanism_source=plan.mechanism,
         info={
@@ -284,7 +313,7 @@ def _swept(
             **{name: repr(float(parameter.value)) for name, parameter in plan.mechanism.parameters.items()},
             **{name: repr(value) for name, value in constants.items()},
         },
-        events=tuple(Event(float(times[k]), "error", message) for k, message in told.failures),
+        events=tuple(Event(float(times[k]), "error", message) for k, message in result.failures),
     )
 
 

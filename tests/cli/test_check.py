@@ -111,8 +111,8 @@ def test_a_bar_of_a_wrong_length_is_told_by_name_and_gap(
 ) -> None:
     path = fourbar_file("length = 1\n", "length = 1.01\n")
     told = fails("check", path)
-    assert told.startswith(f"{path}: [joints.AB] contradicts the other joints: O, P, C, Q leave ")
-    assert " open by 0.01 m" in told
+    assert told.startswith(f"{path}: [joints.AB] contradicts the other joints: with O, P, C, Q closed, ")
+    assert ": gap 0.01 m" in told
     assert "contradicts AB" in command("check", path).stdout
     found = json.loads(command("check", path, "--json").stdout)
     assert [(row["name"], round(abs(row["gap"]), 12)) for row in found["inconsistent"]] == [("AB", 0.01)]

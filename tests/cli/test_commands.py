@@ -259,7 +259,7 @@ def test_the_program_tells_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: C
     done = program("solve", path.name, "-o", "run.csv", cwd=tmp_path)
     assert done.returncode == 1
     assert done.stdout == ""
-    assert re.fullmatch(r"kinfmu: mine\.toml: \[joints\.AB\] contradicts .* open by 0\.01 m.*\n", done.stderr)
+    assert re.fullmatch(r"kinfmu: mine\.toml: \[joints\.AB\] contradicts .*: gap 0\.01 m.*\n", done.stderr)
 
 
 def test_the_program_tells_wrong_usage_with_status_two(tmp_path: Path) -> None:

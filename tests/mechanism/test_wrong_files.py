@@ -118,7 +118,7 @@ CHANGES = {
     "lengths that contradict each other": (
         "[drivers]",
         'L = { type = "distance", between = ["ground.O", "crank.P"], length = 1.5 }\n[drivers]',
-        "[joints.L] contradicts the other joints: O leave its row 'length' open by 0.5 m",
+        "[joints.L] contradicts the other joints: with O closed, row 'length' does not close: gap 0.5 m in every pose",
     ),
     "lengths that do not close": ("Q = [3.5, 0]", "Q = [13.5, 0]", "does not close near its start pose"),
     "a length that is negative": (

@@ -1,4 +1,4 @@
-"""The native engine moves as the Python engine does, whatever the order of samples, past singular points too."""
+"""The native engine agrees with the Python engine, for any order of samples, past singular points too."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.mechanisms import uneven_chain
 
 SOLVE = import_module("kinfmu.sweep.solve")  # the package shows a function of that name
 ENGINES = ("native", "python")
-SAMPLES = 1100  # enough for samples to be solved side by side
+SAMPLES = 1100  # enough for samples to be solved in lanes
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -80,35 +80,34 @@ def test_change_points_are_crossed_at_full_accuracy_in_any_order() -> None:
         np.testing.assert_allclose(run["coupler.ax"], -np.cos(u), rtol=0, atol=1e-8)
 
 
-def test_most_samples_go_side_by_side() -> None:
+def test_most_samples_are_solved_in_lanes() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
-    told = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
-    assert told.side_by_side == SAMPLES // 64 * 64  # all that fill the lanes
-    assert (told.outcomes[:, 0] == 0).all()
+    result = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
+    assert result.side_by_side == SAMPLES // 64 * 64  # all that fill the lanes
+    assert (result.outcomes[:, 0] == 0).all()
 
 
-def test_alike_loops_of_other_lengths_move_each_in_its_own_way() -> None:
+def test_loops_of_one_kind_with_other_lengths_agree_with_python() -> None:
     u = np.linspace(1.0, 8.0, SAMPLES)
     native, python = (kinfmu.solve(uneven_chain(4), crank_angle=u, engine=engine) for engine in ("native", "python"))
     assert_same_motion(native, python)
 
 
-def test_windows_of_bridges_are_read_side_by_side() -> None:
+def test_windows_of_bridges_are_read_in_lanes() -> None:
     u = 0.3 + np.arange(64 * 60) * (np.pi / 180.0)
     plan = compile_plan(kinfmu.load("fourbar"), ("coupler.x", "rocker.phi"))
     values, rates, accelerations = (np.empty((len(u), 2)) for _ in range(3))
     speed, acceleration = np.sin(u), np.cos(3.0 * u)
     inputs = (u[:, None], speed[:, None], acceleration[:, None])
-    told = library.Library(plan).sweep(inputs, (values, rates, accelerations))
-    assert told.side_by_side > len(u) - 2 * 8  # in either window few may be left over
-    assert (
-        90 <= (told.outcomes[:, 0] == 2).sum() <= 150
-    )  # at 21 change points windows of 0.1 rad: five or six samples each
+    result = library.Library(plan).sweep(inputs, (values, rates, accelerations))
+    assert result.side_by_side > len(u) - 2 * 8  # in either window few may be left over
+    bridged = (result.outcomes[:, 0] == 2).sum()
+    assert 90 <= bridged <= 150  # at 21 change points windows of 0.1 rad: five or six samples each
     np.testing.assert_allclose(values, np.stack([1.0 + np.cos(u), u], axis=1), rtol=0, atol=1e-12)
     np.testing.assert_allclose(rates, np.stack([-np.sin(u) * speed, speed], axis=1), rtol=0, atol=1e-10)
     exact = np.stack([-np.cos(u) * speed**2 - np.sin(u) * acceleration, acceleration], axis=1)
     np.testing.assert_allclose(accelerations, exact, rtol=0, atol=1e-8)
-    assert told.residual.max() <= 1e-12
+    assert result.residual.max() <= 1e-12
 
 
 @pytest.mark.parametrize("offset", [0, 3, 7])
@@ -119,61 +118,61 @@ def test_large_tables_are_filled_wherever_they_begin(offset: int, order: Literal
     count, columns = 24_037, len(plan.outputs)  # more than goes through the caches, and no whole number of lanes
     assert count * columns * 3 * 8 > 4e6
     u = np.linspace(0.0, 70.0, count)
-    rooms = [np.full(count * columns + offset + 1, 7.0) for _ in range(3)]
-    large = [room[offset:-1].reshape((count, columns), order=order) for room in rooms]
-    told = compiled.sweep(driven(u), large)
-    assert all((room[:offset] == 7.0).all() and room[-1] == 7.0 for room in rooms)
-    assert (told.outcomes[:, 0] == 0).all()
+    arrays = [np.full(count * columns + offset + 1, 7.0) for _ in range(3)]
+    large = [array[offset:-1].reshape((count, columns), order=order) for array in arrays]
+    result = compiled.sweep(driven(u), large)
+    assert all((array[:offset] == 7.0).all() and array[-1] == 7.0 for array in arrays)
+    assert (result.outcomes[:, 0] == 0).all()
     for part in np.array_split(np.arange(count), 5):
         small = [np.empty((len(part), columns), order=order) for _ in range(3)]
         few = compiled.sweep(driven(u[part]), small)
-        np.testing.assert_array_equal(told.outcomes[part, 1] > 0, few.outcomes[:, 1] > 0)
+        np.testing.assert_array_equal(result.outcomes[part, 1] > 0, few.outcomes[:, 1] > 0)
         for one, other in zip(large, small, strict=True):
             np.testing.assert_allclose(one[part], other, rtol=0, atol=1e-11)
             assert np.abs(other).max() > 1.0
 
 
 @pytest.mark.parametrize("offset", range(4))
-def test_what_is_no_number_is_told_in_large_tables_too(offset: int) -> None:
+def test_nan_inputs_are_reported_in_large_tables_too(offset: int) -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     count, columns = 24_037, len(plan.outputs)
     u = np.linspace(0.0, 70.0, count)
     for k, nothing in enumerate((np.nan, np.inf, -np.inf)):
         u[60 + k :: 64] = nothing  # at the end of the lanes, where a line of the tables may still be to be written
-    room = np.full((3, count * columns + offset), 7.0)
-    large = [one[offset:].reshape((count, columns), order="F") for one in room]
-    told = library.Library(plan).sweep(driven(u), large)
-    np.testing.assert_array_equal(told.outcomes[:, 0], np.where(np.isfinite(u), 0, 3))
+    space = np.full((3, count * columns + offset), 7.0)
+    large = [one[offset:].reshape((count, columns), order="F") for one in space]
+    result = library.Library(plan).sweep(driven(u), large)
+    np.testing.assert_array_equal(result.outcomes[:, 0], np.where(np.isfinite(u), 0, 3))
     for table in large:
         np.testing.assert_array_equal(np.isfinite(table).all(axis=1), np.isfinite(u))
         np.testing.assert_array_equal(np.isnan(table).all(axis=1), ~np.isfinite(u))
-    np.testing.assert_array_equal(np.isfinite(told.residual), np.isfinite(u))
-    assert told.failures[0] == (60, "crank = nan rad (nan deg) is not a finite number")
+    np.testing.assert_array_equal(np.isfinite(result.residual), np.isfinite(u))
+    assert result.failures[0] == (60, "crank = nan rad (nan deg) is not a finite number")
 
 
-def test_what_an_earlier_sweep_told_may_be_written_over() -> None:
+def test_the_result_of_an_earlier_sweep_can_be_reused() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     compiled = library.Library(plan)
     first = compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs))
     expected = first.residual.copy()
     first.residual[:] = -1.0
-    again = compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs), room=first)
+    again = compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs), reuse=first)
     assert again.residual is first.residual
     np.testing.assert_array_equal(again.residual, expected)
-    with pytest.raises(KinfmuError, match=r"room for \(1100, 0\) samples and rows set aside, not for \(2, 0\)"):
-        compiled.sweep(driven(np.zeros(2)), [np.zeros((2, len(plan.outputs)))] * 3, room=first)
+    with pytest.raises(KinfmuError, match=r"the result to reuse has \(1100, 0\) samples and watches, not \(2, 0\)"):
+        compiled.sweep(driven(np.zeros(2)), [np.zeros((2, len(plan.outputs)))] * 3, reuse=first)
 
 
-def test_more_stretches_than_are_told_one_by_one_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_intervals_beyond_the_reported_ones_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library, "MOST_FAILURES", 2)
     plan = compile_plan(kinfmu.load("triple_rocker"))
     u = np.where(np.arange(SAMPLES) % 100 < 50, 1.0, 9.0)
     failures = library.Library(plan).sweep(driven(u), tables(plan.outputs)).failures
     assert [sample for sample, _ in failures] == [50, 150, 250]
-    assert failures[-1][1] == "9 more stretches without numbers begin here or later: 2 are told"
+    assert failures[-1][1] == "9 more intervals without numbers begin here or later; 2 are reported"
 
 
-def test_memory_that_runs_out_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_running_out_of_memory_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     compiled = library.Library(plan)
     for name, nothing in (("kf_sweep_run", False), ("kf_sweep_new", None)):
@@ -185,7 +184,7 @@ def test_memory_that_runs_out_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch)
                 compiled.sweep(driven(np.linspace(0.0, 7.0, SAMPLES)), tables(plan.outputs))
 
 
-def test_what_lies_past_a_limit_is_told_and_the_branch_comes_back() -> None:
+def test_samples_past_a_limit_are_reported_and_the_branch_comes_back() -> None:
     mechanism = kinfmu.load("triple_rocker")
     u = np.concatenate([np.linspace(0.9, 4.0, 700), np.linspace(4.0, 0.9, 700)])
     native, python = (kinfmu.solve(mechanism, left_angle=u, engine=engine) for engine in ("native", "python"))
@@ -195,7 +194,7 @@ def test_what_lies_past_a_limit_is_told_and_the_branch_comes_back() -> None:
 
 
 @pytest.mark.parametrize("turns", [1_000, 15_000])
-def test_thousands_of_turns_on_a_sample_is_as_good_as_at_first(turns: int) -> None:
+def test_after_thousands_of_turns_samples_are_as_good_as_at_first(turns: int) -> None:
     u = 2.0 * np.pi * turns + np.linspace(0.0, 7.0, 700)  # the last ones fill no lanes
     native, python = (kinfmu.solve(kinfmu.load("jansen_leg"), engine=engine, crank_angle=u) for engine in ENGINES)
     assert (native.status == 0).all()
@@ -206,14 +205,14 @@ def test_thousands_of_turns_on_a_sample_is_as_good_as_at_first(turns: int) -> No
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=(1e-12, 1e-11, 1e-10)[order] * np.abs(theirs).max())
 
 
-def test_no_good_sample_leaves_more_than_the_tolerance() -> None:
+def test_no_good_sample_has_a_residual_above_the_tolerance() -> None:
     u = np.linspace(9e4, 9e4 + 7.0, 700)
     run = kinfmu.solve(kinfmu.load("jansen_leg"), engine="native", crank_angle=u, tolerance=1e-12)
     assert run.good.all()
     assert run.residual[run.good].max() <= 1e-12
 
 
-def test_tables_may_lie_by_samples_or_by_outputs() -> None:
+def test_tables_may_be_laid_out_by_samples_or_by_outputs() -> None:
     u = np.linspace(0.5, 2.0, SAMPLES)
     mechanism = kinfmu.load("fourbar")
     runs = []
@@ -225,7 +224,7 @@ def test_tables_may_lie_by_samples_or_by_outputs() -> None:
     np.testing.assert_array_equal(runs[0].accelerations, runs[1].accelerations)
 
 
-def test_positions_alone_can_be_had() -> None:
+def test_positions_alone_can_be_solved() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     whole, alone = tables(plan.outputs), tables(plan.outputs)
     samples = driven(np.linspace(0.0, 7.0, SAMPLES))
@@ -248,23 +247,23 @@ def test_other_parameters_are_reached_by_continuation() -> None:
         )
 
 
-def test_laws_take_the_parameters() -> None:
+def test_laws_depend_on_parameters() -> None:
     t = np.linspace(0.0, 1.0, SAMPLES)
     runs = [kinfmu.solve(geared(), t, parameters={"pace": 2.0}, engine=engine) for engine in ("python", "native")]
     np.testing.assert_allclose(runs[1].values, runs[0].values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(runs[1].accelerations, runs[0].accelerations, rtol=0, atol=1e-9)
 
 
-def test_few_samples_are_left_to_python_and_many_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_takes_python_for_few_samples_and_native_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
     t = np.linspace(0.0, 90.0, 50)
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "python"
     monkeypatch.setattr(SOLVE, "WORTH_COMPILING", 50)
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "native"
 
 
-def test_without_a_compiler_auto_is_python_and_native_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_auto_is_python_and_native_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     def none() -> tuple[str, ...]:
-        raise CompilerError("no C compiler: neither cc, gcc nor clang is there")
+        raise CompilerError("no C compiler: cc, gcc and clang are not found")
 
     monkeypatch.setattr(compiler, "command", none)
     monkeypatch.setattr(SOLVE, "WORTH_COMPILING", 0)
