@@ -27,7 +27,7 @@ from kinfmu import (
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu.build import default_drive
 from kinfmu.laws import Law
-from tests.fmu.host import Host
+from tests.fmu.host import DISCARD, OK, Host
 
 SEQUENCE = MotionSequence((Segment("cycloidal", 1.0, 2.0), Segment("dwell", 0.5)), start=0.25, repeat=True)
 LAWS = {
@@ -75,11 +75,11 @@ def test_constants_of_laws_are_parameters_with_units_and_a_duration_stays_positi
     assert positive == ["arm0.duration_1", "arm0.duration_2"]
     host.set({"arm0.duration_1": 4.0, "arm0.rise_1": -1.0})
     host.initialize(0.0)
-    assert host.step(0.0, 2.0)
+    assert host.step(0.0, 2.0) == OK
     assert host.get("arm0.phi") == pytest.approx([0.25 - 0.5])
     host.set({"arm0.duration_1": 0.0})
     assert host.get("arm0.duration_1") == [4.0]
-    assert not host.step(2.0, 0.5)
+    assert host.step(2.0, 0.5) == DISCARD
     host.free()
 
 

@@ -20,8 +20,7 @@ from kinfmu.codegen.python import load_model
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver, Status
-from tests.fmu.host import Host as PythonHost
-from tests.fmu.native.host import Host as NativeHost
+from tests.fmu.host import OK, Host
 from tests.mechanisms import (
     ROBOT_LENGTHS,
     ROBOT_PIVOT,
@@ -70,14 +69,14 @@ def test_so_it_is_in_fmus(flavour: str, tmp_path: Path) -> None:
         fmi=int(fmi or 2),  # type: ignore[arg-type]
         drive="inputs",
     )
-    host = (PythonHost if name == "python" else NativeHost)(path, tmp_path / "unpacked")
+    host = Host(path, tmp_path / "unpacked")
     try:
         host.initialize(0.0)
         found = []
         for k, left in enumerate(THERE_AND_BACK):
             host.set({"left_angle": left, "right_angle": math.pi - left})
             found.append([host.status(), *host.get("T.x", "T.y")])
-            assert host.step(0.1 * k, 0.1) == (name == "python")  # True, or fmi2OK
+            assert host.step(0.1 * k, 0.1) == OK
     finally:
         host.free()
     assert [int(row[0]) for row in found] == [0, 0, 1, 1, 1, 0, 0]
@@ -232,21 +231,19 @@ def test_fmus_follow_a_crossing_with_blocks_of_several_drivers_and_go_back_to_a_
         fmi=int(fmi or 2),  # type: ignore[arg-type]
         drive="inputs",
     )
-    host = (PythonHost if name == "python" else NativeHost)(path, tmp_path / "unpacked")
+    host = Host(path, tmp_path / "unpacked")
     ways = [(1.0, 0.6), (3.1, 0.9), (3.16, 0.2), (5.0, 0.4), (2.0, 1.0)]
     try:
         host.initialize(0.0)
-        fmu = host.slave if name == "python" else host.fmu
-        take, give = (getattr(fmu, f"{verb}FM{'UState' if fmi == '3' else 'Ustate'}") for verb in ("get", "set"))
-        runs, taken = [], take()
+        runs, taken = [], host.state()
         for _ in range(2):
             found = []
             for k, (crank, arm) in enumerate(ways):
                 host.set({"crank_angle": crank, "arm_angle": arm})
                 found.append([host.status(), *host.get("rocker.phi", "link.phi")])
-                assert host.step(0.1 * k, 0.1) == (name == "python")  # True, or fmi2OK
+                assert host.step(0.1 * k, 0.1) == OK
             runs.append(found)
-            give(taken)
+            host.restore(taken)
     finally:
         host.free()
     assert runs[0] == runs[1]
@@ -267,21 +264,20 @@ def test_fmus_pass_crossings_of_each_driver_and_go_back_to_a_state(flavour: str,
         fmi=int(fmi or 2),  # type: ignore[arg-type]
         drive="inputs",
     )
-    host = (PythonHost if name == "python" else NativeHost)(path, tmp_path / "unpacked")
+    host = Host(path, tmp_path / "unpacked")
     ways = [(1.0, 1.0), (3.1, 3.16), (3.18, 2.0), (5.0, -1.0)]
     try:
         host.initialize(0.0)
-        fmu = host.slave if name == "python" else host.fmu
-        taken = fmu.getFMUstate() if name == "python" else fmu.getFMUState()
+        taken = host.state()
         runs = []
         for _ in range(2):
             found = []
             for k, (first, second) in enumerate(ways):
                 host.set({"crank_angle": first, "second_angle": second})
                 found.append([host.status(), *host.get("rocker.phi", "rocker2.phi")])
-                assert host.step(0.1 * k, 0.1) == (name == "python")  # True, or fmi3OK
+                assert host.step(0.1 * k, 0.1) == OK
             runs.append(found)
-            (fmu.setFMUstate if name == "python" else fmu.setFMUState)(taken)
+            host.restore(taken)
     finally:
         host.free()
     assert runs[0] == runs[1]

@@ -1,53 +1,20 @@
-"""Native FMUs of the gallery's mechanisms, built once, and instances of them."""
+"""Instances of native FMUs, of both versions of FMI."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from importlib import import_module
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-import kinfmu
-from kinfmu.codegen.c import compiler
 from kinfmu.mechanism import Mechanism
-from tests.fmu.native.host import Host
-
-Build = Callable[..., Path]
-Start = Callable[..., Host]
-
-
-@pytest.fixture(scope="package", autouse=True)
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compile libraries without optimization, into a cache of the tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        for module in (compiler, import_module("kinfmu.fmu.native.archive")):
-            quick = ["-O0" if flag.startswith("-O") else flag for flag in module.FLAGS]  # the same numbers
-            patch.setattr(module, "FLAGS", quick)
-        yield
+from tests.fmu.conftest import Build, Start
+from tests.fmu.host import Host
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
 def fmi(request: pytest.FixtureRequest) -> int:
     return int(request.param)
-
-
-@pytest.fixture(scope="session")
-def built_native(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """`built_native(mechanism, fmi, drive)`: path of a native FMU of a mechanism or a gallery name."""
-    folder = tmp_path_factory.mktemp("native")
-    paths: dict[tuple[str, int, str], Path] = {}
-
-    def get(model: str | Mechanism, fmi: int, drive: str = "inputs") -> Path:
-        mechanism = kinfmu.load(model) if isinstance(model, str) else model
-        key = (mechanism.name, fmi, drive)
-        if key not in paths:
-            path = folder / f"{mechanism.name}_{fmi}_{drive}.fmu"
-            paths[key] = kinfmu.build(mechanism, path, flavour="native", fmi=fmi, drive=drive)  # type: ignore[arg-type]
-        return paths[key]
-
-    return get
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ from kinfmu.fmu.native import archive
 from kinfmu.fmu.native.platforms import PLATFORMS, host
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan
-from tests.fmu.native.conftest import Build
-from tests.fmu.native.host import Host
+from tests.fmu.conftest import Build
+from tests.fmu.host import Host
 from tests.fmu.test_parameters import linkage
 
 STRICT = ("-O0", "-Wall", "-Wextra", "-Wconversion", "-Werror")

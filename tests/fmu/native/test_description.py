@@ -15,7 +15,7 @@ import kinfmu
 from kinfmu.fmu import description
 from kinfmu.fmu.interface import Interface, interface
 from kinfmu.plan import compile_plan
-from tests.fmu.native.conftest import Build
+from tests.fmu.conftest import Build
 from tests.fmu.test_parameters import linkage
 
 STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*\Z", re.ASCII)

@@ -11,8 +11,8 @@ from kinfmu import MotionSequence, Spline
 from kinfmu.laws import Cycloidal, Harmonic, Law, SimpleHarmonic
 from kinfmu.mechanism import Mechanism
 from kinfmu.solver.python.status import Status
-from tests.fmu.native.conftest import Start
-from tests.fmu.native.host import OK, Host, answer
+from tests.fmu.conftest import Start
+from tests.fmu.host import OK, Host, answer
 from tests.fmu.test_laws import arms
 
 SWINGS = (("simple_harmonic", 1.0, 0.5), ("dwell", 0.5), ("simple_harmonic", 1.5, -0.5), ("cycloidal", 1.0, 0.2))

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from tests.fmu.native.conftest import Start
-from tests.fmu.native.host import DISCARD, ERROR, OK, WARNING, Host, answer
-from tests.fmu.test_hostile_calls import HUGE, NO_STEPS, damaged
+from tests.fmu.conftest import Start
+from tests.fmu.host import DISCARD, ERROR, OK, WARNING, Host, answer
+from tests.fmu.test_python_slave import damaged
 
 
 def component(host: Host) -> ctypes.c_void_p:
@@ -22,52 +22,6 @@ def call(host: Host, name: str, *arguments: Any) -> int:
     """Status of a call of the library itself, past fmpy."""
     function = ctypes.CDLL(host.fmu.dll._name)[f"fmi{host.fmi}{name}"]
     return int(function(component(host), *arguments))
-
-
-@pytest.mark.parametrize("drive", ["inputs", "time"])
-def test_a_step_that_is_none_is_an_error_and_changes_nothing(start: Start, drive: str) -> None:
-    host, other = start("fourbar", drive), start("fourbar", drive)
-    for one in (host, other):
-        one.set({"crank_angle": 0.3} if drive == "inputs" else {})
-        assert one.step(0.0, 0.1) == OK
-    for t, h in NO_STEPS:
-        assert host.step(t, h) == ERROR, (t, h)
-        assert "doStep from t = " in host.messages[-1][1]
-        assert host.outputs() == other.outputs()
-    assert host.step(0.1, 0.1) == OK
-
-
-def test_runs_may_start_before_time_0(start: Start) -> None:
-    host = start("fourbar", "time", initialize=False)
-    host.initialize(-2.0)
-    assert host.step(-2.0, 0.5) == OK
-    assert host.step(-2.1, 0.5) == ERROR
-    assert host.messages[-1][1].startswith("doStep from t = -2.1")
-    assert "before the start at -2 s" in host.messages[-1][1]
-
-
-@pytest.mark.parametrize("name", ["crank_angle", "crank_speed", "crank_acceleration", "crank.speed"])
-def test_numbers_whose_squares_are_infinite_are_refused(start: Start, name: str) -> None:
-    host = start("fourbar", "time" if name == "crank.speed" else "inputs")
-    (before,) = host.get(name)
-    for value in HUGE:
-        assert answer(host.set, {name: value}) == ERROR
-        assert host.messages[-1] == (
-            ERROR,
-            f"{name} = {value:g} is too large: at most 1e+100 is taken; {before:.17g} stays",
-        )
-    assert host.get(name) == [before]
-    assert host.step(0.0, 0.1) == OK
-
-
-@pytest.mark.parametrize("h", [5e-324, 1e-300, 1e-150])
-def test_rates_estimated_over_no_time_are_no_infinities(start: Start, h: float) -> None:
-    host = start()
-    for k in range(6):
-        host.set({"crank_angle": 0.1 * k})
-        assert all(math.isfinite(value) for value in host.outputs()), k
-        assert host.step(k * h, h) == OK
-        assert all(math.isfinite(value) for value in host.outputs()), k
 
 
 @pytest.mark.parametrize(("value", "h"), [(1e90, 1e30), (1e60, 1e50), (1.0, 1e101)])

@@ -1,7 +1,7 @@
-"""Native FMUs in hosts that others wrote, each in a process of its own, equal to the Python engine.
+"""FMUs in hosts of other authors, each in a process of its own, compared with the Python engine.
 
-They run where these packages are installed beside the tests, as scripts/hosts does: libcosimpy (OSP, FMI 2.0), ecospy
-with its own `ecos` command (both versions). KINFMU_HOSTS may name another Python that has them.
+A test is skipped if its host is not installed (scripts/hosts installs them): libcosimpy (OSP, FMI 2.0), ecospy with its
+`ecos` command (both versions). KINFMU_HOSTS may name another Python that has them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import pytest
 
 import kinfmu
 from kinfmu.fmu import description
-from tests.fmu.native.conftest import Build
+from tests.fmu.conftest import Build
 
 PYTHON = os.environ.get("KINFMU_HOSTS", sys.executable)
 STEP, COUNT = 0.05, 40
@@ -128,6 +128,21 @@ def test_ecospy_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
     np.testing.assert_allclose(rows, _wanted("crank_rocker", times), rtol=0, atol=1e-9)
 
 
+def _table_of_ecos(fmu: Path, stop: float, step: float, folder: Path) -> tuple[list[str], list[list[str]]]:
+    """Return the header and the rows of the CSV file that the ecos command writes."""
+    ecos = _ecos()
+    assert ecos is not None
+    ecos.chmod(0o755)
+    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", str(stop), "--stepSize", str(step)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=120)
+    if "error while loading shared libraries" in done.stderr:
+        pytest.skip("the ecos command lacks libtbb12")
+    assert done.returncode == 0, done.stdout + done.stderr
+    with next(iter(folder.rglob("*.csv"))).open() as file:
+        header, *lines = list(csv.reader(file))
+    return header, [line for line in lines if len(line) > 1]
+
+
 def _ecos() -> Path | None:
     """The native command inside the wheel of ecospy."""
     code = "import importlib.util as u; print(u.find_spec('ecospy').submodule_search_locations[0])"
@@ -138,22 +153,12 @@ def _ecos() -> Path | None:
 
 @pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
 def test_the_ecos_command_steps_it(built_native: Build, fmi: int, tmp_path: Path) -> None:
-    ecos = _ecos()
-    assert ecos is not None
-    ecos.chmod(0o755)
-    fmu = built_native("crank_rocker", fmi, "time")
-    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", str(STEP * COUNT), "--stepSize", str(STEP)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
-    if "error while loading shared libraries" in done.stderr:
-        pytest.skip("the ecos command lacks libtbb12")
-    assert done.returncode == 0, done.stdout + done.stderr
-    with next(iter(tmp_path.rglob("*.csv"))).open() as file:
-        header, *lines = list(csv.reader(file))
+    header, lines = _table_of_ecos(built_native("crank_rocker", fmi, "time"), STEP * COUNT, STEP, tmp_path)
     columns = [next(k for k, cell in enumerate(header) if f"::{name}[" in cell.replace(" ", "")) for name in NAMES]
-    rows = np.array([[float(line[k]) for k in (header.index(header[1]), *columns)] for line in lines if len(line) > 1])
+    rows = np.array([[float(line[k]) for k in (1, *columns)] for line in lines])
     np.testing.assert_allclose(
         rows[:, 1:], _wanted("crank_rocker", rows[:, 0]), rtol=0, atol=2e-5
-    )  # it prints 6 digits
+    )  # the command writes 6 digits
 
 
 # Driven by inputs, in steps that the host chooses, up to a limit and past it
@@ -218,7 +223,7 @@ def test_rates_of_a_driven_crank_are_estimated_in_hosts_that_wire_the_angle_alon
 
 
 @pytest.mark.parametrize(("host", "flavour"), HOSTS)
-def test_what_a_host_does_at_a_limit_is_what_the_page_says(
+def test_hosts_react_to_a_limit_as_documented(
     fmus: Callable[[str, str], Path], host: str, flavour: str, tmp_path: Path
 ) -> None:
     values = [5.3 + 0.1 * k for k in range(14)]  # the limit is 2 pi, before value number 10
@@ -237,16 +242,7 @@ def test_what_a_host_does_at_a_limit_is_what_the_page_says(
 
 @pytest.mark.skipif(_ecos() is None, reason="ecospy is not installed: no ecos command")
 def test_the_ecos_command_writes_ok_as_a_column_that_turns_0_at_the_limit(built_native: Build, tmp_path: Path) -> None:
-    ecos = _ecos()
-    assert ecos is not None
-    fmu = built_native("double_pendulum", 2, "time")
-    command = [str(ecos), "simulate", "--path", str(fmu), "--stopTime", "3", "--stepSize", "0.1"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
-    if "error while loading shared libraries" in done.stderr:
-        pytest.skip("the ecos command lacks libtbb12")
-    assert done.returncode == 0, done.stdout + done.stderr
-    with next(iter(tmp_path.rglob("*.csv"))).open() as file:
-        header, *lines = list(csv.reader(file))
+    header, lines = _table_of_ecos(built_native("double_pendulum", 2, "time"), 3.0, 0.1, tmp_path)
     (ok,) = (k for k, cell in enumerate(header) if "::solver.ok[BOOL]" in cell)
-    rows = [(float(line[1]), int(line[ok])) for line in lines if len(line) > 1]
+    rows = [(float(line[1]), int(line[ok])) for line in lines]
     assert {t for t, good in rows if not good} == {t for t, _ in rows if t > 2.0 + 1e-9}  # 360 degrees are there at 2 s

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from kinfmu.fmu.estimated_rates import Rates
-from tests.fmu.native.conftest import Build
-from tests.fmu.native.host import DISCARD, OK, Host
+from tests.fmu.conftest import Build
+from tests.fmu.host import DISCARD, OK, Host
 
 H = 0.01  # [s]
 QUANTITIES = ("length", "speed", "acceleration")

@@ -16,7 +16,7 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.plan import compile_plan
-from tests.fmu.native.conftest import Build
+from tests.fmu.conftest import Build
 
 CC, NM = shutil.which("gcc") or shutil.which("clang"), shutil.which("nm")
 LINKED = {"first": ("fourbar", "2.0"), "second": ("double_pendulum", "2.0"), "third": ("fourbar", "3.0")}

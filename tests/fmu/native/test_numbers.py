@@ -13,7 +13,7 @@ import kinfmu
 from kinfmu import gallery
 from kinfmu.errors import FmuError
 from kinfmu.solver.python.status import Status
-from tests.fmu.native.conftest import Build
+from tests.fmu.conftest import Build
 from tests.fmu.test_parameters import OTHERS, linkage
 
 NAMES = gallery.names()

@@ -15,14 +15,12 @@ from kinfmu.errors import RequestError
 from kinfmu.fmu import simulate
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from tests.fmu.host import Host as PythonHost
-from tests.fmu.native.conftest import Build
-from tests.fmu.native.host import OK
-from tests.fmu.native.host import Host as NativeHost
+from tests.fmu.conftest import Build
+from tests.fmu.host import OK, Host
 
 INPUTS = ("crank_angle", "crank_speed", "crank_acceleration")
 FLAVOURS = ("python", "native 2", "native 3")
-Start = Callable[..., Any]
+Start = Callable[..., Host]
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +42,10 @@ def paths(built_native: Build, tmp_path_factory: pytest.TempPathFactory) -> Call
 @pytest.fixture(params=FLAVOURS)
 def start(request: pytest.FixtureRequest, paths: Callable[[str, str], Path], tmp_path: Path) -> Iterator[Start]:
     """`start(name, rates, before)`: a slave; before: inputs that are set before `rates` is."""
-    hosts: list[Any] = []
+    hosts: list[Host] = []
 
     def get(name: str = "fourbar", rates: Rates | None = None, before: dict[str, float] | None = None) -> Any:
-        kind = PythonHost if request.param == "python" else NativeHost
-        hosts.append(kind(paths(request.param, name), tmp_path / f"slave_{len(hosts)}"))
+        hosts.append(Host(paths(request.param, name), tmp_path / f"slave_{len(hosts)}"))
         host = hosts[-1]
         host.set(before or {})
         if rates is not None:
@@ -61,23 +58,18 @@ def start(request: pytest.FixtureRequest, paths: Callable[[str, str], Path], tmp
         host.free()
 
 
-def slave_of(host: Any) -> Any:
-    return host.slave if isinstance(host, PythonHost) else host.fmu
-
-
 def steps(host: Any, t: float, h: float) -> bool:
-    done = host.step(t, h)
-    return done if isinstance(done, bool) else done == OK
+    return host.step(t, h) == OK
 
 
 def mode(host: Any) -> int:
-    is_old = isinstance(host, PythonHost) or host.fmi == 2
-    read = slave_of(host).getInteger if is_old else slave_of(host).getInt64
+    is_old = host.is_python or host.fmi == 2
+    read = host.fmu.getInteger if is_old else host.fmu.getInt64
     return int(read([host.references["rates"]])[0])
 
 
 def ok(host: Any) -> bool:
-    return bool(slave_of(host).getBoolean([host.references["solver.ok"]])[0])
+    return bool(host.fmu.getBoolean([host.references["solver.ok"]])[0])
 
 
 def motion(order: int, t: float) -> float:
@@ -121,12 +113,7 @@ def test_default_is_auto_whatever_is_set_first(start: Start) -> None:
 
 def test_the_choice_is_part_of_the_state(start: Start) -> None:
     host, other = start(rates=Rates.WIRED), start()
-    native = isinstance(host, NativeHost)
-    if native:
-        other.restore(other.deserialize(host.serialize(host.state())))
-    else:
-        state = host.slave.getFMUstate()
-        other.slave.setFMUstate(other.slave.deSerializeFMUstate(host.slave.serializeFMUstate(state)))
+    other.restore(other.deserialize(host.serialize(host.state())))
     assert mode(other) == Rates.WIRED
     for k in range(3):
         other.set({"crank_angle": 0.5 * k})
@@ -140,7 +127,7 @@ def test_values_that_are_no_choice_are_refused(start: Start, value: int) -> None
     try:
         host.set({"rates": value})
     except FMICallException:
-        assert isinstance(host, NativeHost)
+        assert not host.is_python
     assert f"rates = {value} must be 0 (auto), 1 (estimated) or 2 (wired); 1 stays" in host.messages[-1][1]
     assert mode(host) == Rates.ESTIMATED
 
@@ -150,7 +137,7 @@ def test_the_choice_is_fixed_once_initialized(start: Start) -> None:
     try:
         host.set({"rates": Rates.WIRED})
     except FMICallException:
-        assert isinstance(host, NativeHost)
+        assert not host.is_python
     assert "rates = 2 comes too late: it is fixed once the FMU is initialized" in host.messages[-1][1]
     assert mode(host) == Rates.AUTO
 
@@ -159,7 +146,7 @@ def test_model_exchange_takes_the_inputs_whatever_the_parameter_says(
     paths: Callable[[str, str], Path], tmp_path: Path
 ) -> None:
     for fmi in (2, 3):
-        host = NativeHost(paths(f"native {fmi}", "fourbar"), tmp_path / str(fmi), model_exchange=True)
+        host = Host(paths(f"native {fmi}", "fourbar"), tmp_path / str(fmi), model_exchange=True)
         host.set({"rates": Rates.ESTIMATED, "crank_speed": 3.0})
         host.initialize(0.0)
         assert host.get("crank.omega") == [3.0]

@@ -1,4 +1,4 @@
-"""Python FMUs: calls that no host should make get one message and Discard; none is Fatal, and nothing changes."""
+"""Python FMUs: what only they have; invalid calls get a message and Discard, are never Fatal and change nothing."""
 
 from __future__ import annotations
 
@@ -11,96 +11,20 @@ from typing import Any
 
 import pytest
 
-from tests.fmu.host import Host
+from kinfmu.solver.python import Solver
+from tests.fmu.host import DISCARD, OK, Host
 
 Start = Callable[..., Host]
-
-NO_STEPS = [
-    (math.nan, 0.1), (math.inf, 0.1), (-math.inf, 0.1), (0.2, math.nan), (0.2, math.inf), (0.2, -0.1), (0.2, -5e-324),
-    (1.7e308, 1.7e308), (-0.3, 0.1), (-1e300, 0.1),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("drive", ["inputs", "time"])
-@pytest.mark.parametrize(("t", "h"), NO_STEPS)
-def test_a_step_that_is_none_is_discard_and_changes_nothing(start: Start, drive: str, t: float, h: float) -> None:
-    host, other = start("fourbar", drive), start("fourbar", drive)
-    assert not host.step(t, h)
-    for one in (host, other):
-        one.set({"crank_angle": 0.3} if drive == "inputs" else {})
-        assert one.step(0.0, 0.1)
-        assert one.step(0.1, 0.0)
-    assert any("doStep from t = " in text for _, text in host.messages)
-    assert not host.step(t, h)
-    assert host.outputs() == other.outputs()
-    assert all(math.isfinite(value) for value in host.get("rocker.phi", "rocker.omega", "rocker.alpha"))
-    assert host.step(0.1, 0.1)
-
-
-@pytest.mark.parametrize("drive", ["inputs", "time"])
-def test_steps_before_initialization_and_after_terminate_are_discard(start: Start, drive: str) -> None:
-    host = start("fourbar", drive, initialize=False)
-    assert not host.step(0.0, 0.1)
-    host.initialize(0.0)
-    assert host.step(0.0, 0.1)
-    host.slave.terminate()
-    assert not host.step(0.1, 0.1)
-    assert "doStep before the end of initialization, or after terminate" in host.messages[-1][1]
-    host.slave.reset()
-    assert not host.step(0.1, 0.1)
-    host.initialize(0.0)
-    assert host.step(0.0, 0.1)
 
 
 @pytest.mark.parametrize("t", [math.nan, math.inf])
 def test_a_start_time_that_is_no_number_is_refused(start: Start, t: float) -> None:
     host = start("fourbar", "time", initialize=False)
     host.initialize(t)
-    assert not host.step(0.0, 0.1)
+    assert host.step(0.0, 0.1) == DISCARD
     assert any("start time = " in text for _, text in host.messages)
-    assert host.step(0.0, 0.1)
+    assert host.step(0.0, 0.1) == OK
     assert math.isfinite(host.get("rocker.omega")[0])
-
-
-def test_runs_may_start_before_time_0(start: Start) -> None:
-    host = start("fourbar", "time", initialize=False)
-    host.initialize(-2.0)
-    assert host.step(-2.0, 0.5)
-    assert host.step(-1.5, 0.5)
-
-
-HUGE = [1e101, -1e155, 1e300, -1.7e308]
-
-
-@pytest.mark.parametrize("name", ["crank_angle", "crank_speed", "crank_acceleration", "crank.speed"])
-def test_numbers_whose_squares_are_infinite_are_refused(start: Start, name: str) -> None:
-    host = start("fourbar", "time" if name == "crank.speed" else "inputs")
-    (before,) = host.get(name)
-    for value in HUGE:
-        host.set({name: value})
-        assert host.get(name) == [before]
-        assert f"{name} = {value!r} is too large: at most 1e+100 is taken; {before!r} stays" in host.messages[-1][1]
-        assert not host.step(0.0, 0.1)
-    assert host.step(0.0, 0.1)
-
-
-@pytest.mark.parametrize("h", [5e-324, 1e-300, 1e-150])
-def test_rates_estimated_over_no_time_are_no_infinities(start: Start, h: float) -> None:
-    host = start()
-    for k in range(6):
-        host.set({"crank_angle": 0.1 * k})
-        assert all(math.isfinite(value) for value in host.outputs()), k
-        assert host.step(k * h, h)
-        assert all(math.isfinite(value) for value in host.outputs()), k
-
-
-def test_laws_whose_rates_are_beyond_all_bounds_have_no_pose(start: Start) -> None:
-    host = start("crank_rocker", "time")
-    host.set({"crank.speed": 1e100})
-    assert all(math.isfinite(value) for value in host.outputs())
-    assert not host.step(0.0, 0.1)
-    host.set({"crank.speed": 1.0})
-    assert host.step(0.0, 0.1)
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:
@@ -123,19 +47,19 @@ def test_damaged_states_are_refused_and_the_slave_goes_on(start: Start) -> None:
     host = start()
     for k in range(5):
         host.set({"crank_angle": 0.1 * k, "crank_speed": 1.0})
-        assert host.step(0.1 * k, 0.1)
+        assert host.step(0.1 * k, 0.1) == OK
     before = host.outputs()
-    data = host.slave.serializeFMUstate(host.slave.getFMUstate())
+    data = host.serialize(host.state())
     for k in range(60):
-        state = host.slave.deSerializeFMUstate(damaged(data, rng))
-        host.slave.setFMUstate(state)
-        host.slave.freeFMUstate(state)
+        state = host.deserialize(damaged(data, rng))
+        host.restore(state)
+        host.free_state(state)
         assert host.outputs() == before, k
         assert "state is damaged, or not one of this FMU" in host.messages[-1][1]
-    assert not host.step(0.5, 0.1)
-    assert host.step(0.5, 0.1)
-    whole = host.slave.deSerializeFMUstate(data)
-    host.slave.setFMUstate(whole)
+    assert host.step(0.5, 0.1) == DISCARD
+    assert host.step(0.5, 0.1) == OK
+    whole = host.deserialize(data)
+    host.restore(whole)
     assert host.outputs() == before
 
 
@@ -148,7 +72,7 @@ def _call(host: Host, rng: random.Random, states: list[Any]) -> None:
 
     count = len(host.references)
     references = [rng.choice([0, count + 1, 2**31 - 1, 1 + rng.randrange(count)]) for _ in range(rng.randrange(5))]
-    slave = host.slave
+    slave = host.fmu
     kind = rng.randrange(12)
     if kind < 3:
         slave.setReal([1, 2, 3], [number(), number(), number()])
@@ -195,12 +119,12 @@ def test_states_that_no_slave_has_written_are_refused(start: Start, content: Any
     slave_class = _slave_class(host)
     before = host.outputs()
     if content in FORGED:
-        content = json.loads(host.slave.serializeFMUstate(host.slave.getFMUstate())[32:]) | content
-    host.slave.setFMUstate(host.slave.deSerializeFMUstate(slave_class._fmu_state_to_bytes(content)))
+        content = json.loads(host.serialize(host.state())[32:]) | content
+    host.restore(host.deserialize(slave_class._fmu_state_to_bytes(content)))
     assert host.outputs() == before
     assert "state is damaged" in host.messages[-1][1]
-    assert not host.step(0.0, 0.1)
-    assert host.step(0.0, 0.1)
+    assert host.step(0.0, 0.1) == DISCARD
+    assert host.step(0.0, 0.1) == OK
 
 
 def _slave_class(host: Host) -> Any:
@@ -224,3 +148,99 @@ def test_a_host_of_kinfmu_shows_messages_as_they_were_meant(start: Start) -> Non
     fmi2_callbacks(lambda *message: heard.append(message)).logger(None, b"x", 1, b"", b"100%% of ##r1##")
     host.set({"crank_angle": math.nan})
     assert heard == [(1, "100% of #r1#")]
+
+
+def _counting(run: Callable[..., object], name: str, calls: dict[str, int]) -> Callable[..., object]:
+    def counting(*args: object) -> object:
+        calls[name] = calls.get(name, 0) + 1
+        return run(*args)
+
+    return counting
+
+
+def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
+    """How often the slave's solver is called from here on; its modules are those inside the FMU."""
+    (solver,) = {
+        module.Solver
+        for name, module in sys.modules.items()
+        if name.startswith(f"kinfmu_{host.about.interface.name}_{host.about.token[1:9]}") and name.endswith(".solver")
+    }
+    assert solver is not Solver
+    calls: dict[str, int] = {}
+    for method in ("solve", "outputs", "rates", "accelerations", "errors", "margin"):
+        monkeypatch.setattr(solver, method, _counting(getattr(solver, method), method, calls))
+    return calls
+
+
+def test_unchanged_input_costs_no_solve_and_later_stages_wait_until_read(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host = start()
+    host.set({"crank_angle": 0.5})
+    calls = _counted(monkeypatch, host)
+    assert host.get("coupler.x") == pytest.approx([1 + math.cos(0.5)])
+    assert calls == {"solve": 1, "outputs": 1}
+    host.get("coupler.x", "rocker.phi")
+    host.set({"crank_angle": 0.5})
+    host.get("coupler.x")
+    assert calls == {"solve": 1, "outputs": 1}
+    host.get("coupler.vx")
+    assert calls == {"solve": 1, "outputs": 1, "rates": 1}
+    assert host.step(0.0, 0.1) == OK
+    host.get("coupler.x", "coupler.vx", "coupler.ax")
+    assert calls == {"solve": 1, "outputs": 1, "rates": 1, "accelerations": 1}
+
+
+def test_restored_state_brings_back_parameters_refusals_and_time(start: Start) -> None:
+    host = start("fourbar", "time")
+    host.set({"crank.speed": 0.3})
+    assert host.step(0.0, 2.0) == OK
+    host.set({"crank_angle": math.nan})
+    state = host.state()
+    assert host.step(2.0, 1.0) == DISCARD
+    host.set({"crank.speed": 0.1})
+    assert host.step(2.0, 1.0) == OK
+    host.restore(state)
+    assert host.get("crank.phi", "crank.speed") == pytest.approx([0.6, 0.3])
+    assert host.step(2.0, 1.0) == DISCARD
+    host.free_state(state)
+
+
+def test_state_of_another_fmu_is_refused(start: Start) -> None:
+    host, other = start("fourbar"), start("double_pendulum")
+    data = other.serialize(other.state())
+    before = host.outputs()
+    host.restore(host.deserialize(data))
+    host.restore(host.deserialize(b"no state"))
+    assert host.outputs() == before  # the binary passes messages on in the next call
+    assert [text.partition(" ")[0] for _, text in host.messages] == ["state", "state"]
+    assert host.step(0.0, 0.1) == DISCARD
+
+
+def test_value_reference_that_does_not_exist_is_an_error_message_not_the_end(start: Start) -> None:
+    host = start()
+    (value,) = host.fmu.getReal([9999])
+    assert math.isnan(value)
+    assert host.messages[-1] == (3, "value reference 9999 is not a Real variable of this FMU")
+    assert host.step(0.0, 0.1) == OK
+
+
+def test_many_slaves_one_after_another_live_in_one_process(start: Start) -> None:
+    for k in range(8):
+        host = start()
+        host.set({"crank_angle": 0.1 * k})
+        assert host.get("crank.phi") == [0.1 * k]
+
+
+def test_fixed_parameters_and_outputs_are_refused_after_initialization_too(start: Start) -> None:
+    host = start("fourbar", "inputs")
+    before = host.outputs()
+    for values in ({"coupler.x": 7.0}, {"solver.residual": 1.0}, {"driven_by_time": True}, {"crank.x": 3.0}):
+        host.set(values)
+        (name,) = values
+        assert host.outputs() == before  # the binary passes messages on in the next call
+        assert host.messages[-1][0] == 3
+        assert host.messages[-1][1].startswith(name)
+        assert host.step(0.0, 0.1) == DISCARD
+        assert host.messages[-1][1].startswith(f"at t = 0 s: {name}")
+    assert host.step(0.0, 0.1) == OK
