@@ -75,7 +75,7 @@ class Number(NamedTuple):
         return self.error / most if most else 0.0 if self.error == 0.0 else math.inf
 
 
-class Told(NamedTuple):
+class Statistics(NamedTuple):
     """What a set of numbers says."""
 
     count: int
@@ -84,10 +84,10 @@ class Told(NamedTuple):
     worst: float  # largest error over max(estimate, eps * scale)
 
 
-def told(numbers: Sequence[Number]) -> Told:
+def statistics(numbers: Sequence[Number]) -> Statistics:
     """Coverage and median overestimation."""
     worst = max(number.underestimation for number in numbers)
-    return Told(
+    return Statistics(
         len(numbers),
         sum(number.is_covered for number in numbers) / len(numbers),
         float(np.median([number.overestimation for number in numbers])),
@@ -584,7 +584,7 @@ def main(seed: int, count: int, names: Sequence[str]) -> None:
 
 
 def _line(name: str, order: str, numbers: list[Number]) -> None:
-    result = told(numbers)
+    result = statistics(numbers)
     ninety = float(np.quantile([number.overestimation for number in numbers], 0.9))
     print(
         f"{name:<20}{order:<5}{result.count:>9}{result.coverage:>9.2%}{result.overestimation:>13.3g}"

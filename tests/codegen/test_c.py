@@ -163,7 +163,7 @@ def test_a_parameter_that_only_a_condition_looks_at_is_bound_or_refused() -> Non
     c = Compiled(compile_plan(gears))
     assert c.bind([3.0]) == ""
     assert c.bind([0.0]) == "[joints.mesh] ratio = 0 must be other than 0"
-    assert c.bind([math.inf]) == "what follows from them is no finite number"
+    assert c.bind([math.inf]) == "they lead to numbers that are not finite"
 
 
 def test_the_same_plan_gives_the_same_bytes_whatever_the_hash_seed() -> None:

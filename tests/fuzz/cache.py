@@ -67,14 +67,14 @@ def _trial(seed: int, folder: Path, summary: Summary) -> None:
     summary.count(("with a process killed: " if killed else "") + kind)
     for k, process in enumerate(processes):
         try:
-            out, told = process.communicate(timeout=PATIENCE)
+            out, errors = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
             summary.find(seed, kind, f"loading does not end in {PATIENCE:g} s")
             continue
-        if (k > 0 or not killed) and (process.returncode, out, told) != (0, "7\n", ""):
-            last = (told.splitlines() or [out])[-1]
+        if (k > 0 or not killed) and (process.returncode, out, errors) != (0, "7\n", ""):
+            last = (errors.splitlines() or [out])[-1]
             summary.find(seed, kind, f"loading ended with status {process.returncode}: {last}"[:300])
     if folder.stat().st_mode & 0o777 != 0o700:
         summary.find(seed, kind, f"the folder has mode {folder.stat().st_mode & 0o777:o}")

@@ -285,7 +285,7 @@ def _written(run: Run, path: Path, texts: dict[str, str], *, is_checked: bool = 
 
 
 def _bombs(drawn: random.Random, find: Find) -> None:
-    """Chunks and archives that unpack to gigabytes, and chunks that say so."""
+    """Chunks and archives that unpack to gigabytes, and chunks that claim to."""
     kind = drawn.randrange(4)
     if kind == 0:
         path = Path("bomb.fmu")

@@ -5,7 +5,7 @@
  * It is linked with the FMU's sources and compiled under sanitizers. It checks itself what a host relies on: an answer is
  * never Fatal; what was read with OK is finite; changed states, NULL arrays, wrong counts and steps that are none are
  * refused; messages are one line and no formats; a reset instance is as a fresh one; a call takes no longer than SLOWEST;
- * the same calls give the same answers beside another thread. Exit status 1 and one line on standard error if not.
+ * the same calls give the same answers next to another thread. Exit status 1 and one line on standard error if not.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
@@ -36,7 +36,7 @@ typedef fmi3FMUState state;
 
 #define INSTANCES 3
 #define STATES 2
-#define SLOWEST 20.0 /* [s], under sanitizers and beside other programs */
+#define SLOWEST 20.0 /* [s], under sanitizers and next to other programs */
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 
 typedef struct {
@@ -115,7 +115,7 @@ static unsigned reference(host *h)
 
 /* Arguments: arrays of exactly as many elements as are announced, or NULL */
 
-static void *room(size_t count, size_t size)
+static void *array_of(size_t count, size_t size)
 {
     void *const made = calloc(count ? count : 1, size);
     if (made == NULL) {
@@ -131,7 +131,7 @@ static size_t a_count(host *h)
 
 static unsigned *references(host *h, size_t n)
 {
-    unsigned *const made = room(n, sizeof *made);
+    unsigned *const made = array_of(n, sizeof *made);
     size_t k;
     const unsigned first = 1u + below(h, KF_REALS);
     const bool in_order = one_in(h, 2); /* what most hosts ask for: neighbours that are there */
@@ -143,7 +143,7 @@ static unsigned *references(host *h, size_t n)
 
 static double *numbers(host *h, size_t n)
 {
-    double *const made = room(n, sizeof *made);
+    double *const made = array_of(n, sizeof *made);
     size_t k;
     for (k = 0; k < n; ++k) {
         made[k] = number(h);
@@ -381,7 +381,7 @@ static void get_real(host *h, slot *s)
     const size_t n = a_count(h);
     bool wrong = false;
     unsigned *const r = references(h, n);
-    double *const v = room(n, sizeof *v);
+    double *const v = array_of(n, sizeof *v);
     unsigned *const given = or_null(h, r, &wrong);
     double *const into = or_null(h, v, &wrong);
     size_t k;
@@ -437,7 +437,7 @@ static void drive(host *h, slot *s)
 
 static void read_all(host *h, slot *s)
 {
-    double *const values = room(KF_REALS, sizeof *values);
+    double *const values = array_of(KF_REALS, sizeof *values);
     unsigned k;
     if (answered(h, get_all(s->c, values)) == OK) {
         for (k = 0; k < KF_REALS; ++k) {
@@ -472,7 +472,7 @@ static void do_step(host *h, slot *s)
 #if FMI == 2
 #define TYPED(word, most)                                                                                              \
     do {                                                                                                               \
-        fmi2##word *const v = room(n, sizeof *v);                                                                      \
+        fmi2##word *const v = array_of(n, sizeof *v);                                                                  \
         size_t k;                                                                                                      \
         for (k = 0; (most) && k < n; ++k) {                                                                            \
             v[k] = (fmi2##word)(intptr_t)below(h, (most) + 1u);                                                        \
@@ -484,7 +484,7 @@ static void do_step(host *h, slot *s)
 #else
 #define TYPED(word, most)                                                                                              \
     do {                                                                                                               \
-        fmi3##word *const v = room(n, sizeof *v);                                                                      \
+        fmi3##word *const v = array_of(n, sizeof *v);                                                                  \
         size_t k;                                                                                                      \
         for (k = 0; (most) && k < n; ++k) {                                                                            \
             v[k] = (fmi3##word)(intptr_t)below(h, (most) + 1u);                                                        \
@@ -560,7 +560,7 @@ static void directional(host *h, slot *s)
     bool wrong_u = false, wrong_k = false, miscounted = false;
     (void)miscounted;
     unsigned *const unknowns = references(h, n), *const knowns = references(h, m);
-    double *const seed = numbers(h, m), *const slope = room(n, sizeof *slope);
+    double *const seed = numbers(h, m), *const slope = array_of(n, sizeof *slope);
     unsigned *const given_u = or_null(h, unknowns, &wrong_u), *const given_k = or_null(h, knowns, &wrong_k);
     size_t k;
     int answer;
@@ -596,7 +596,7 @@ static void derivatives(host *h, slot *s)
     bool wrong = false, sets = FMI == 2 && one_in(h, 2);
     unsigned *const r = references(h, n);
     double *const v = numbers(h, n);
-    int *const orders = room(n, sizeof *orders);
+    int *const orders = array_of(n, sizeof *orders);
     unsigned *const given = or_null(h, r, &wrong);
     size_t k;
     int answer;
@@ -641,15 +641,15 @@ static void states(host *h, slot *s)
 #define SET(c, from) fmi2SetFMUstate(c, from)
 #define FREE(c, what) fmi2FreeFMUstate(c, what)
 #define SIZE(c, of, to) fmi2SerializedFMUstateSize(c, of, to)
-#define WRITE(c, of, to, room) fmi2SerializeFMUstate(c, of, (fmi2Byte *)(to), room)
-#define READ(c, from, room, to) fmi2DeSerializeFMUstate(c, (const fmi2Byte *)(from), room, to)
+#define WRITE(c, of, to, size) fmi2SerializeFMUstate(c, of, (fmi2Byte *)(to), size)
+#define READ(c, from, size, to) fmi2DeSerializeFMUstate(c, (const fmi2Byte *)(from), size, to)
 #else
 #define GET(c, to) fmi3GetFMUState(c, to)
 #define SET(c, from) fmi3SetFMUState(c, from)
 #define FREE(c, what) fmi3FreeFMUState(c, what)
 #define SIZE(c, of, to) fmi3SerializedFMUStateSize(c, of, to)
-#define WRITE(c, of, to, room) fmi3SerializeFMUState(c, of, to, room)
-#define READ(c, from, room, to) fmi3DeserializeFMUState(c, from, room, to)
+#define WRITE(c, of, to, size) fmi3SerializeFMUState(c, of, to, size)
+#define READ(c, from, size, to) fmi3DeserializeFMUState(c, from, size, to)
 #endif
     switch (below(h, 8)) {
     case 0:
@@ -678,7 +678,7 @@ static void states(host *h, slot *s)
         answered(h, GET(s->c, one));
     }
     answered(h, SIZE(s->c, *one, &size));
-    bytes = room(size + 1, 1);
+    bytes = array_of(size + 1, 1);
     refused(h, WRITE(s->c, *one, bytes, size - 1), true);
     answered(h, WRITE(s->c, *one, bytes, size));
     given = one_in(h, 4) ? (one_in(h, 2) ? size + 1 : below(h, (unsigned)size)) : size;
@@ -689,7 +689,7 @@ static void states(host *h, slot *s)
         }
         answer = READ(other->c, bytes, given, &copy);
         if (answer != ERROR) { /* two changes may have cancelled */
-            unsigned char *const whole = room(size, 1);
+            unsigned char *const whole = array_of(size, 1);
             WRITE(s->c, *one, whole, size);
             if (given != size || memcmp(whole, bytes, size) != 0) {
                 fail(h, "a damaged state is taken");
@@ -896,27 +896,27 @@ int main(int count, char **arguments)
 {
     const uint64_t seed = count > 1 ? strtoull(arguments[1], NULL, 10) : 0;
     const long calls_wanted = count > 2 ? atol(arguments[2]) : 1000;
-    host alone[2] = {{0}}, beside[2] = {{0}};
+    host alone[2] = {{0}}, parallel[2] = {{0}};
     pthread_t threads[2];
     int k;
     for (k = 0; k < 2; ++k) {
-        alone[k].seed = beside[k].seed = seed + 1000003u * (unsigned)k;
-        alone[k].calls = beside[k].calls = calls_wanted;
+        alone[k].seed = parallel[k].seed = seed + 1000003u * (unsigned)k;
+        alone[k].calls = parallel[k].calls = calls_wanted;
     }
     if (count <= 3 || atoi(arguments[3]) < 2) {
         run(&alone[0]);
         return 0;
     }
     for (k = 0; k < 2; ++k) {
-        if (pthread_create(&threads[k], NULL, run, &beside[k]) != 0) {
+        if (pthread_create(&threads[k], NULL, run, &parallel[k]) != 0) {
             return 2;
         }
     }
     for (k = 0; k < 2; ++k) {
         pthread_join(threads[k], NULL);
         run(&alone[k]);
-        if (alone[k].seen != beside[k].seen) {
-            fail(&beside[k], "beside another thread the answers differ");
+        if (alone[k].seen != parallel[k].seen) {
+            fail(&parallel[k], "next to another thread the answers differ");
         }
     }
     return 0;

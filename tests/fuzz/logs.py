@@ -36,7 +36,7 @@ from tests.fuzz.summary import Summary, seeds
 
 MOTION = "motion.mcap"
 PATIENCE = 60.0  # [s] for a process
-NOBODY = 65534  # a user without rights
+UNPRIVILEGED = 65534  # a user without rights
 CYCLES = 25  # records that are opened and closed
 LONG, PIECE, MOST_GROWTH = 100_000, 2000, 8 * 2**20  # samples, samples of a piece, [bytes] that the memory may grow by
 
@@ -101,8 +101,8 @@ def _process(target: Callable[..., None], *arguments: Any) -> tuple[Any, Connect
     return process, near
 
 
-def _told(pipe: Connection) -> list[Any]:
-    """Everything that a process said until it ended."""
+def _messages(pipe: Connection) -> list[Any]:
+    """Return all messages of a process until it ended."""
     texts = []
     try:
         while pipe.poll(PATIENCE):
@@ -117,7 +117,7 @@ def _hidden(folder: Path) -> list[str]:
 
 
 def _grow(pipe: Connection, path: Path, seed: float, pause: float) -> None:
-    """Write the run piece by piece; tell how many samples were passed on, in the end "whole" or the error."""
+    """Write the run piece by piece; send how many samples were passed on, in the end "whole" or the error."""
     draw, whole, done = random.Random(seed), _motion_beside(path), 0  # noqa: S311
     sink = McapLog(path, drawn=draw.random() < 0.5)
     try:
@@ -145,9 +145,9 @@ def _killed(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
     time.sleep(0.08 * draw.random() ** 2)
     process.kill()
     process.join()
-    said = [first, *_told(pipe)]
-    done = max(one[0] for one in said if isinstance(one, tuple) and one[0] != "whole") if len(said) > 1 else 0
-    if said[-1] == "whole" or done == len(motion()):
+    messages = [first, *_messages(pipe)]
+    done = max(one[0] for one in messages if isinstance(one, tuple) and one[0] != "whole") if len(messages) > 1 else 0
+    if messages[-1] == "whole" or done == len(motion()):
         return
     found = recover(path, folder / "found.mcap")
     if not _is_beginning(found, motion()):
@@ -158,18 +158,18 @@ def _killed(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
         yield "the older record is lost"
     if len(_hidden(folder)) > 1:
         yield f"left behind: {_hidden(folder)}"
-    sink = McapLog(path)  # nobody holds the name of a run that was killed
+    sink = McapLog(path)  # the name of a killed run is free again
     sink.begin(motion().part(slice(0, 0)))
     sink.end(motion().part(slice(0, 2)), "")
     if len(read(path)) != 2:
         yield "the name is not free after the writer was killed"
 
 
-def _fill_disk(pipe: Connection, path: Path, room: int, seed: float) -> None:
+def _fill_disk(pipe: Connection, path: Path, limit: int, seed: float) -> None:
     """Write the run in several ways where files may have so many bytes; say what went wrong."""
     whole = _motion_beside(path)
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     for name, write in _WRITERS.items():
         try:
             write(whole, path.with_suffix(name))
@@ -193,33 +193,33 @@ _WRITERS: dict[str, Callable[[Run, Path], None]] = {
 
 
 def _full_disk(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
-    """A disk that fills up: one line says so, older files stay, a record that grows keeps what it has."""
+    """A disk that fills up: one line reports it, older files stay, a record that grows keeps what it has."""
     path = folder / "run.mcap"
     for name in _WRITERS:
         path.with_suffix(name).write_text("older")
-    room = draw.randint(1, 500_000)
-    process, pipe = _process(_fill_disk, path, room, draw.random())
-    said = _told(pipe)
+    limit = draw.randint(1, 500_000)
+    process, pipe = _process(_fill_disk, path, limit, draw.random())
+    messages = _messages(pipe)
     process.join()
-    for name, error in (one for one in said if isinstance(one, tuple) and one[0] in _WRITERS):
+    for name, error in (one for one in messages if isinstance(one, tuple) and one[0] in _WRITERS):
         if error and ("cannot be written" not in error or "\n" in error):
             yield f"{name}: {error}"
         if error and path.with_suffix(name).read_text() != "older":
             yield f"{name}: the older file is lost"
     if _hidden(folder):
         yield f"left behind: {_hidden(folder)}"
-    if isinstance(said[-1], str):
-        if "cannot be written (File too large)" not in said[-1] or "\n" in said[-1]:
-            yield said[-1]
-        done = [one[0] for one in said if isinstance(one, tuple) and isinstance(one[0], int)]
+    if isinstance(messages[-1], str):
+        if "cannot be written (File too large)" not in messages[-1] or "\n" in messages[-1]:
+            yield messages[-1]
+        done = [one[0] for one in messages if isinstance(one, tuple) and isinstance(one[0], int)]
         if path.exists():
             found = recover(path, folder / "found.mcap")
             if not _is_beginning(found, motion()) or len(found) < max(done, default=0):
                 yield "what is left is not what was passed on"
         elif done:
             yield "the record is lost"
-    elif said[-1][0] != "whole":
-        yield f"the process ended with status {process.exitcode} after {said[-1:]}"
+    elif messages[-1][0] != "whole":
+        yield f"the process ended with status {process.exitcode} after {messages[-1:]}"
 
 
 def _without_rights(pipe: Connection, path: Path) -> None:
@@ -227,8 +227,8 @@ def _without_rights(pipe: Connection, path: Path) -> None:
     for name, write in _WRITERS.items():  # imports what it needs, which the user without rights may not
         write(whole, path.parents[1] / f"open{name}")
     if os.geteuid() == 0:
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
+        os.setgid(UNPRIVILEGED)
+        os.setuid(UNPRIVILEGED)
     for name, write in (*_WRITERS.items(), (".grown.mcap", lambda run, target: McapLog(target).begin(run))):
         try:
             write(whole, path.with_suffix(name))
@@ -238,16 +238,16 @@ def _without_rights(pipe: Connection, path: Path) -> None:
 
 
 def _read_only(_draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]:
-    """A folder in which nothing can be written: one line says so, nothing changes there."""
+    """A folder in which nothing can be written: one line reports it, nothing changes there."""
     closed = folder / "closed"
     closed.mkdir()
     closed.chmod(0o555)
     process, pipe = _process(_without_rights, closed / "run.mcap")
-    said = _told(pipe)
+    messages = _messages(pipe)
     process.join()
-    if len(said) != len(_WRITERS) + 1:
-        yield f"the process ended with status {process.exitcode} after {said[-1:]}"
-    for name, text in said:
+    if len(messages) != len(_WRITERS) + 1:
+        yield f"the process ended with status {process.exitcode} after {messages[-1:]}"
+    for name, text in messages:
         if "cannot be written (Permission denied)" not in text or "\n" in text:
             yield f"{name}: {text}"
     if any(closed.iterdir()):
@@ -263,11 +263,11 @@ def _two_at_once(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]
         time.sleep(0.1 * draw.random() ** 3)
     spans = []
     for process, pipe in both:
-        said = _told(pipe)
+        messages = _messages(pipe)
         process.join()
-        last = said[-1] if said else "nothing said"
+        last = messages[-1] if messages else "no message"
         if isinstance(last, tuple) and last[0] == "whole":
-            spans.append((said[1][1], last[1]))
+            spans.append((messages[1][1], last[1]))
         elif last != f"{path}: cannot be written ({BUSY})":
             yield str(last)
     if not spans:
@@ -358,7 +358,7 @@ def _long(pipe: Connection, path: Path, samples: int) -> None:
 def _flat(_draw: random.Random, folder: Path, _fmu: Path, samples: int = LONG) -> Iterator[str]:
     """A long run: a record that grows takes no more memory for it."""
     process, pipe = _process(_long, folder / "run.mcap", samples)
-    (sizes,) = _told(pipe)
+    (sizes,) = _messages(pipe)
     process.join()
     if sizes[-1] - sizes[0] > MOST_GROWTH:
         yield f"the memory grows by {sizes[-1] - sizes[0]} bytes over {samples} samples"

@@ -138,11 +138,11 @@ def _titles(drawn: random.Random, find: Find) -> None:
         _look_through(mechanism, f"title {mechanism.title[:80]!r}", find)
 
 
-def _look_through(mechanism: Mechanism, told: str, find: Find) -> None:
+def _look_through(mechanism: Mechanism, origin: str, find: Find) -> None:
     """Find texts that became code in what is generated; a name that the FMU has already is refused."""
     try:
         for fault in faults(mechanism):
-            find(f"{fault} ({told})")
+            find(f"{fault} ({origin})")
     except KinfmuError as error:
         judge_refusal(str(error), 0.0, find)
 

@@ -1,6 +1,6 @@
 """Mechanisms with change points, random grids over them, and their motion in closed form to 18 digits.
 
-The closed forms keep their digits at the change points and beside them: what vanishes there is factored out, so that a
+The closed forms keep their digits at and near the change points: terms that vanish there are factored out, so that a
 square root becomes a cosine. They run on numpy's long doubles, thousands of samples at once; lengths are decimal
 numbers. tests/solver/test_change_points.py holds them against the 50 digits of tests/oracle.py.
 """
@@ -223,20 +223,20 @@ def _walk(rng: random.Random, step: float, end: float) -> Iterator[float]:
 def _with_turns(
     coordinates: Callable[[LongArray], Motion], mechanism: Mechanism, start: float
 ) -> Callable[[LongArray], Motion]:
-    """Angles with their turns: followed from the start pose over a fine grid."""
+    """Angles with their turns: followed from the start pose over a dense grid."""
     given = {f"{body.name}.phi": body.start.phi for body in mechanism.moving_bodies}
 
     def motion(u: LongArray) -> Motion:
         exact = coordinates(u)
         span = max(abs(float(u.min()) - start), abs(float(u.max()) - start), 1.0) + 0.01
         count = math.ceil(span / _FINE)
-        fine = start + np.arange(-count, count + 1) * np.longdouble(_FINE)
-        rough = coordinates(fine)
+        dense = start + np.arange(-count, count + 1) * np.longdouble(_FINE)
+        rough = coordinates(dense)
         for name in exact:
             if name.endswith(".phi") and name != "crank.phi":
                 followed = _unwrapped(rough[name][0].astype(float), count)
                 followed += given[name] - followed[count]
-                near = np.interp(u.astype(float), fine.astype(float), followed)
+                near = np.interp(u.astype(float), dense.astype(float), followed)
                 whole = np.round((near - exact[name][0].astype(float)) / math.tau)
                 exact[name] = (exact[name][0] + whole * TWO_PI, *exact[name][1:])
         return exact

@@ -1,4 +1,4 @@
-"""Bridges over change points, moved by whole turns, and the road that remembers them."""
+"""Bridges over change points, moved by whole turns, and the singularity map that remembers them."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_bridge_is_built_once_and_moved_on_later_turns(
 
 
 @pytest.mark.parametrize("turns", [1000, -1000])
-def test_thousands_of_turns_later_a_window_is_as_good_as_at_first(fourbar: Solver, errors: Errors, turns: int) -> None:
+def test_a_window_is_as_accurate_after_thousands_of_turns(fourbar: Solver, errors: Errors, turns: int) -> None:
     pose = fourbar.solve(fourbar.anchor, (turned(math.pi + 0.01, turns),))
     assert pose.status == Status.BRIDGED
     q, qd, qdd = errors(fourbar, pose)
@@ -83,7 +83,7 @@ def test_dumped_pose_is_restored_to_the_bit_in_and_out_of_windows(fourbar: Solve
 
 
 def test_many_loops_that_all_but_cross_at_once_are_each_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """More of them than a road keeps places: each search must be remembered until all are done."""
+    """More of them than a singularity map has places: each search must be remembered until all are done."""
     searched: list[int] = []
     monkeypatch.setattr("kinfmu.solver.python.survey.build", lambda *args: searched.append(args[2]))
     written = fourbar_chain(40)

@@ -1,4 +1,4 @@
-"""Through change points on the smooth branch, whatever the steps; with lengths that all but make one, right or told.
+"""Change points on the smooth branch, with steps of all sizes; with lengths close to one, right or reported as outside.
 
 `pytest --grids 200 tests/solver/test_change_points.py` takes the grids in full.
 """
@@ -115,9 +115,9 @@ def test_the_smooth_branch_is_kept_on_every_grid(case: Case, grids: tuple[int, i
 @pytest.mark.parametrize("case", [pytest.param(reference(), id="reference"), *CASES])
 def test_at_a_change_point_and_as_near_as_doubles_go_nothing_is_lost(case: Case) -> None:
     quarter = math.pi / 2.0 if case.name.startswith("slider") else 0.0
-    beside = [0.0, *(side * 10.0**-k for k in range(1, 13) for side in (1.0, -1.0))]
+    near = [0.0, *(side * 10.0**-k for k in range(1, 13) for side in (1.0, -1.0))]
     for turns in range(-2, 4):
-        u = [quarter + turns * math.pi + offset for offset in beside]
+        u = [quarter + turns * math.pi + offset for offset in near]
         for order in (u, u[::-1]):
             run = case.run(order)
             assert run.good.all()
@@ -178,7 +178,7 @@ def gaps(case: Case) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("by", OFF)
-def test_beside_a_change_point_samples_are_right_within_their_estimate_or_outside(
+def test_near_a_change_point_samples_are_right_within_their_estimate_or_outside(
     by: str, grids: tuple[int, int | None]
 ) -> None:
     count, most = grids

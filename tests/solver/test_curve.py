@@ -45,7 +45,7 @@ def test_at_a_break_the_right_hand_piece_counts_and_the_outer_pieces_hold_for_al
     assert [value(STEPS, order, 101.0) for order in range(3)] == [506.0, 5.0, 0.0]
 
 
-def test_not_a_number_stays_none() -> None:
+def test_nan_stays_nan() -> None:
     assert math.isnan(value(STEPS, 0, math.nan))
     assert math.isnan(value(STEPS, 2, math.nan))
 

@@ -12,7 +12,7 @@ import pytest
 import kinfmu
 from kinfmu import Body, Point, Run
 from kinfmu.solver.python import Pose, Solver, Status
-from tests.error_estimates import FAMILIES, ORDERS, Number, measured, told
+from tests.error_estimates import FAMILIES, ORDERS, Number, measured, statistics
 from tests.mechanisms import fourbar as fourbar_of_bars
 
 SEED = 1989
@@ -21,7 +21,7 @@ COUNTS = {"gallery": 25, "chains": 5, "parallel_chains": 3, "turned_far": 3}  # 
 
 @pytest.fixture(scope="module")
 def numbers() -> list[Number]:
-    """Estimates beside true errors, from every family of mechanisms."""
+    """Estimates compared with true errors, from every family of mechanisms."""
     return [number for name in FAMILIES for number in measured(name, SEED, COUNTS.get(name, 8))]
 
 
@@ -29,7 +29,7 @@ def numbers() -> list[Number]:
 def test_the_estimate_is_at_least_the_error_in_99_percent_and_1000_times_too_large_at_most(
     numbers: list[Number], order: str
 ) -> None:
-    result = told([number for number in numbers if number.order == order])
+    result = statistics([number for number in numbers if number.order == order])
     assert result.count > 150
     assert result.coverage >= 0.99
     assert result.overestimation <= 1000.0
@@ -38,7 +38,7 @@ def test_the_estimate_is_at_least_the_error_in_99_percent_and_1000_times_too_lar
 @pytest.mark.parametrize("order", ORDERS)
 def test_along_a_chain_estimates_grow_no_faster_than_errors(numbers: list[Number], order: str) -> None:
     """Of 2 to 60 loops, each known to what the loops before it leave."""
-    result = told([number for number in numbers if number.family == "chains" and number.order == order])
+    result = statistics([number for number in numbers if number.family == "chains" and number.order == order])
     assert result.coverage == 1.0
     assert result.overestimation <= 100.0
 
@@ -127,7 +127,7 @@ def test_a_run_that_travels_has_its_estimates_with_it() -> None:
     np.testing.assert_array_equal(there.margin, run.margin)
 
 
-def test_a_run_tells_what_the_poses_tell(fourbar: Solver) -> None:
+def test_a_run_has_the_estimates_of_its_poses(fourbar: Solver) -> None:
     angles = [1.0, 3.1, np.pi, 3.3]
     run = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=angles, outputs=list(fourbar.model.OUTPUTS))
     pose = fourbar.anchor
@@ -138,7 +138,7 @@ def test_a_run_tells_what_the_poses_tell(fourbar: Solver) -> None:
     assert set(run.status) == {Status.OK, Status.BRIDGED}
 
 
-def test_where_nothing_is_known_the_estimate_is_infinite(fourbar: Solver) -> None:
+def test_an_unknown_error_is_infinite(fourbar: Solver) -> None:
     pose = fourbar.solve(fourbar.anchor, (1.0,))
     flat = Pose((0.0,), fourbar.model.position((0.0,), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), -0.0, -1))
     flat.tangent = fourbar.model.tangent(pose.values)

@@ -21,7 +21,7 @@ DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)
 
 
 @pytest.mark.parametrize(
-    ("value", "digits", "said"),
+    ("value", "digits", "text"),
     [
         (math.pi / 3.0, 6, "crank = 1.047198 rad (60 deg)"),
         (math.pi / 3.0, LOCATED, "crank = 1.0471975512 rad (60 deg)"),
@@ -34,12 +34,12 @@ DEAD_CENTRE = math.acos(1.0 / 13.0)  # 65^2 + 100^2 - 2 65 100 cos u = (50 + 65)
         (math.inf, 6, "crank = inf rad (inf deg)"),
     ],
 )
-def test_an_angle_has_as_many_decimals_as_it_is_known_to(value: float, digits: int, said: str) -> None:
+def test_an_angle_has_as_many_decimals_as_it_is_known_to(value: float, digits: int, text: str) -> None:
     model = load_model(compile_plan(kinfmu.load("fourbar")))
-    assert place(model, (value,), digits) == said
+    assert place(model, (value,), digits) == text
 
 
-def test_lengths_have_digits_and_drivers_are_told_one_after_another() -> None:
+def test_lengths_have_digits_and_drivers_are_listed_in_order() -> None:
     model = load_model(compile_plan(kinfmu.load("parallel_jaw")))
     assert place(model, (12.3456789012,)) == "piston = 12.3457 mm"
     assert place(model, (12.3456789012,), LOCATED) == "piston = 12.3456789 mm"
@@ -55,12 +55,14 @@ def test_lengths_have_digits_and_drivers_are_told_one_after_another() -> None:
         (1e-8, "left = 1.4937971961 rad (85.58827479 deg)"),  # to six decimals it is the limit
     ],
 )
-def test_what_cannot_be_reached_is_told_apart_from_the_limit(engine: str, beyond: float, asked: str) -> None:
+def test_a_value_out_of_reach_is_shown_with_digits_that_differ_from_the_limit(
+    engine: str, beyond: float, asked: str
+) -> None:
     u = np.array([1.0, DEAD_CENTRE + beyond])
     (event,) = kinfmu.solve(kinfmu.load("triple_rocker"), left_angle=u, engine=engine).events
     limit = "left = 1.4937971861 rad (85.58827421 deg)"
-    why = "coupler.phi, right.phi would part"
-    assert event.text == f"{asked} cannot be reached: the limit is {limit}, where {why}"
+    why = "beyond it the loop of coupler.phi, right.phi cannot close"
+    assert event.text == f"{asked} cannot be reached: the limit is {limit}; {why}"
 
 
 class NativeLimit(ctypes.Structure):
@@ -76,7 +78,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Native]:
         yield Native(compile_plan(kinfmu.load("triple_rocker")))
 
 
-def said_by_native(native: Native, limit: float, asked: float) -> str:
+def native_message(native: Native, limit: float, asked: float) -> str:
     text = ctypes.create_string_buffer(480)
     found = NativeLimit((ctypes.c_double * 1)(limit), 0, False)
     native.c.kf_append_limit(text, ctypes.byref(found), (ctypes.c_double * 1)(asked), -1)
@@ -89,7 +91,7 @@ def test_a_refused_value_never_has_the_digits_of_its_limit(native: Native, turns
     model = load_model(compile_plan(kinfmu.load("triple_rocker")))
     limit = DEAD_CENTRE + turns * math.tau
     text = limit_message(model, Limit((limit,), 0), (limit + beyond,))
-    assert text == said_by_native(native, limit, limit + beyond)
+    assert text == native_message(native, limit, limit + beyond)
     numbers = re.findall(r"(\S+) rad \((\S+) deg\)", text)
     assert all(len(set(column)) == len(column) for column in zip(*numbers, strict=True)), text
-    assert len(numbers) == 2 or "cannot be reached: to these digits it is the limit, where" in text
+    assert len(numbers) == 2 or "cannot be reached: to these digits it is the limit; beyond it" in text

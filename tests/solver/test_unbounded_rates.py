@@ -1,4 +1,4 @@
-"""Places where rates have no bound, and change points that lengths miss: estimates and status say so."""
+"""Places where rates have no bound, and change points that lengths miss: estimates and status report them."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def exact_arm(arm: float, length: float) -> tuple[mp.mpf, mp.mpf, mp.mpf] | None
 @pytest.mark.parametrize("arm", [1.0 + 1e-7, 1.0 - 3e-8, 1.0 + 1e-4, 0.7, 0.5, 1.75])
 def test_close_to_the_shortest_and_longest_reach_of_a_cylinder_estimates_hold(engine: str, arm: float) -> None:
     shortest, longest = abs(1.0 - arm), 1.0 + arm
-    beside = [0.0, 1e-17, 1e-15, 1e-13, 1e-10, 1e-7, 5e-8, 1e-4]
-    lengths = [0.5 * (shortest + longest), *(shortest + x for x in beside), *(longest - x for x in beside)]
+    near = [0.0, 1e-17, 1e-15, 1e-13, 1e-10, 1e-7, 5e-8, 1e-4]
+    lengths = [0.5 * (shortest + longest), *(shortest + x for x in near), *(longest - x for x in near)]
     lengths += [0.5 * shortest, 0.0, longest + 1e-9]
     run = kinfmu.solve(cylinder(arm, lengths[0]), engine=engine, cylinder_length=lengths)
     for k, length in enumerate(lengths):

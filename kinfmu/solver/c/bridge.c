@@ -1,22 +1,24 @@
-/* Bridges: across singular points by interpolation from both sides, proved by closing. See kinfmu/solver/python/bridge.py. */
+/* Bridges: interpolation across singular points from both sides, accepted only if the interpolated pose closes. See
+ * kinfmu/solver/python/bridge.py.
+ */
 #include "internal.h"
 
-#define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would win */
+#define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would gain */
 #define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
-#define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node turns away */
-#define FINE 1e-12     /* [rad, sizes]; difference of two widths from which narrower ones win nothing */
-#define STRAIGHT 0.1   /* change of a zero located anew, as a part of what is left to go: less where there is one */
+#define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away */
+#define FINE 1e-12     /* [rad, sizes]; difference of two widths below which narrower ones gain nothing */
+#define STRAIGHT 0.1   /* change of a zero located anew, as a part of the distance ahead: it is as small where there is a zero */
 #define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
 #define NOISE 8.0      /* roundings of the residual at the centre; a smaller residual is no miss */
 #define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
 
-/* True inside the window, where the bridge is used. */
+/* Return whether u is inside the window, where the bridge is used. */
 bool kf_covers(const kf_bridge *bridge, double u)
 {
     return bridge->u[2] < u && u < bridge->u[3];
 }
 
-/* Unknowns moved by the turns of a bridge; `to` may be `z`. */
+/* Move unknowns by the turns of a bridge; `to` may be `z`. */
 static void turn_on(const kf_bridge *bridge, const double *z, double *to)
 {
     int k;
@@ -25,19 +27,19 @@ static void turn_on(const kf_bridge *bridge, const double *z, double *to)
     }
 }
 
-/* Where a driver value lies on the span: x = (u - centre) / half. */
+/* Return the place of a driver value on the span: x = (u - centre) / half. */
 static double place(const kf_bridge *bridge, const kf_span *span, double u)
 {
     return (kf_turned(u, -bridge->turns) - span->centre) / bridge->half;
 }
 
-/* Where the inner polynomials of a bridge's span are kept, if none with the same place came after them. */
+/* Return the place where the inner polynomials of a bridge's span are cached; others may have overwritten them. */
 static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
 {
     return &solver->scratch.inner[bridge->span % KF_INNERS];
 }
 
-/* A span whole turns on; `raised` tells the turns of the unknowns. */
+/* Make the bridge of a span moved by whole turns; `raised` holds the turns of the unknowns. */
 static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
 {
     const kf_span *const from = &KF_POOL(solver)->spans[span];
@@ -51,16 +53,16 @@ static void make(kf_bridge *bridge, const kf_solver *solver, int span, double tu
     }
 }
 
-/* The pose at a node. */
+/* Find the pose at a node. */
 static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pose *pose)
 {
     const double *const z = KF_POOL(solver)->spans[bridge->span].z[node];
     double *const there = solver->scratch.z;
     const double *u;
 #if KF_TRACKS
-    double room[KF_DRIVERS];
+    double buffer[KF_DRIVERS];
 #endif
-    u = KF_AT(&solver->model, &bridge->u[node], room);
+    u = KF_AT(&solver->model, &bridge->u[node], buffer);
     kf_fresh(pose, -1, -INFINITY, INFINITY);
     if (bridge->turns == 0.0) { /* as it was found */
         return kf_evaluated_as_given(&solver->model, u, z, &pose->found);
@@ -69,7 +71,7 @@ static bool at_node(kf_solver *solver, const kf_bridge *bridge, int node, kf_pos
     return kf_evaluated(&solver->model, u, there, NULL, &pose->found);
 }
 
-/* The farthest node on the target's side that does not lie beyond the target. */
+/* Find the farthest node on the target's side that does not lie beyond the target. */
 bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
 {
     const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
@@ -78,7 +80,7 @@ bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose)
     return at_node(solver, bridge, passed ? far : near, pose);
 }
 
-/* The interpolated pose inside the window; blocks that are regular are solved from it. */
+/* Find the interpolated pose inside the window; regular blocks are solved from it. */
 bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose)
 {
     const kf_model *const model = &solver->model;
@@ -99,13 +101,13 @@ bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pos
     return true;
 }
 
-/* The interpolated pose at the centre, and the largest of the driver value and the unknowns, in radians and sizes. */
+/* Find the interpolated pose at the centre, and the largest of the driver value and the unknowns, in radians and sizes. */
 static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *found, double *size)
 {
     const kf_span *const span = &KF_POOL(solver)->spans[bridge->span];
     double *const z = solver->scratch.z;
 #if KF_TRACKS
-    double room[KF_DRIVERS];
+    double buffer[KF_DRIVERS];
 #endif
     double largest = fabs(bridge->centre) / kf_reach[KF_ALONG(solver)];
     int block, k = 0;
@@ -117,10 +119,10 @@ static bool find_middle(kf_solver *solver, const kf_bridge *bridge, kf_found *fo
         }
     }
     *size = largest;
-    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, room), z, span->held, found);
+    return kf_evaluated(&solver->model, KF_AT(&solver->model, &bridge->centre, buffer), z, span->held, found);
 }
 
-/* True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
+/* Return whether a driven distance that passes 0 in the window closes as a length: d.d - u^2 always does.
  *
  * Two points that pass each other at a distance d give this row a residual of d^2.
  */
@@ -142,7 +144,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
     return true;
 }
 
-/* True if the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
+/* Return whether the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
 static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
 {
     double largest;
@@ -150,7 +152,7 @@ static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
            && keeps_distances(solver, bridge, found);
 }
 
-/* By how much lengths miss the change point, relative to the size; 0 within rounding.
+/* Return by how much lengths miss the change point, relative to the size; 0 within rounding.
  *
  * That is the residual at the centre that no change of the unknowns removes: of J dz = -r, damped, the part outside the
  * columns of J.
@@ -182,7 +184,7 @@ static double miss(kf_solver *solver, const kf_bridge *bridge)
     return fmax(0.0, left - NOISE * KF_EPS * (1.0 + largest));
 }
 
-/* What the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
+/* Return what the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
  *
  * Where lengths miss a change point by m, crossing branches separate: by sqrt(m) at the crossing, by m / x at the distance
  * x from it. Their determinant is linear in x, so it gives x more exactly than the window's centre. slope: of the steepest
@@ -210,7 +212,7 @@ void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, doub
     missed[2] = 8.0 * e * e / (w * w * w);
 }
 
-/* What the wider span says less than the one used, in z and its two derivatives: the error estimate. */
+/* Return the difference of the wider span and the one used, in z and its two derivatives: the error estimate. */
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd)
 {
     const kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
@@ -218,10 +220,10 @@ void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, do
     kf_span_difference(span, inner_of(solver, bridge), place(bridge, span, u), z, zd, zdd);
 }
 
-/* The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats; or -1.
+/* Return the bridge moved by whole turns, if u lies between its moved nodes and the mechanism repeats, else -1.
  *
- * It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
- * if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
+ * It repeats if the node next to the pose, reached from it, is the node of the span except for whole turns of angles, and
+ * if the moved bridge closes. So a bridge of another branch, or of a mechanism with a screw, is not moved.
  */
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
 {
@@ -260,7 +262,7 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
     return closes(solver, other, &solver->scratch.follow[0].found) ? made : -1;
 }
 
-/* Driver value where a determinant vanishes on the secant through its values at a and b. */
+/* Find the driver value where a determinant vanishes on the secant through its values at a and b. */
 bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
 {
     const double rise = of_b - of_a;
@@ -268,9 +270,9 @@ bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
     return rise != 0.0;
 }
 
-/* Where a block's determinant vanishes, by the secant rule from the near side; false if it does not fall straight.
+/* Find where a block's determinant vanishes, by secants from the near side; false if it does not fall straight.
  *
- * Towards a dead centre it falls like a square root: the secant's zero stays beyond, by as much as is left to go.
+ * Towards a dead centre it falls like a square root: the secant's zero is about twice as far as the dead centre.
  */
 static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
 {
@@ -300,7 +302,7 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
         if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
             return true;
         }
-        solver->scratch.located = *ahead; /* walks from here may fail */
+        solver->scratch.located = *ahead; /* paths from here may fail */
         pose = &solver->scratch.located;
         whole = true;
         step = 0.5 * (better - KF_HERE(solver, pose));
@@ -308,13 +310,13 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
     return false;
 }
 
-/* True for a block of more rows than unknowns: its determinant is never negative, and falls to a crossing too. */
+/* Return whether a block has more rows than unknowns: its determinant is never negative, and falls to zero at a crossing. */
 static bool is_tall(int block)
 {
     return kf_block_rows[block] > kf_block_ends[block] - (block > 0 ? kf_block_ends[block - 1] : 0);
 }
 
-/* Poses at 1, 2, 4 half widths on the far side: each extrapolated from the last known ones, then corrected. */
+/* Find poses at 1, 2, 4 half widths on the far side, each extrapolated from the last ones and corrected. */
 static bool cross(kf_solver *solver, kf_span *span, double side, int block)
 {
     static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
@@ -323,7 +325,7 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
     kf_pose *const pose = &solver->scratch.follow[0];
     double *const last = determinants[2];
 #if KF_TRACKS
-    double room[KF_DRIVERS];
+    double buffer[KF_DRIVERS];
 #endif
     int node, k;
     for (node = 3; node < KF_NODES; ++node) {
@@ -333,13 +335,13 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
         kf_weights(count, places + first, places[node], weights);
         kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
         kf_fresh(pose, -1, -INFINITY, INFINITY);
-        if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, room), solver->scratch.z, NULL, &pose->found)
+        if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, buffer), solver->scratch.z, NULL, &pose->found)
             || pose->found.moved > STEADY * pose->found.margin) {
             return false;
         }
         for (k = 0; node > 3 && k < KF_BLOCKS; ++k) {
             if (pose->found.determinants[k] * last[k] <= 0.0) {
-                return false; /* there is another zero beside the one to be bridged */
+                return false; /* there is another zero next to the one to be bridged */
             }
         }
         memcpy(last, pose->found.determinants, KF_BLOCKS * sizeof(double));
@@ -348,10 +350,10 @@ static bool cross(kf_solver *solver, kf_span *span, double side, int block)
         }
         kf_span_node(span, node, pose, &solver->model);
     }
-    return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else touched and not crossed */
+    return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else it touches zero without crossing it */
 }
 
-/* A span of one width over the zero of a block's determinant, from the side that the pose is on. */
+/* Build a span of one width over the zero of a block's determinant, from the side of the pose. */
 static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block, double centre, double half)
 {
     const double side = centre > KF_HERE(solver, pose) ? 1.0 : -1.0;
@@ -378,7 +380,7 @@ static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block
     return true;
 }
 
-/* A bridge over the zero of a block's determinant that a regular pose has before it, or -1 if none proves itself.
+/* Build a bridge over the zero of a block's determinant ahead of a regular pose; -1 if none is accepted.
  *
  * zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
  * closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:

@@ -1,18 +1,18 @@
-/* Continuation: from the anchor of a mechanism as it is written to the same pose with other parameters.
+/* Continuation: from the anchor with the parameters of the mechanism to the same pose with other parameters.
  *
  *     Phi(q, u, p0 + s (p1 - p0)) = 0,   s from 0 to 1
  *
- * The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a
- * way of the drivers. See kinfmu/solver/python/continuation.py.
+ * The drivers rest; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a
+ * path of the drivers. See kinfmu/solver/python/continuation.py.
  */
 #include "internal.h"
 
-#define SHORTEST 1e-7 /* step in s; where steps get shorter the way ends */
+#define SHORTEST 1e-7 /* step in s; where steps get shorter the path ends */
 #define MOST_STEPS 10000
 #define ITERATIONS 60
 #define WHY 200 /* characters */
 
-/* As on a way of the drivers: corrections small against the determinants, none of which falls steeply. */
+/* Return whether corrections are small compared with the determinants and no determinant falls steeply. */
 static bool is_trusted(const kf_found *found, const kf_found *trial)
 {
     int k;
@@ -28,7 +28,7 @@ static bool is_trusted(const kf_found *found, const kf_found *trial)
     return true;
 }
 
-/* "parameters coupler = 9": those that differ from what is written. */
+/* "parameters coupler = 9": those that differ from the mechanism's. */
 static void append_parameters(char *message, const double *parameters)
 {
     bool is_first = true;
@@ -58,7 +58,7 @@ static double length_of(int count, const double *vector)
     return largest * sqrt(square);
 }
 
-/* J^T (J, r) of a block at what was found, the rows relative to the size; the length of r. */
+/* Form J^T (J, r) of a block at the pose found, rows relative to the size; return the length of r. */
 static double normal_equations(const kf_model *model, const kf_found *found, int block, int k, double *normal,
                                double *right)
 {
@@ -86,7 +86,7 @@ static double normal_equations(const kf_model *model, const kf_found *found, int
     return length_of(m, left);
 }
 
-/* Smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if none can be had. */
+/* Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if there is none. */
 static double gap_of(kf_solver *solver, const kf_model *model, int block)
 {
     kf_found *const found = &solver->scratch.follow[0].found;
@@ -137,12 +137,12 @@ static double gap_of(kf_solver *solver, const kf_model *model, int block)
     return length_of(kf_block_rows[block], residuals);
 }
 
-/* Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave. */
+/* Append why the path ends: the rows that do not close with these parameters, and their smallest gap. */
 static void append_failure(kf_solver *solver, const double *parameters, int block)
 {
     kf_model *const model = &solver->scratch.ahead;
     const double *const determinants = solver->anchor.found.determinants;
-    const bool is_told = block >= 0;
+    const bool is_known = block >= 0;
     char why[WHY];
     double gap;
     int k;
@@ -150,7 +150,7 @@ static void append_failure(kf_solver *solver, const double *parameters, int bloc
         kf_append(solver->message, "%s", why);
         return;
     }
-    for (k = 0; !is_told && k < KF_BLOCKS; ++k) {
+    for (k = 0; !is_known && k < KF_BLOCKS; ++k) {
         block = block < 0 || fabs(determinants[k]) < fabs(determinants[block]) ? k : block;
     }
     if (block < 0) {
@@ -159,11 +159,11 @@ static void append_failure(kf_solver *solver, const double *parameters, int bloc
     }
     gap = gap_of(solver, model, block);
     if (gap > 1e-9) {
-        kf_append(solver->message, "the mechanism does not close: rows %s stay open by ", kf_block_row_names[block]);
+        kf_append(solver->message, "the mechanism does not close: rows %s leave a gap of ", kf_block_row_names[block]);
         kf_append_number(solver->message, "%.4g", gap * KF_SIZE);
         kf_append(solver->message, " %s", kf_length_unit);
     } else {
-        kf_append(solver->message, "lie behind a singular point, where rows %s are dependent",
+        kf_append(solver->message, "beyond a singular point, where rows %s are dependent",
                kf_block_row_names[block]);
     }
 }
@@ -228,7 +228,7 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
         for (k = 1; k < KF_WATCHES; ++k) {
             most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
         }
-        kf_append(solver->message, "the redundant row %s is open by about ", kf_watch_names[most]);
+        kf_append(solver->message, "redundant row %s does not close: gap about ", kf_watch_names[most]);
         kf_append_number(solver->message, "%.4g", fabs(watches[most]) * KF_SIZE);
         kf_append(solver->message, " %s", kf_length_unit);
     } else {

@@ -1,8 +1,8 @@
-/* A function of one variable made of pieces: see kinfmu/solver/python/curve.py. */
+/* A piecewise function of one variable: see kinfmu/solver/python/curve.py. */
 #include "kinfmu.h"
 #include "sincos.h"
 
-/* n! / (n - order)!: what the derivative of s^n puts before its power. */
+/* n! / (n - order)!: the factor of the derivative of s^n. */
 static double falling(int n, int order)
 {
     double factor = 1.0;

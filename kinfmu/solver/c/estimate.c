@@ -4,15 +4,15 @@
  *
  *     |dz| = |J^-1| R (2 eps + residual + eps |z|)        R: scales of the rows, in lengths
  *
- * which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried:
- * position, velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
+ * which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
+ * velocity and acceleration are formed again at the moved pose. See kinfmu/solver/python/estimate.py.
  */
 #include "internal.h"
 
-#define UNBOUNDED 0.5 /* change of a determinant, as a part of it, within a pose's error: rates are not known then */
+#define UNBOUNDED 0.5 /* relative change of a determinant within a pose's error from which rates are unknown */
 
-/* How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given. And the
- * largest of the derivatives in radians and sizes.
+/* Speeds and accelerations of the drivers (with one driver: 1 and 0), and the blocks held; the largest derivatives, in
+ * radians and sizes.
  */
 typedef struct {
     const double *ud, *udd;
@@ -20,7 +20,7 @@ typedef struct {
     double speed, curve;
 } kf_driven;
 
-/* How a pose is driven; its derivatives are formed. */
+/* Return how a pose is driven, and form its derivatives. */
 static kf_driven drive_of(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd)
 {
     const bool one = KF_IS_ONE(solver);
@@ -39,7 +39,7 @@ static kf_driven drive_of(kf_solver *solver, kf_pose *pose, const double *ud, co
     return drive;
 }
 
-/* What one block adds. */
+/* Form the source of one block. */
 static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int block, double weight)
 {
     kf_source *const source = &solver->scratch.source;
@@ -66,7 +66,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
     source->is_given = false;
 }
 
-/* There and more, away from here: two errors that happen to cancel are no smaller for it. */
+/* Move `there` by `more` away from `here`, so that two errors cannot cancel by chance. */
 static void add(const double *there, const double *here, const double *more, double *to)
 {
     double along = 0.0, sign;
@@ -80,7 +80,7 @@ static void add(const double *there, const double *here, const double *more, dou
     }
 }
 
-/* The pose that a source moves to, with its derivatives. */
+/* Form the pose moved by a source, with its derivatives. */
 static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, kf_pose *there)
 {
     const kf_model *const model = &solver->model;
@@ -106,8 +106,8 @@ static bool move(kf_solver *solver, const kf_pose *pose, const kf_driven *drive,
     return true;
 }
 
-/* What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together. The larger
- * of it and what `rounding` holds stays there.
+/* Form the error of a bridge's node in each unknown: of z, half z' and half^2 z'' together. `rounding` keeps the larger of
+ * it and its own value.
  */
 static bool round_node(kf_solver *solver, const kf_span *span, int place, double *rounding)
 {
@@ -119,9 +119,9 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     kf_driven drive;
     kf_fresh(node, -1, -INFINITY, INFINITY);
 #if KF_TRACKS
-    double room[KF_DRIVERS];
+    double buffer[KF_DRIVERS];
 #endif
-    if (!kf_evaluated_as_given(&solver->model, KF_AT(&solver->model, &span->u[place], room), span->z[place], &node->found)) {
+    if (!kf_evaluated_as_given(&solver->model, KF_AT(&solver->model, &span->u[place], buffer), span->z[place], &node->found)) {
         return false;
     }
     drive = drive_of(solver, node, KF_SPEEDS(&solver->model), kf_at_rest);
@@ -158,7 +158,7 @@ static double steepest(const kf_solver *solver, const kf_pose *pose)
     return kf_larger(0.0, KF_UNKNOWNS, pose->x1, kf_unknown_scales) * kf_reach[KF_ALONG(solver)];
 }
 
-/* What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by. */
+/* Form the source of a bridge: the difference of its two widths, and the errors of its nearest nodes. */
 static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
 {
     kf_scratch *const scratch = &solver->scratch;
@@ -189,7 +189,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
 
 #if KF_TRACKS
 
-/* What the bridge of one track adds, in time. */
+/* Form the source of the bridge of one track, in time. */
 static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const kf_driven *drive, int driver)
 {
     kf_source *const source = &solver->scratch.source;
@@ -229,7 +229,7 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
 
 #endif
 
-/* The largest difference of two rows of outputs, in radians and sizes. */
+/* Return the largest difference of two rows of outputs, in radians and sizes. */
 static double largest_gap(const double *there, const double *here)
 {
     double largest = 0.0;
@@ -244,7 +244,7 @@ static double largest_gap(const double *there, const double *here)
     return largest;
 }
 
-/* True if a determinant changes by half of its size to a pose that rounding cannot distinguish.
+/* Return whether a determinant changes by half of its size to a pose that rounding cannot distinguish.
  *
  * So close to a singular point the rates have no bound.
  */
@@ -304,7 +304,7 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
     return count >= 0 && squares[0] + squares[1] + squares[2] < INFINITY;
 }
 
-/* True where branches cross and no bridge holds: whose rates these are is not known. */
+/* Return whether branches cross without a bridge: to which branch the rates belong is unknown. */
 static bool is_at_a_crossing(const kf_solver *solver, const kf_pose *pose, const kf_driven *drive)
 {
     (void)solver;
@@ -312,7 +312,7 @@ static bool is_at_a_crossing(const kf_solver *solver, const kf_pose *pose, const
         && drive->speed * kf_reach[KF_ALONG(solver)] < KF_STEEP;
 }
 
-/* The same of one of the tracks. */
+/* Return the same of one of the tracks. */
 static bool is_a_track_at_a_crossing(kf_solver *solver, const kf_pose *pose)
 {
     bool is_there = false;

@@ -1,4 +1,4 @@
-/* Follower: a solver that goes from one good pose to the next. */
+/* Follower: a solver that starts each path from the last good pose. */
 #include "follower.h"
 
 kf_pose *kf_followed(kf_follower *follower, const double *u)

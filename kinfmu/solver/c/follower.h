@@ -1,4 +1,4 @@
-/* Follower: a solver that goes from one good pose to the next. */
+/* Follower: a solver that starts each path from the last good pose. */
 #ifndef KF_FOLLOWER_H
 #define KF_FOLLOWER_H
 
@@ -12,8 +12,8 @@ typedef struct {
     bool started;
 } kf_follower;
 
-/* Solve at driver values from the last good pose, or from the anchor; the pose found is the last good one from now on, if
- * it is good.
+/* Solve at driver values from the last good pose, or from the anchor; a good pose found becomes the
+ * last good one.
  */
 kf_pose *kf_followed(kf_follower *follower, const double *u);
 

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define KF_EPS DBL_EPSILON
-#define KF_REGULAR 0.19      /* determinant from which a block is solved as elsewhere: see span.py */
+#define KF_REGULAR 0.19      /* determinant from which a block is regular: see span.py */
 #define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see bridge.py */
 #define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see trusted_step.py, advance.py and limit.py, as all that follows */
 #define KF_TRUST 10.0
@@ -20,7 +20,7 @@
 #define KF_SHORTEST_STEP 5e-9 /* of the longest; where steps get shorter, a limit is near: its place is extrapolated */
 #define KF_GIVE_UP 5e-15      /* of the longest; nothing lies between such steps */
 #define KF_BENT 1.0           /* [rad, sizes]; a prediction whose quadratic term is larger may land whole turns away */
-#define KF_UNDECIDED 1e-6    /* determinant below which a way ends: so small where a change point is missed by 1e-12 */
+#define KF_UNDECIDED 1e-6    /* determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant */
 #define KF_STEEP 100.0       /* slope of an unknown; right before a dead centre it is more: see pose.py */
 
 /* Blocks of models with several drivers that depend on one driver alone are followed along it: a track.
@@ -33,12 +33,12 @@
 void kf_enter_track(kf_solver *solver, int driver);
 void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes);
 void kf_leave_track(kf_solver *solver);
-const double *kf_driven_at(const kf_model *model, const double *value, double *room);
+const double *kf_driven_at(const kf_model *model, const double *value, double *buffer);
 void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,
               double *x1);
 void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
                      const double *given, const bool *held, double *x2);
-#define KF_AT(model, value, room) kf_driven_at(model, value, room)
+#define KF_AT(model, value, buffer) kf_driven_at(model, value, buffer)
 #define KF_VELOCITY kf_rates
 #define KF_ACCELERATION kf_second_rates
 #else
@@ -46,7 +46,7 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 #define KF_SPEEDS(model) kf_alone
 #define KF_VELOCITY kf_velocity
 #define KF_ACCELERATION kf_acceleration
-#define KF_AT(model, value, room) (value)
+#define KF_AT(model, value, buffer) (value)
 #endif
 #define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
 #define KF_NAMED_DRIVER(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages name; -1: all */
@@ -155,7 +155,7 @@ KF_RARE kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const doubl
 
 /* worst_case_step.c */
 #define KF_ROUNDINGS 2.0  /* of a row's terms, and of what is formed of them */
-#define KF_MOST_SOURCES 3 /* of a mechanism with more blocks those that move farthest count for all */
+#define KF_MOST_SOURCES 3 /* with more blocks, those that move farthest represent all */
 bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step);
 double kf_known_to(const kf_found *found, int block);
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight);

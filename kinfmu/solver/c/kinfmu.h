@@ -1,7 +1,7 @@
 /* The model and the solver of a mechanism in C99: libm only, no allocation, no global state.
  *
  * model.c is generated from the plan of a mechanism, sizes.h with it; all other files are the same for every
- * mechanism. The words are those of the Python run time (kinfmu/solver/python), and so are the methods, file by file.
+ * mechanism. Names and methods are those of the Python run time (kinfmu/solver/python), file by file.
  */
 #ifndef KINFMU_H
 #define KINFMU_H
@@ -14,7 +14,7 @@
 #define KF_MIXED (-1)
 #define KF_ROOM(n) ((n) > 0 ? (n) : 1) /* arrays without elements are no C */
 
-/* Hints where compilers take them: what is rarely called, and what most samples go through, best compiled as a whole. */
+/* Compiler hints: functions that are rarely called, and the function most samples go through, to be inlined as a whole. */
 #if defined(__GNUC__)
 #define KF_RARE __attribute__((cold))
 #define KF_WHOLE __attribute__((flatten))
@@ -23,7 +23,7 @@
 #define KF_WHOLE
 #endif
 
-/* What the formulas are made of besides the pose: the parameters, and what depends on them alone. */
+/* Inputs of the formulas other than the pose: the parameters, and what depends on them alone. */
 typedef struct {
     double parameters[KF_ROOM(KF_PARAMETERS)];
     double derived[KF_ROOM(KF_DERIVED)];
@@ -34,16 +34,17 @@ typedef struct {
     double along[KF_DRIVERS], rest[KF_DRIVERS]; /* speeds of the drivers, and their values */
     double kept[KF_UNKNOWNS]; /* unknowns of those blocks */
 #if KF_MIXES
-    double slopes[KF_UNKNOWNS]; /* their derivatives on the way, for KF_MIXED; all others rest */
+    double slopes[KF_UNKNOWNS]; /* their derivatives on the path, for KF_MIXED; all others rest */
 #endif
 #endif
 } kf_model;
 
 /* A pose: x holds the unknowns first, then the coordinates that are given outright, then the driver values.
  *
- * determinants: one a block, 1 far from singular; margin: the smallest of their sizes; residual: the largest length of
+ * determinants: one for each block, 1 far from singular; margin: the smallest of their sizes; residual: the largest length of
  * a block's residuals, relative to the size; moved: the largest correction of the prediction, in radians and sizes;
- * watch: the largest residual of the rows set aside; hold: what rates need of the position stage.
+ * watch: the largest residual of the watches (redundant rows, which are not solved but monitored); hold: numbers of the
+ * position stage that rates use.
  */
 typedef struct {
     double x[KF_COORDINATES];
@@ -53,8 +54,8 @@ typedef struct {
     int iterations;
 } kf_found;
 
-/* How Newton went in all blocks: their squared residuals, relative to the size, the largest, all together, and the one
- * of the block that failed; the one that it may end at; and how often it corrected.
+/* Squared residuals of the blocks after Newton, relative to the size: the largest, the sum, that of the block that failed,
+ * and that at which Newton may end; and the number of corrections.
  */
 typedef struct {
     double largest, total, failed, enough;
@@ -77,8 +78,8 @@ typedef struct {
 
 double kf_curve_at(const kf_curve *curve, int order, double x);
 
-/* The model: generated. In rates, x1, the drivers' speeds stand at the end, as their values do in x; in accelerations,
- * x2, alike. held: a flag a block, NULL for none: the block's unknowns are taken as given, not solved for.
+/* The model: generated. The rates x1 end with the drivers' speeds, as x ends with their values, and the accelerations x2
+ * with theirs. held: one flag for each block, NULL for none: the block's unknowns are given, not solved for.
  */
 extern const double kf_anchor_u[KF_DRIVERS];
 extern const double kf_anchor_z[KF_ROOM(KF_UNKNOWNS)];
@@ -86,7 +87,7 @@ extern const double kf_unknown_scales[KF_ROOM(KF_UNKNOWNS)];
 #if KF_TRACKS
 extern const int kf_block_drivers[KF_BLOCKS]; /* the driver that each block depends on; KF_MIXED: several */
 #endif
-extern const double kf_reach[KF_DRIVERS]; /* what counts as a step of one */
+extern const double kf_reach[KF_DRIVERS]; /* change that counts as a step of 1 */
 extern const int kf_block_ends[KF_ROOM(KF_BLOCKS)]; /* last unknown + 1 of each block */
 extern const int kf_block_rows[KF_ROOM(KF_BLOCKS)]; /* residuals of each block */
 extern const double kf_row_scales[KF_ROOM(KF_ROWS)]; /* of the residuals, block after block */
@@ -109,14 +110,14 @@ extern const char *const kf_watch_names[KF_ROOM(KF_WATCHES)];
 extern const char *const kf_parameter_names[KF_ROOM(KF_PARAMETERS)];
 extern const char *const kf_block_row_names[KF_ROOM(KF_BLOCKS)]; /* "Q.x, Q.y" */
 
-/* Where outputs that are coordinates stand in x, x1, x2; -1: a formula. */
+/* Indices in x, x1, x2 of outputs that are coordinates; -1: a formula. */
 extern const int kf_outputs_places[KF_ROOM(KF_OUTPUTS)];
 extern const int kf_rates_places[KF_ROOM(KF_OUTPUTS)];
 extern const int kf_accelerations_places[KF_ROOM(KF_OUTPUTS)];
 
 bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size);
 void kf_drive(const kf_model *model, double time, const double *constants, double *u, double *ud, double *udd);
-bool kf_is_outside(const kf_model *model, int block); /* true for a block that is not of the track that is followed */
+bool kf_is_outside(const kf_model *model, int block); /* whether a block is outside the track that is followed */
 int kf_solve_blocks(const kf_model *model, const double *z, const bool *held, kf_found *found,
                     kf_newton *newton); /* x of all blocks from what x predicts; -1, or the block that failed */
 void kf_velocity(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,

@@ -61,7 +61,7 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
         kf_append_place(message, target, KF_ROUGHLY, driver);
         kf_append(message, " is too far from ");
         kf_append_place(message, limit->u, KF_ROUGHLY, driver);
-        kf_append(message, ": more than %d steps on one way", KF_MOST_STEPS);
+        kf_append(message, ": more than %d steps on one path", KF_MOST_STEPS);
         return;
     }
     if (!kf_differs(target, limit->u, KF_LOCATED)) {
@@ -72,14 +72,12 @@ void kf_append_limit(char *message, const kf_limit *limit, const double *target,
         kf_append(message, " cannot be reached: the limit is ");
         kf_append_place(message, limit->u, KF_LOCATED, driver);
     }
-    kf_append(message, limit->crosses ? ", where branches of " : ", where ");
-    if (limit->block == KF_NO_BLOCK) {
-        kf_append(message, "the joints");
-    }
+    kf_append(message, limit->crosses ? ", where branches of " : "; beyond it ");
+    kf_append(message, limit->block == KF_NO_BLOCK ? "the joints" : limit->crosses ? "" : "the loop of ");
     for (k = kf_first_of(limit->block); limit->block >= 0 && k < kf_block_ends[limit->block]; ++k) {
         kf_append(message, "%s%s", k == kf_first_of(limit->block) ? "" : ", ", kf_unknown_names[k]);
     }
-    kf_append(message, limit->crosses ? " cross" : " would part");
+    kf_append(message, limit->crosses ? " cross" : " cannot close");
     if (limit->crosses && KF_DRIVERS > 1 && driver < 0) {
         kf_append(message, "; the crossing depends on several drivers, so no bridge is built");
     }

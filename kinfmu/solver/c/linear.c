@@ -59,9 +59,9 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
     return true;
 }
 
-/* The least length of a line over what is usual for it, at most 1: lines scaled to unit length hide one that vanishes.
+/* Return the smallest length of a line relative to its usual one, at most 1; scaling hides a line that vanishes.
  *
- * lines of so many entries, that begin `start` apart; entries of a line stand `step` apart.
+ * lines of so many entries, that begin `start` apart; entries of a line are `step` apart.
  */
 static double least_part(int lines, int start, int entries, int step, const double *matrix, const double *usual)
 {
@@ -202,7 +202,7 @@ void kf_qr_solve(int m, int k, const double *factors, const double *right, doubl
     }
 }
 
-/* The same for 2 x 2, where the inverse is at hand. */
+/* Return the same for 2 x 2, with the inverse written out. */
 static double reciprocal_condition_of_two(const double *matrix)
 {
     double a = matrix[0], b = matrix[1], c = matrix[2], d = matrix[3];
@@ -228,7 +228,7 @@ static double reciprocal_condition_of_two(const double *matrix)
     return fabs(a * d - b * c) / (norm * inverse_norm);
 }
 
-/* The largest entry of b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: what of b lies outside the columns of A
+/* The largest entry of b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: the part of b outside the columns of A
  * (m, k).
  */
 double kf_unclosed(int m, int k, const double *matrix, const double *right, double damping)

@@ -1,12 +1,12 @@
-/* Messages: put together piece by piece, cut where they would not fit; numbers as %g of the C locale writes them. */
+/* Messages: appended piece by piece and cut at the end of the buffer; numbers as %g of the C locale writes them. */
 #include "internal.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 
-#define KF_LARGE 1e6                /* [rad]; beyond, decimals say nothing */
+#define KF_LARGE 1e6                /* [rad]; decimals of larger numbers are meaningless */
 #define KF_MORE 6                   /* digits that such numbers have before the point */
-#define KF_DEGREE 57.29577951308232 /* to a radian */
+#define KF_DEGREE 57.29577951308232 /* degrees in a radian */
 
 void kf_append(char *message, const char *format, ...)
 {
@@ -17,41 +17,43 @@ void kf_append(char *message, const char *format, ...)
     va_end(arguments);
 }
 
-/* A number, with a point whatever the locale says. */
+/* Append a number with a decimal point in every locale. */
 void kf_append_number(char *message, const char *format, double value)
 {
-    char *written = message + strlen(message);
+    char *text = message + strlen(message);
     kf_append(message, format, value == value ? value : fabs(value)); /* a NaN is printed without its sign */
-    for (; *written != '\0'; ++written) {
-        if (*written == ',') {
-            *written = '.';
+    for (; *text != '\0'; ++text) {
+        if (*text == ',') {
+            *text = '.';
         }
     }
 }
 
-/* A number to so many decimals, without zeros at its end. */
+/* Append a number with at most `count` decimals, without zeros at its end. */
 static void append_decimals(char *message, int count, double value)
 {
-    char *const written = message + strlen(message);
+    char *const text = message + strlen(message);
     char format[16];
     const bool is_large = !(value > -KF_LARGE && value < KF_LARGE);
     snprintf(format, sizeof format, is_large ? "%%.%dg" : "%%.%df",
              is_large && count > KF_ROUGHLY ? count + KF_MORE : count);
     kf_append_number(message, format, value);
-    if (!is_large && strchr(written, '.') != NULL) {
-        char *end = written + strlen(written);
+    if (!is_large && strchr(text, '.') != NULL) {
+        char *end = text + strlen(text);
         while (end[-1] == '0') {
             --end;
         }
         end -= end[-1] == '.';
         *end = '\0';
     }
-    if (strcmp(written, "-0") == 0) {
-        strcpy(written, "0");
+    if (strcmp(text, "-0") == 0) {
+        strcpy(text, "0");
     }
 }
 
-/* "crank = 1.047198 rad (60 deg)": driver values, of one driver or of all; angles to so many decimals, lengths to so many digits. */
+/* Append "crank = 1.047198 rad (60 deg)": driver values, of one driver or of all;
+ * digits: decimals of angles, digits of lengths.
+ */
 void kf_append_place(char *message, const double *u, int digits, int driver)
 {
     char format[16];
@@ -74,7 +76,7 @@ void kf_append_place(char *message, const double *u, int digits, int driver)
     }
 }
 
-/* True if kf_append_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
+/* Return whether kf_append_place shows a driver of two places with different digits: of an angle, in rad and in degrees. */
 bool kf_differs(const double *a, const double *b, int digits)
 {
     char format[16];

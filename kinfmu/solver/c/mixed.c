@@ -5,7 +5,7 @@
 
 #if KF_MIXES
 
-/* What the blocks that depend on several drivers have of a pose of the whole. */
+/* Return the part of a pose of the whole mechanism with the blocks that depend on several drivers. */
 static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
 {
     double margin = INFINITY;
@@ -23,8 +23,8 @@ static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
     return share;
 }
 
-/* One step of all blocks; false if those that depend on several drivers cannot be trusted to stay on their branch; a
- * failed pose if the tracks end before.
+/* Take one step of all blocks, or find a failed pose if the tracks end before it; false if the blocks that depend on several
+ * drivers cannot be trusted to stay on their branch.
  */
 static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const double *target, kf_pose *there)
 {
@@ -59,7 +59,7 @@ static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const 
     return true;
 }
 
-/* Where the way of the blocks that depend on several drivers ends, just beyond a pose. */
+/* Find where the path of the blocks that depend on several drivers ends, just beyond a pose. */
 static void mixed_limit(kf_solver *solver, const kf_pose *before, kf_pose *pose, const double *direction, kf_limit *limit)
 {
     kf_pose *const share = solver->scratch.share;
@@ -76,7 +76,7 @@ static kf_status ended(kf_solver *solver, const kf_limit *limit, const double *t
     return kf_failed(pose, KF_OUTSIDE);
 }
 
-/* A place for one more pose beside those that are needed. */
+/* Return a place for one more pose that holds none of those needed. */
 static kf_pose *spare(kf_solver *solver, const kf_pose *pose, const kf_pose *before, const kf_pose *regular)
 {
     kf_pose *place = solver->scratch.whole;
@@ -86,9 +86,9 @@ static kf_pose *spare(kf_solver *solver, const kf_pose *pose, const kf_pose *bef
     return place;
 }
 
-/* The pose at `target`: blocks that depend on several drivers follow the tracks in trusted steps.
+/* Find the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
  *
- * The drivers go straight. As in kf_advance, but at each step the tracks are solved first, and the other blocks are
+ * The path is straight, as in kf_advance, but at each step the tracks are solved first, and the other blocks are
  * predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
  */
 kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *target, kf_pose *found)

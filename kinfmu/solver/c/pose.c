@@ -4,7 +4,7 @@
 const double kf_alone[KF_DRIVERS] = {1.0};
 const double kf_at_rest[KF_DRIVERS > KF_UNKNOWNS ? KF_DRIVERS : KF_ROOM(KF_UNKNOWNS)] = {0.0};
 
-/* A pose just found: nothing is known of it but its road. */
+/* Reset all that a pose holds besides what was found, with this singularity map. */
 inline void kf_fresh(kf_pose *pose, int map, double low, double high)
 {
     pose->low = low;
@@ -19,15 +19,15 @@ inline void kf_fresh(kf_pose *pose, int map, double low, double high)
 #endif
 }
 
-/* What kf_position gives for unknowns that are known: held blocks are not solved for. s = -0.0 at rest leaves z as it
- * is, to the bit.
+/* Call kf_position at given unknowns; held blocks are not solved for. With s = -0.0 and zero rates z stays as it is, to the
+ * bit.
  */
 bool kf_evaluated(const kf_model *model, const double *u, const double *z, const bool *held, kf_found *found)
 {
     return kf_position(model, u, z, kf_at_rest, kf_at_rest, -0.0, held, found) < 0;
 }
 
-/* The same where nothing is solved for. */
+/* The same with all blocks held. */
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found)
 {
     bool all[KF_ROOM(KF_BLOCKS)];
@@ -35,7 +35,7 @@ bool kf_evaluated_as_given(const kf_model *model, const double *u, const double 
     return kf_evaluated(model, u, z, all, found);
 }
 
-/* First and second derivative of all coordinates with respect to the only driver. */
+/* Form first and second derivative of all coordinates with respect to the only driver. */
 inline void kf_tangent(const kf_model *model, kf_pose *pose)
 {
     if (pose->derivatives < 1) {
@@ -49,7 +49,7 @@ inline void kf_tangent(const kf_model *model, kf_pose *pose)
 
 #if KF_TRACKS
 
-/* The model of a track: of the blocks that depend on one driver alone. All others stay as the anchor has them. */
+/* Restrict the model to a track, the blocks that depend on one driver alone. All others stay as in the anchor. */
 void kf_enter_track(kf_solver *solver, int driver)
 {
     kf_model *const model = &solver->model;
@@ -67,8 +67,8 @@ void kf_enter_track(kf_solver *solver, int driver)
 
 #if KF_MIXES
 
-/* The model of the blocks that depend on several drivers, while all others are at unknowns z, and move: slopes are their
- * derivatives along the way that the drivers go, second derivatives are 0.
+/* Restrict the model to the blocks that depend on several drivers, while all others are at unknowns z and move: slopes are
+ * their derivatives along the path of the drivers, second derivatives are 0.
  */
 void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes)
 {
@@ -84,31 +84,31 @@ void kf_enter_mixed(kf_solver *solver, const double *z, const double *slopes)
 
 #endif
 
-/* The whole model again. */
+/* Return to the whole model. */
 void kf_leave_track(kf_solver *solver)
 {
     solver->model.track = 0;
 }
 
-/* Driver values of which one is given and the others rest. */
-const double *kf_driven_at(const kf_model *model, const double *value, double *room)
+/* Return driver values of which one is given and the others rest. */
+const double *kf_driven_at(const kf_model *model, const double *value, double *buffer)
 {
-    memcpy(room, model->rest, KF_DRIVERS * sizeof(double));
-    room[KF_ALONG_OF(model)] = *value;
-    return room;
+    memcpy(buffer, model->rest, KF_DRIVERS * sizeof(double));
+    buffer[KF_ALONG_OF(model)] = *value;
+    return buffer;
 }
 
 /* Blocks whose unknowns are given: those that are held, and those outside a track. */
-static const bool *given_blocks(const kf_model *model, const bool *held, bool *room)
+static const bool *given_blocks(const kf_model *model, const bool *held, bool *buffer)
 {
     int k;
     for (k = 0; k < KF_BLOCKS; ++k) {
-        room[k] = model->outside[k] || (held != NULL && held[k]);
+        buffer[k] = model->outside[k] || (held != NULL && held[k]);
     }
-    return room;
+    return buffer;
 }
 
-/* Derivatives of the unknowns outside a track: they rest, but beside blocks that depend on several drivers. */
+/* Derivatives of the unknowns outside a track: they are 0, except for blocks that depend on several drivers. */
 static const double *slopes_of(const kf_model *model)
 {
 #if KF_MIXES
@@ -120,16 +120,16 @@ static const double *slopes_of(const kf_model *model)
     return kf_at_rest;
 }
 
-/* What is given of the unknowns. */
-static const double *given_rates(const kf_model *model, const double *outside, const double *given, double *room)
+/* Return the derivatives given of the unknowns. */
+static const double *given_rates(const kf_model *model, const double *outside, const double *given, double *buffer)
 {
     int block, k = 0;
     for (block = 0; block < KF_BLOCKS; ++block) {
         for (; k < kf_block_ends[block]; ++k) {
-            room[k] = model->outside[block] ? outside[k] : given == NULL ? 0.0 : given[k];
+            buffer[k] = model->outside[block] ? outside[k] : given == NULL ? 0.0 : given[k];
         }
     }
-    return room;
+    return buffer;
 }
 
 void kf_rates(const kf_model *model, const kf_found *found, const double *ud, const double *given, const bool *held,

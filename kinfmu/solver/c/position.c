@@ -6,7 +6,7 @@
 #define KF_ROUND_OFF 4e-16 /* residual relative to the size that Newton may end at: see kinfmu/codegen/newton.py */
 #define KF_POLISHED 0.1    /* determinant below which it goes on: see kinfmu/solver/python/pose.py */
 
-/* The largest residual of the rows set aside. */
+/* Return the largest residual of the watches. */
 static inline double watched(const kf_model *model, const kf_found *found)
 {
     double watches[KF_ROOM(KF_WATCHES)], largest = 0.0, total = 0.0;
@@ -20,7 +20,7 @@ static inline double watched(const kf_model *model, const kf_found *found)
     return total < INFINITY ? largest : total;
 }
 
-/* True for a block that is not of the track that is followed. */
+/* Return whether a block is outside the track that is followed. */
 inline bool kf_is_outside(const kf_model *model, int block)
 {
 #if KF_TRACKS
@@ -86,7 +86,7 @@ static inline int solved(const kf_model *model, const double *z, const bool *hel
     return -1;
 }
 
-/* True if a block that is solved for is near a singular pose. */
+/* Return whether a block that is solved for is near a singular pose. */
 static bool is_polished(const bool *held, const kf_found *found)
 {
     int k;
@@ -152,7 +152,7 @@ inline int kf_position(const kf_model *model, const double *u, const double *z, 
     }
 #if KF_TRACKS
     if (model->track != 0) {
-        found->watch = 0.0; /* rows set aside are of the whole */
+        found->watch = 0.0; /* watches belong to the whole model */
         return -1;
     }
 #endif

@@ -27,7 +27,7 @@ KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status)
     return status;
 }
 
-/* A pose counts only if its rows close and the rows set aside as redundant hold too. */
+/* Set status and message of a pose whose rows or watches do not close. */
 static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
 {
     char *const message = solver->message;
@@ -35,22 +35,22 @@ static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
     int k, most = 0;
     kf_append_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_NAMED_DRIVER(solver));
     if (!(pose->found.residual <= solver->tolerance)) {
-        kf_append(message, ": residual ");
+        kf_append(message, ": the rows do not close: residual ");
         kf_append_number(message, "%.2g", pose->found.residual);
-        kf_append(message, " of the size is left");
+        kf_append(message, " of the size");
         return pose->status = KF_NOT_CONVERGED;
     }
     kf_watches(&solver->model, &pose->found, watches);
     for (k = 1; k < KF_WATCHES; ++k) {
         most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
     }
-    kf_append(message, ": the redundant row %s is open by ", kf_watch_names[most]);
+    kf_append(message, ": redundant row %s does not close: gap ", kf_watch_names[most]);
     kf_append_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
     kf_append(message, " %s", kf_length_unit);
     return pose->status = KF_INCONSISTENT;
 }
 
-/* The pose that a way starts from where the pose has no tangent to go on by. */
+/* Return the pose from which a path starts if the pose itself has no tangent. */
 static KF_RARE kf_pose *base_of(kf_solver *solver, const kf_pose *pose)
 {
     kf_pose *const base = &solver->scratch.base;
@@ -76,7 +76,7 @@ static inline bool is_same(const double *a, const double *b)
     return same;
 }
 
-/* Away from all that is singular: one trusted step. What is new on the road there is told by its number. */
+/* Take one trusted step; false near singular points, where `map` is the map with what is new there. */
 static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose, int *map)
 {
     const double longest = KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)], s = u[KF_ALONG(solver)] - KF_HERE(solver, start);
@@ -97,7 +97,7 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
     return false;
 }
 
-/* The pose, rejected if its rows do not close or the rows set aside as redundant do not hold. */
+/* Reject the pose if its rows or its watches do not close. */
 kf_status kf_checked(kf_solver *solver, kf_pose *pose)
 {
     if (!(pose->found.residual <= solver->tolerance && pose->found.watch <= solver->tolerance)) {
@@ -107,7 +107,7 @@ kf_status kf_checked(kf_solver *solver, kf_pose *pose)
     return pose->status;
 }
 
-/* The pose at the driver values of the start: the start itself, unless nothing has judged it yet, as the anchor. */
+/* Find the pose at the driver values of the start: the start itself, or its checked copy if it is the anchor. */
 static kf_status again(kf_solver *solver, kf_pose *start, kf_pose *pose)
 {
     const kf_pose *found = NULL;
@@ -177,9 +177,7 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
     return kf_checked(solver, pose);
 }
 
-/* Outputs, rates and accelerations from the derivatives that the pose holds: those with respect to the only driver, or
- * those in time.
- */
+/* Form outputs, rates and accelerations from the derivatives of the pose: with respect to the only driver, or in time. */
 inline void kf_outputs_of(const kf_model *model, const kf_pose *pose, const double *ud, const double *udd,
                           double *outputs, double *rates, double *accelerations)
 {
@@ -208,7 +206,7 @@ inline void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, 
 #endif
     if ((rates != NULL || accelerations != NULL) && pose->derivatives < 1) {
         KF_VELOCITY(model, &pose->found, one ? kf_alone : ud, NULL, NULL, pose->x1);
-        pose->derivatives = one ? 1 : 0; /* of the single driver they stay true */
+        pose->derivatives = one ? 1 : 0; /* those with respect to the single driver stay valid */
     }
     if (accelerations != NULL && pose->derivatives < 2) {
         KF_ACCELERATION(model, &pose->found, one ? kf_at_rest : udd, pose->x1, NULL, NULL, pose->x2);

@@ -1,18 +1,18 @@
 /* The solver: follows the branch of a mechanism that its anchor lies on. See kinfmu/solver/python/solver.py.
  *
- *     static kf_solver solver;                        zeroed memory: then equal runs leave equal bytes
+ *     static kf_solver solver;                        zeroed memory, so that equal runs leave equal bytes
  *     kf_pose poses[2];
  *     kf_solver_start(&solver);
  *     kf_solve(&solver, &solver.anchor, u, &poses[0]);
  *     kf_motion(&solver, &poses[0], ud, udd, outputs, rates, accelerations);
  *     kf_solve(&solver, &poses[0], next_u, &poses[1]);    and so on, in turns: what is found is not copied
  *
- * State is in the poses. A pose that is found on a trial changes nothing about another one found later from the same
- * start. What a pose knows of singular points on its way is kept in the solver, since it is large and rarely changes;
- * the pose tells its road there by number. kf_solve keeps what its start refers to, and what it finds; what any other
+ * State is in the poses. A trial pose does not affect another one found later from the same
+ * start. The singularity map of a pose is kept in the solver, since it is large and rarely changes;
+ * the pose refers to it by number. kf_solve keeps what its start refers to, and what it finds; what any other
  * pose refers to may be overwritten. So after kf_solve(s, a, u, b) go on from a (another trial) or from b (it is
- * accepted), and from the anchor at any time; a third pose that was kept aside is to be kept together with a copy of
- * its solver.
+ * accepted), and from the anchor at any time; a third pose must be kept together with a copy of its
+ * solver.
  *
  * There are no pointers inside: copies of the solver and of the poses, byte by byte, are the whole state, and do the
  * same to the bit wherever they are copied to, in another instance too. Of the solver the first KF_SOLVER_STATE bytes
@@ -30,15 +30,15 @@
 typedef enum {
     KF_OK,
     KF_NEAR_SINGULAR, /* right, but with fewer digits: see kf_errors */
-    KF_BRIDGED,       /* interpolated across a singular point, proved by closing */
+    KF_BRIDGED,       /* interpolated across a singular point; the interpolated pose closes */
     KF_OUTSIDE,       /* the drivers cannot take the mechanism there */
-    KF_INCONSISTENT,  /* a constraint set aside as redundant does not hold there */
+    KF_INCONSISTENT,  /* a watch (a redundant row that is monitored) does not close there */
     KF_NOT_CONVERGED
 } kf_status;
 
 #define KF_GOOD(status) ((status) <= KF_BRIDGED) /* the pose holds numbers */
 
-/* What a pose of the whole has of one driver's track: where to go on from, and what is known there. */
+/* The part of a pose of the whole mechanism that belongs to one driver's track: base, singularity map and bridge. */
 typedef struct {
     kf_status status;
     int map, bridge, base_bridge;
@@ -46,12 +46,12 @@ typedef struct {
     double base_u, base_z[KF_ROOM(KF_UNKNOWNS)];
 } kf_track_pose;
 
-/* A pose that was found. If it is not good, nothing but its status says anything.
+/* A pose that was found. If it is not good, only its status is defined.
  *
  * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
- * high: the stretch around the pose that is free of windows of bridges; road: what is known of singular points, -1:
- * nothing; bridge: the one that the pose is interpolated by, or -1. A pose at a dead centre has no tangent to go on
- * by: the next way starts from its base, the last regular pose before it, to which map, low and high then belong.
+ * high: the interval around the pose without windows of bridges; map: number of its singularity map, -1: empty; bridge: that
+ * by which the pose is interpolated, or -1. A dead centre has no tangent that the next path could start with: that starts
+ * from its base, the last regular pose before it, to which map, low and high then belong.
  */
 typedef struct {
     kf_found found;
@@ -74,7 +74,7 @@ typedef struct {
 
 #define KF_POSE_U(pose) ((pose)->found.x + KF_COORDINATES - KF_DRIVERS) /* its driver values */
 
-/* What is interpolated across a singular point, from six regular poses: see kinfmu/solver/python/span.py. */
+/* Interpolation across a singular point from six regular poses: see kinfmu/solver/python/span.py. */
 #define KF_NODES 6
 typedef struct {
     double centre, half;
@@ -110,31 +110,31 @@ typedef struct {
     double u[KF_NODES]; /* of the nodes, moved; the window is between the third and the fourth */
 } kf_bridge;
 
-/* A stretch where no zero of a block's determinant is to be sought (again). */
+/* Driver values between which a block's determinant was searched for a zero: none is bridged there. */
 typedef struct {
     double low, high;
     int block;
 } kf_interval;
 
-/* What is known of the singular points on the way of a single driver: see kinfmu/solver/python/road.py. */
+/* The singular points known so far along one driver: see kinfmu/solver/python/singularity_map.py. */
 #define KF_KEPT 32 /* of each kind, the latest */
 #define KF_IS_FOLLOWED (KF_DRIVERS == 1 || KF_TRACKS) /* along one driver: there are bridges */
-#define KF_INTERVALS (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* of one place there may be one a block */
+#define KF_INTERVALS (KF_IS_FOLLOWED ? KF_KEPT + KF_BLOCKS : 1) /* at one place there may be one for each block */
 typedef struct {
     int bridges, intervals;
     int bridge[KF_KEPT]; /* their numbers in the solver, the latest last */
     kf_interval searched[KF_INTERVALS];
 } kf_singularity_map;
 
-/* At once there live the roads of the start, of the pose under way and of the last regular one, and one that is new.
+/* In use at the same time are the maps of the start, of the current pose and of the last regular one, and a new one.
  * Bridges on later turns share the span of the first; where there are more singular points than KF_SPANS, the last are
- * not bridged. Blocks of several drivers follow the tracks piece by piece: the roads of the first start are needed too.
+ * not bridged. Blocks of several drivers follow the tracks step by step: the maps of the first start are needed too.
  */
 #define KF_MAPS (KF_IS_FOLLOWED ? 4 + KF_MIXES : 1)
 #define KF_BRIDGES (KF_IS_FOLLOWED ? (3 + KF_MIXES) * KF_KEPT + 1 : 1)
 #define KF_SPANS (KF_IS_FOLLOWED ? KF_KEPT + 8 : 1)
 
-/* What is known along one driver. */
+/* Maps, bridges and spans along one driver. */
 typedef struct {
     kf_singularity_map maps[KF_MAPS];
     kf_bridge bridges[KF_BRIDGES];
@@ -143,26 +143,26 @@ typedef struct {
 
 #define KF_POOLS (KF_TRACKS ? KF_DRIVERS : 1)
 
-/* What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held. */
+/* Errors of the unknowns: of z, of the derivatives by rounding, and the derivatives given of held blocks. */
 typedef struct {
     double z[KF_ROOM(KF_UNKNOWNS)], first[KF_ROOM(KF_UNKNOWNS)], second[KF_ROOM(KF_UNKNOWNS)];
     double given_first[KF_ROOM(KF_UNKNOWNS)], given_second[KF_ROOM(KF_UNKNOWNS)];
-    double missed[3]; /* what adds to the outputs and their derivatives, as lengths miss a change point */
+    double missed[3]; /* errors of outputs and their derivatives because lengths miss a change point */
     bool is_given;
 } kf_source;
 
 #define KF_INNERS 2 /* as many as most mechanisms have singular points */
 
-/* What does not outlive a call, but for the polynomials read last, which may be of use again. */
+/* Memory of a single call; the polynomials used last are kept, since the next call may use them again. */
 typedef struct {
     kf_inner inner[KF_INNERS];
-    kf_pose base, poses[4], follow[2], beside, located;
+    kf_pose base, poses[4], follow[2], nearby, located;
 #if KF_TRACKS
     kf_pose track[2];
 #endif
 #if KF_MIXES
     kf_pose whole[4], share[2];
-    int origin[KF_DRIVERS]; /* roads of the tracks where a way of several drivers starts: needed until it ends */
+    int origin[KF_DRIVERS]; /* maps of the tracks where a path of several drivers starts: needed until it ends */
 #endif
     kf_model ahead;
     kf_source source;
@@ -170,17 +170,17 @@ typedef struct {
     double z[KF_ROOM(KF_UNKNOWNS)], zd[KF_ROOM(KF_UNKNOWNS)], zdd[KF_ROOM(KF_UNKNOWNS)];
     double determinants[3][KF_ROOM(KF_BLOCKS)]; /* of nodes around a zero */
     double x1[KF_COORDINATES], x2[KF_COORDINATES];
-    int live[3]; /* roads that are needed */
+    int live[3]; /* maps that are needed */
 } kf_scratch;
 
 /* tolerance: residual relative to the size above which a pose is not good (Newton always goes to round-off); anchor:
- * where all ways start; message: why the last pose that is not good could not be had.
+ * where all paths start; message: the reason of the last failure.
  */
 typedef struct {
     kf_model model;
     double tolerance;
     kf_pose anchor;
-    bool unsolvable; /* the parameters cannot be had: every pose fails, and the message says why */
+    bool unsolvable; /* the parameters have no solution: every pose fails, and the message states why */
     char message[KF_MESSAGE];
     kf_pool pools[KF_POOLS];
     kf_scratch scratch;
@@ -188,17 +188,17 @@ typedef struct {
 
 #define KF_SOLVER_STATE offsetof(kf_solver, scratch)
 
-/* Parameters as written, tolerance 1e-9. */
+/* Start with the parameters of the mechanism and tolerance 1e-9. */
 void kf_solver_start(kf_solver *solver);
 
-/* Values of the parameters (KF_PARAMETERS), followed from what is written with the drivers at rest; the tolerance
- * stays. false: they cannot be had, the message says why, and every pose fails with it. Poses found before are void.
+/* Set the parameters (KF_PARAMETERS), followed from those of the mechanism with the drivers at rest; the tolerance stays.
+ * false: they have no solution, the message states why, and every pose fails with it. Poses found before are invalid.
  */
 bool kf_solver_bind(kf_solver *solver, const double *parameters);
 
 /* The pose at driver values u (KF_DRIVERS), followed from the good pose `start`, another one, in a straight line of
  * the driver values. The start stays what it is; derivatives that it has not been asked for yet are added to it. The
- * status is that of the pose; if it is not good, the solver's message says why, in one line.
+ * status is that of the pose; if it is not good, the solver's message states why, in one line.
  */
 kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
 
@@ -209,7 +209,7 @@ void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const d
                double *rates, double *accelerations);
 
 /* Estimated errors of the outputs, their rates and accelerations, the largest of each, in radians and sizes; infinite
- * where nothing is known of them. See kinfmu/solver/python/estimate.py.
+ * where they are unknown. See kinfmu/solver/python/estimate.py.
  */
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
 

@@ -1,4 +1,4 @@
-/* Span: what is interpolated across a singular point, from six regular poses around it. See kinfmu/solver/python/span.py. */
+/* Span: interpolation across a singular point from six regular poses around it. See kinfmu/solver/python/span.py. */
 #include "internal.h"
 
 static const double inner_places[4] = {-2.0, -1.0, 1.0, 2.0}; /* of the nodes, in half widths */
@@ -6,7 +6,7 @@ static const double outer_places[4] = {-4.0, -2.0, 2.0, 4.0};
 static const int inner_nodes[4] = {1, 2, 3, 4};
 static const int outer_nodes[4] = {0, 1, 4, 5};
 
-/* What the nodes count for the centre: kf_weights at 0 of the places above. */
+/* Weights of the nodes at the centre: kf_weights at 0 of the places above. */
 static const double inner_weights[4][3] = {{-0.2901234567901234, -0.09722222222222143, -0.009259259259259522},
                                            {0.7901234567901234, 0.1481481481481488, 0.14814814814814792},
                                            {0.7901234567901234, -0.14814814814814814, 0.14814814814814814},
@@ -16,7 +16,7 @@ static const double outer_weights[4][3] = {{-0.2901234567901234, -0.194444444444
                                            {0.7901234567901234, -0.2962962962962963, 0.5925925925925926},
                                            {-0.2901234567901235, 0.19444444444444445, -0.037037037037037035}};
 
-/* Take a pose for a node. */
+/* Store a pose as a node. */
 void kf_span_node(kf_span *span, int place, kf_pose *node, const kf_model *model)
 {
     const size_t size = KF_UNKNOWNS * sizeof(double);
@@ -37,7 +37,7 @@ static void exchange(double *a, double *b, int count)
     }
 }
 
-/* The nodes in the opposite order. */
+/* Reverse the order of the nodes. */
 void kf_span_reverse(kf_span *span)
 {
     int k;
@@ -83,7 +83,7 @@ void kf_span_middle(const kf_span *span, double *z)
     kf_combined(span, span->half, 4, inner_nodes, inner_weights, z);
 }
 
-/* Largest difference of what the inner and the outer nodes say at the centre, in radians and sizes. */
+/* Return the largest difference of the inner and the outer nodes at the centre, in radians and sizes. */
 double kf_span_apart(const kf_span *span)
 {
     double inner[KF_ROOM(KF_UNKNOWNS)], outer[KF_ROOM(KF_UNKNOWNS)], apart = 0.0;
@@ -122,7 +122,7 @@ static void read_at(const kf_hermite *polynomial, double half, double x, double 
 }
 
 /* Make the inner polynomials, unless they are those that were read last: most samples in a window follow another one.
- * What they were made from tells, so that it does not matter how this memory came about.
+ * They are compared by the nodes they were made from, so that copied memory is valid, too.
  */
 static void make_inner(const kf_span *span, kf_inner *inner)
 {
@@ -151,7 +151,7 @@ void kf_span_read(const kf_span *span, kf_inner *inner, double x, double *z, dou
     }
 }
 
-/* What the outer nodes say less than the inner ones: the error estimate. */
+/* Return the difference of inner and outer nodes: the error estimate. */
 void kf_span_difference(const kf_span *span, kf_inner *inner, double x, double *z, double *zd, double *zdd)
 {
     int k;

@@ -2,14 +2,14 @@
 #include "internal.h"
 
 /* Return a pose at a distance from another, on the side where a block's determinant grows; NULL if there is none. */
-static kf_pose *beside(kf_solver *solver, kf_pose *pose, int block, double distance)
+static kf_pose *nearby(kf_solver *solver, kf_pose *pose, int block, double distance)
 {
     int k;
     for (k = 0; k < 2; ++k) {
         const kf_pose *const other = kf_follow_path(solver, pose, KF_HERE(solver, pose) + (k == 0 ? distance : -distance));
         if (other != NULL && fabs(other->found.determinants[block]) > fabs(pose->found.determinants[block])) {
-            solver->scratch.beside = *other; /* paths start from it */
-            return &solver->scratch.beside;
+            solver->scratch.nearby = *other; /* paths start from it */
+            return &solver->scratch.nearby;
         }
     }
     return NULL;
@@ -37,7 +37,7 @@ int kf_surveyed(kf_solver *solver, kf_pose *pose, kf_pose *trial)
             return kf_with_bridge(solver, map, again);
         }
     }
-    before = fabs(here - KF_HERE(solver, pose)) > 1e-3 * reach ? pose : beside(solver, trial, block, 0.02 * reach);
+    before = fabs(here - KF_HERE(solver, pose)) > 1e-3 * reach ? pose : nearby(solver, trial, block, 0.02 * reach);
     for (; before != NULL && block < KF_BLOCKS; ++block) { /* upstream first */
         const double from = KF_HERE(solver, before), of_from = before->found.determinants[block];
         kf_interval searched;

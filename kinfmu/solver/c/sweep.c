@@ -2,9 +2,9 @@
  *
  * With several drivers, or where the model has no lanes, each sample is followed from the last good one. With one driver
  * samples are predicted from segments, in whatever order they come, corrected side by side in lanes, and checked: residual,
- * determinants, corrections and rows set aside. What fails a check is left for later: samples in the window of a bridge are
- * read from it side by side too, and closed; what then is left, beside a singular point or a limit, is solved as if it were
- * alone.
+ * determinants, corrections and rows set aside. Samples that fail a check are left for later: samples in the window of a bridge are
+ * read from it side by side too, and closed; those then left, near a singular point or a limit, are solved one by
+ * one.
  */
 #include "sweep.h"
 
@@ -73,7 +73,7 @@ static void put_gap(kf_job *job, int64_t sample, kf_status status)
     }
 }
 
-/* Why a sample failed, if it is the first of its stretch: it was the last one to be solved. */
+/* Store why a sample failed, if it is the first of its interval; it was the last one to be solved. */
 static void tell_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
 {
     if (sample > 0 && !KF_GOOD((kf_status)job->outcomes[sample - 1].status)) {
@@ -86,7 +86,7 @@ static void tell_failure(const kf_sweep *sweep, kf_job *job, int64_t sample)
     ++job->failure_count;
 }
 
-/* The pose whole turns of the driver on, where the mechanism repeats; a pose that is not good as it is. */
+/* Return the pose moved by whole turns of the driver, where the mechanism repeats; a pose that is not good as it is. */
 static kf_pose *turned(kf_sweep *sweep, kf_pose *pose, const double *u, double turns)
 {
     kf_pose *const there = &sweep->raised_pose;
@@ -136,7 +136,7 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
 
 #if KF_HAS_LANES
 
-/* True for jobs large enough to be worth segments. */
+/* Return whether a job is large enough to be worth segments. */
 static bool goes_side_by_side(const kf_sweep *sweep, const kf_job *job)
 {
     return job->count >= 4 * KF_LANES && !sweep->follower.solver.unsolvable;
@@ -145,7 +145,7 @@ static bool goes_side_by_side(const kf_sweep *sweep, const kf_job *job)
 /* Keep a sample for later; false if memory ran out. */
 bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample)
 {
-    const double u = isnan(job->u[sample]) ? INFINITY : job->u[sample]; /* what has no place in the order comes last */
+    const double u = isnan(job->u[sample]) ? INFINITY : job->u[sample]; /* NaN comes last in the order */
     kf_list *const list = &sweep->alone;
     double turns;
     if (list->count == list->capacity) {
@@ -168,8 +168,8 @@ static int in_order(const void *a, const void *b)
     return (left > right) - (left < right);
 }
 
-/* Samples from..to (excluded) of those that are left, followed from the anchor. What lies behind a sample that cannot be
- * reached cannot be reached either.
+/* Samples from..to (excluded) of those that are left, followed from the anchor. Samples beyond an unreachable one are
+ * unreachable, too.
  */
 static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_t to)
 {
@@ -268,7 +268,7 @@ bool kf_drive_all(int64_t count, const double *times, const double *parameters, 
     return true;
 }
 
-/* Of a sample that is good; if it is not when it is followed another way, as may happen at a limit, nothing is known. */
+/* Estimate a good sample; if it is not good when followed on another path, as may happen at a limit, nothing is known. */
 static void diagnose(kf_sweep *sweep, const kf_job *job, int64_t sample, double *margin, double *errors)
 {
     kf_pose *const pose = kf_followed(&sweep->follower, job->u + sample * KF_DRIVERS);

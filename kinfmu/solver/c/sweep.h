@@ -6,7 +6,7 @@
 
 #include "solver.h"
 
-/* A table of count samples by outputs; sample i, output j stands at start[i * row + j * column]. start NULL: not wanted. */
+/* A table of count samples by outputs; sample i, output j is at start[i * row + j * column]. start NULL: not wanted. */
 typedef struct {
     double *start;
     ptrdiff_t row, column;
@@ -17,10 +17,10 @@ typedef struct {
     int32_t status, iterations;
 } kf_outcome;
 
-/* What is to be solved and where it goes.
+/* Samples to be solved and the tables to be filled.
  *
  * u, ud, udd: (count, KF_DRIVERS); tables: values, rates, accelerations; outcomes, residual: (count); watches:
- * (count, KF_WATCHES). What cannot be reached is NaN. failures: the first sample of each stretch that cannot be reached,
+ * (count, KF_WATCHES). Unreachable samples are NaN. failures: the first sample of each unreachable interval,
  * up to most_failures of them, with the messages (most_failures, KF_MESSAGE).
  */
 typedef struct {
@@ -41,7 +41,7 @@ typedef struct kf_sweep kf_sweep;
 kf_sweep *kf_sweep_new(double tolerance);
 void kf_sweep_free(kf_sweep *sweep);
 
-/* Parameters followed from those written; false: kf_sweep_message says why they cannot be had. */
+/* Set the parameters, followed from those of the mechanism; false: no solution, kf_sweep_message states why. */
 bool kf_sweep_bind(kf_sweep *sweep, const double *parameters);
 const char *kf_sweep_message(const kf_sweep *sweep);
 
@@ -52,7 +52,7 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job);
 bool kf_sweep_diagnose(kf_sweep *sweep, const kf_job *job, double *margin, double *errors);
 
 /* (count, KF_DRIVERS) driver values, speeds and accelerations at times, by the laws, with these parameters; false if
- * they cannot be had.
+ * they have no solution.
  */
 bool kf_drive_all(int64_t count, const double *times, const double *parameters, const double *constants, double *u,
                   double *ud, double *udd);

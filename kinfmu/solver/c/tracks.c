@@ -1,18 +1,18 @@
-/* Tracks: what depends on one driver alone is followed along that driver. See kinfmu/solver/python/tracks.py. */
+/* Tracks: blocks that depend on one driver alone are followed along that driver. See kinfmu/solver/python/tracks.py. */
 #include "internal.h"
 
 #if KF_TRACKS
 
-/* The pose of a track that a pose of the whole was put together from. */
+/* Return the track's part of a pose of the whole mechanism. */
 kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
 {
     kf_pose *const own = &solver->scratch.track[0];
     const double u = KF_POSE_U(whole)[driver];
     const kf_track_pose *const known = &whole->own[driver];
-    double z[KF_UNKNOWNS], room[KF_DRIVERS];
+    double z[KF_UNKNOWNS], buffer[KF_DRIVERS];
     int block, k = 0;
     if (whole->has_tracks && known->bridge >= 0) {
-        kf_bridge_pose(solver, known->bridge, kf_driven_at(&solver->model, &u, room), own);
+        kf_bridge_pose(solver, known->bridge, kf_driven_at(&solver->model, &u, buffer), own);
     } else {
         for (block = 0; block < KF_BLOCKS; ++block) {
             for (; k < kf_block_ends[block]; ++k) {
@@ -20,7 +20,7 @@ kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
             }
         }
         kf_fresh(own, -1, -INFINITY, INFINITY);
-        kf_evaluated_as_given(&solver->model, kf_driven_at(&solver->model, &u, room), z, &own->found);
+        kf_evaluated_as_given(&solver->model, kf_driven_at(&solver->model, &u, buffer), z, &own->found);
     }
     if (whole->has_tracks) {
         own->status = known->status;
@@ -36,7 +36,7 @@ kf_pose *kf_on_track(kf_solver *solver, const kf_pose *whole, int driver)
     return own;
 }
 
-/* What a pose of the whole keeps of the pose of a track. */
+/* Store the pose of a track in a pose of the whole mechanism. */
 static void keep(kf_solver *solver, const kf_pose *own, int driver, kf_pose *whole, double *z)
 {
     kf_track_pose *const kept = &whole->own[driver];
@@ -74,7 +74,7 @@ static bool has_track(int driver)
     return block < KF_BLOCKS;
 }
 
-/* True if the blocks of all tracks are regular, and the others not near singular. */
+/* Return whether the blocks of all tracks are regular, and the others not near singular. */
 static bool is_apart(const kf_pose *pose)
 {
     int block;
@@ -88,7 +88,7 @@ static bool is_apart(const kf_pose *pose)
     return apart;
 }
 
-/* One trusted step of all drivers away from all that is singular on a track; false if it is not one. */
+/* Take one trusted step of all drivers; false if it is none, or if a track is near a singular point. */
 bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     double direction[KF_DRIVERS], distance;
@@ -127,13 +127,13 @@ bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pos
     return true;
 }
 
-/* The pose of the tracks at u, on the way from `start` to `target`; all other blocks are as z has them. */
+/* Form the pose of the tracks at u, on the path from `start` to `target`; all other blocks are as in `from`. */
 kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const double *target, const double *from,
                        kf_pose *pose)
 {
     const double tolerance = solver->tolerance;
     kf_pose *const own = &solver->scratch.track[1];
-    double z[KF_UNKNOWNS], room[KF_DRIVERS];
+    double z[KF_UNKNOWNS], buffer[KF_DRIVERS];
     kf_status status = KF_OK;
     int k, iterations = 0;
     memcpy(z, from, sizeof z);
@@ -148,14 +148,14 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
             continue;
         }
         kf_enter_track(solver, k);
-        solver->tolerance = INFINITY; /* the whole is what counts */
-        one = kf_solve_along(solver, kf_on_track(solver, start, k), kf_driven_at(&solver->model, &u[k], room), own);
-        if (!KF_GOOD(one) && u != target) { /* the message is to tell of the target */
+        solver->tolerance = INFINITY; /* it applies to the whole pose only */
+        one = kf_solve_along(solver, kf_on_track(solver, start, k), kf_driven_at(&solver->model, &u[k], buffer), own);
+        if (!KF_GOOD(one) && u != target) { /* the message names the target */
             char message[KF_MESSAGE];
             kf_status beyond;
             memcpy(message, solver->message, sizeof message);
-            kf_driven_at(&solver->model, &target[k], room);
-            beyond = kf_solve_along(solver, kf_on_track(solver, start, k), room, own);
+            kf_driven_at(&solver->model, &target[k], buffer);
+            beyond = kf_solve_along(solver, kf_on_track(solver, start, k), buffer, own);
             if (KF_GOOD(beyond)) {
                 memcpy(solver->message, message, sizeof message);
             } else {
@@ -236,7 +236,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
 
 #endif
 
-/* First and second derivative of the coordinates in time; the blocks that are interpolated, whose derivatives follow by
+/* Form first and second derivative of the coordinates in time; return the interpolated blocks, whose derivatives follow by
  * the chain rule, or NULL.
  */
 const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double *ud, const double *udd)

@@ -114,7 +114,7 @@ kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
     kf_pose *const found = solver->scratch.follow, *pose = start;
     double step = longest;
 #if KF_TRACKS
-    double room[KF_DRIVERS];
+    double buffer[KF_DRIVERS];
 #endif
     int k;
     for (k = 0; k < MOST_FOLLOWED; ++k) {
@@ -125,7 +125,7 @@ kf_pose *kf_follow_path(kf_solver *solver, kf_pose *start, double u)
         if (here == u) {
             return pose;
         }
-        if (kf_trusted_step(solver, pose, KF_SPEEDS(&solver->model), s, KF_AT(&solver->model, &there, room), trial)) {
+        if (kf_trusted_step(solver, pose, KF_SPEEDS(&solver->model), s, KF_AT(&solver->model, &there, buffer), trial)) {
             pose = trial;
             continue;
         }

@@ -19,8 +19,8 @@ int kf_first_of(int block)
     return block > 0 ? kf_block_ends[block - 1] : 0;
 }
 
-/* J^-1 (s R) of a block, signs s chosen so that the unknown that can be moved farthest is; false if J is singular.
- * rows: R, the scales of its rows.
+/* Form J^-1 (s R) of a block with those signs s that move the unknown that can move farthest as far as possible; false if J
+ * is singular. rows: R, the scales of its rows.
  */
 bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step)
 {
@@ -73,7 +73,7 @@ bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block,
     return true;
 }
 
-/* What the rows of a block are known to, relative to their scales. */
+/* Return the error of the rows of a block, relative to their scales. */
 double kf_known_to(const kf_found *found, int block)
 {
     const int first = kf_first_of(block), k = kf_block_ends[block] - first;
@@ -81,8 +81,8 @@ double kf_known_to(const kf_found *found, int block)
     return KF_ROUNDINGS * KF_EPS + found->residual + KF_EPS * largest;
 }
 
-/* How many blocks move farthest, which, the worst first, and by how much the sum over them is too small; -1 if one is
- * singular.
+/* Find the blocks that move farthest, the worst first, and the factor by which the sum over them is too small; return
+ * their number, -1 if a block is singular.
  */
 int kf_worst_blocks(const kf_model *model, const kf_found *found, const bool *held, int *worst, double *weight)
 {

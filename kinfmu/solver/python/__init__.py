@@ -1,6 +1,6 @@
 """Run time in Python: advance along the branch, Newton, bridges over singular points. Standard library only.
 
-This package is copied into the Python FMU as it is, beside the generated model.
+The Python FMU carries a copy of this package, in which the generated model is one more module.
 """
 
 from __future__ import annotations

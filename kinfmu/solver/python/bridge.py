@@ -1,9 +1,9 @@
-"""Bridges: across a singular point by interpolation from both sides, proved by closing.
+"""Bridges: interpolation across singular points from both sides, accepted only if the interpolated pose closes.
 
 Near a change point Newton loses digits (the error of q grows like eps / distance, of qd like eps / distance^2, of qdd
 like eps / distance^3) and exactly at it two branches meet. The motion itself is smooth there. So inside a window the
-unknowns come from the two-sided Hermite polynomial through regular poses outside it. That the interpolated pose closes
-proves that it is a pose of the mechanism: where lengths miss a change point by d, it stays open by d.
+unknowns come from the two-sided Hermite polynomial through regular poses outside it: a *bridge*. That the interpolated
+pose closes proves that it is a pose of the mechanism: where lengths miss a change point by d, it leaves a gap of d.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .trusted_step import follow_path
 from .turns import turned, whole_turns
 
 HALF_WIDTH = 0.05  # [rad, sizes]; twice as wide loses four digits on the antiparallelogram
-NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would win
+NARROWEST = 1e-3  # [rad, sizes]; nodes closer than this have lost the digits that a bridge would gain
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
-AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node turns away
-FINE = 1e-12  # [rad, sizes]; difference of two widths from which narrower ones win nothing
-STRAIGHT = 0.1  # change of a zero located anew, as a part of what is left to go: as little where there is a zero
+AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away
+FINE = 1e-12  # [rad, sizes]; difference of two widths below which narrower ones gain nothing
+STRAIGHT = 0.1  # change of a zero located anew, as a part of the distance ahead: it is as small where there is a zero
 DAMPING = 1e-3  # of J dz = -r at a change point: its singular value is 0, the others are far above
 NOISE = 8.0  # roundings of the residual at the centre; a smaller residual is no miss
 STEADY = 0.1  # largest correction of an extrapolation over the determinant: beyond it lies another branch
@@ -33,8 +33,8 @@ STEADY = 0.1  # largest correction of an extrapolation over the determinant: bey
 class Bridge:
     """A span over (low, high), half a width to either side of its centre, moved by whole turns of the driver.
 
-    A mechanism driven by an angle repeats: what was interpolated once holds `turns` turns on, with each unknown angle
-    moved by its own whole turns, `raised`. nodes: the poses of the span, moved.
+    A mechanism driven by an angle repeats: what was interpolated once also holds after `turns` turns, with each unknown
+    angle moved by its own whole turns, `raised`. nodes: the poses of the span, moved.
     """
 
     __slots__ = ("_miss", "centre", "half", "high", "low", "nodes", "raised", "span", "turns")
@@ -57,21 +57,21 @@ class Bridge:
         return tuple([turned(a, n) for a, n in zip(z, self.raised, strict=True)]) if self.turns else z
 
     def covers(self, u: float) -> bool:
-        """True inside the window, where the bridge is used."""
+        """Return whether `u` is inside the window, where the bridge is used."""
         return self.low < u < self.high
 
     def exit(self, target: float) -> Pose:
-        """The farthest node on the target's side that does not lie beyond the target."""
+        """Return the farthest node on the target's side that does not lie beyond the target."""
         near, far = (3, 4) if target > self.centre else (2, 1)
         passed = abs(target - self.centre) >= abs(self.nodes[far].u[0] - self.centre)
         return self.nodes[far if passed else near]
 
     def _place(self, u: float) -> float:
-        """Where a driver value lies on the span: x = (u - centre) / half."""
+        """Return the place of a driver value on the span: x = (u - centre) / half."""
         return (turned(u, -self.turns) - self.span.centre) / self.half
 
     def pose(self, u: Vector) -> Pose:
-        """The interpolated pose inside the window; blocks that are regular are solved from it."""
+        """Return the interpolated pose inside the window; regular blocks are solved from it."""
         z, zd, zdd = self.span.read(self._place(u[0]))
         model, held = self.span.model, self.span.held
         pose = Pose(u, evaluated(model, u, self._raised(z), held))
@@ -90,16 +90,16 @@ class Bridge:
         return bool(found[3] <= CLOSED + 4.0 * EPS * self._largest(found[0])) and self._keeps_distances(found[-1])
 
     def _middle(self) -> Found:
-        """The interpolated pose at the centre."""
+        """Return the interpolated pose at the centre."""
         return evaluated(self.span.model, (self.centre,), self._raised(self.span.middle()[0]), self.span.held)
 
     def _largest(self, z: Vector) -> float:
-        """The largest of the driver value and the unknowns, in radians and sizes."""
+        """Return the largest of the driver value and the unknowns, in radians and sizes."""
         scales = (*self.span.model.REACH, *self.span.model.UNKNOWN_SCALES)
         return float(max([abs(a) / c for a, c in zip((self.centre, *z), scales, strict=True)]))
 
     def _keeps_distances(self, values: Any) -> bool:
-        """True if a driven distance that passes 0 in the window closes as a length too: its row d.d - u^2 does anyway.
+        """Return whether a driven distance that passes 0 in the window closes as a length: d.d - u^2 always does.
 
         Two points that pass each other at a distance d give this row a residual of d^2.
         """
@@ -154,25 +154,25 @@ class Bridge:
         return e * e / w, 2.0 * max(1.0, slope) * (e / w) ** 2, 8.0 * e * e / w**3
 
     def difference(self, u: float) -> tuple[Vector, Vector, Vector]:
-        """What the wider span says less than the one used, in z and its two derivatives: the error estimate."""
+        """Return the difference of the wider span from the one used, z and two derivatives: the error estimate."""
         return self.span.difference(self._place(u))
 
     def dump(self) -> list[Any]:
-        """Plain numbers from which `restored_bridge` makes the same bridge."""
+        """Return plain numbers from which `restored_bridge` makes an equal bridge."""
         return [self.span.dump(), self.turns, list(self.raised)]
 
 
 def restored_bridge(model: Model, data: list[Any]) -> Bridge:
-    """The bridge that was dumped."""
+    """Return the bridge that `dump` gave as plain numbers."""
     span, turns, raised = data
     return Bridge(restored_span(model, span), turns, tuple(raised))
 
 
 def moved(model: Model, bridge: Bridge, pose: Pose, u: float) -> Bridge | None:
-    """The same bridge whole turns on, if a driver value lies between its nodes there and the mechanism repeats.
+    """Return the bridge moved by whole turns, if `u` lies between its moved nodes and the mechanism repeats, else None.
 
-    It repeats if the node next to the pose, reached from it, is the node of the span but for whole turns of angles, and
-    if the moved bridge closes. So a bridge of another branch, or of a mechanism that has a screw in it, is not moved.
+    It repeats if the node next to the pose, reached from it, is the node of the span except for whole turns of angles,
+    and if the moved bridge closes. So a bridge of another branch, or of a mechanism with a screw, is not moved.
     """
     span = bridge.span
     turns = whole_turns(u - span.centre)
@@ -198,7 +198,7 @@ def moved(model: Model, bridge: Bridge, pose: Pose, u: float) -> Bridge | None:
 
 
 def build(model: Model, pose: Pose, block: int, zero: float) -> Bridge | None:
-    """A bridge over the zero of a block's determinant that a regular pose has before it, or None if none proves itself.
+    """Return a bridge over the zero of a block's determinant ahead of a regular pose, or None if none is accepted.
 
     zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
     closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:
@@ -221,9 +221,9 @@ def build(model: Model, pose: Pose, block: int, zero: float) -> Bridge | None:
 
 
 def _located(model: Model, pose: Pose, block: int, zero: float) -> float | None:
-    """Where a block's determinant vanishes, by the secant rule from the near side; None if it does not fall straight.
+    """Return where a block's determinant vanishes, by secants from the near side; None if it does not fall straight.
 
-    Towards a dead centre it falls like a square root: the secant's zero stays beyond, by as much as is left to go.
+    Towards a dead centre it falls like a square root: the secant's zero is about twice as far as the dead centre.
     """
     reach: float = model.REACH[0]
     step = 0.5 * (zero - pose.u[0])
@@ -245,7 +245,7 @@ def _located(model: Model, pose: Pose, block: int, zero: float) -> float | None:
 
 
 def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float) -> Span | None:
-    """A span of one width over the zero of a block's determinant, from the side that the pose is on."""
+    """Return a span of one width over the zero of a block's determinant, built from the side of the pose, or None."""
     side = 1.0 if centre > pose.u[0] else -1.0
     near: list[Pose] = []
     for distance in (4.0, 2.0, 1.0):
@@ -257,18 +257,18 @@ def _spanned(model: Model, pose: Pose, block: int, centre: float, half: float) -
     if far is None:
         return None
     if near[-1].determinants[block] * far[0].determinants[block] >= 0.0 and block not in model.TALL:
-        return None  # touched and not crossed: no change point of two smooth branches
+        return None  # the determinant touches zero without crossing it: not a change point of two smooth branches
     return Span(model, centre, half, near + far if side > 0.0 else (near + far)[::-1])
 
 
 def secant_zero(a: Pose, b: Pose, block: int) -> float | None:
-    """Driver value where the determinant of a block vanishes on the secant through two poses."""
+    """Return the driver value where the determinant of a block vanishes on the secant through two poses."""
     rise = b.determinants[block] - a.determinants[block]
     return None if rise == 0.0 else b.u[0] - b.determinants[block] * (b.u[0] - a.u[0]) / rise
 
 
 def _crossed(model: Model, centre: float, half: float, side: float, near: list[Pose]) -> list[Pose] | None:
-    """Poses at 1, 2, 4 half widths on the far side: each extrapolated from the last known ones, then corrected."""
+    """Return poses at 1, 2, 4 half widths on the far side, each extrapolated from the last and corrected, or None."""
     places = [-4.0, -2.0, -1.0]  # seen in the direction of the crossing
     poses = list(near)
     for distance in (1.0, 2.0, 4.0):
@@ -282,7 +282,7 @@ def _crossed(model: Model, centre: float, half: float, side: float, near: list[P
         if pose.moved > STEADY * pose.margin:
             return None
         if distance > 1.0 and any(a * b <= 0.0 for a, b in zip(pose.determinants, poses[-1].determinants, strict=True)):
-            return None  # there is another zero beside the one to be bridged
+            return None  # there is another zero next to the one to be bridged
         places.append(distance)
         poses.append(pose)
     return poses[3:]

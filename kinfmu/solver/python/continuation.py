@@ -1,9 +1,9 @@
-"""Continuation: from the anchor of a mechanism as it is written to the same pose with other parameters.
+"""Continuation: from the anchor with the parameters of the mechanism to the same pose with other parameters.
 
     Phi(q, u, p0 + s (p1 - p0)) = 0,   s from 0 to 1
 
-The drivers stand still; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a way
-of the drivers. Rank is not decided again: the rows set aside as redundant tell whether they still hold.
+The drivers rest; steps in s are predicted by the last step's slope, corrected by Newton and trusted as on a path
+of the drivers. The rank is not determined again: the watches show whether the redundant rows still hold.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from .solver import TOLERANCE, Solver
 from .status import Status
 from .trusted_step import FALL, TRUST
 
-_SHORTEST = 1e-7  # step in s; where steps get shorter the way ends
+_SHORTEST = 1e-7  # step in s; where steps get shorter the path ends
 _MOST_STEPS = 10_000
 _ITERATIONS = 60
-NO_NUMBER = "what follows from them is no finite number"
+NO_NUMBER = "they lead to numbers that are not finite"
 
 
 class Reached(NamedTuple):
-    """A model with its parameters bound, its anchor, and why it could not be had (empty if it could).
+    """A model with its parameters bound, its anchor, and an empty message.
 
-    If it could not, the last on the way there.
+    If the parameters have no solution: the last model and anchor on the path to them, and the reason.
     """
 
     model: Model
@@ -35,7 +35,7 @@ class Reached(NamedTuple):
 
 
 class UnsolvableModel(Solver):
-    """Stands for a mechanism whose parameters cannot be had: every pose fails, and says why."""
+    """A solver of a mechanism whose parameters have no solution: every pose fails with the reason."""
 
     def __init__(self, model: Model, tolerance: float, anchor: Pose, message: str) -> None:
         super().__init__(model, tolerance, anchor)
@@ -66,7 +66,7 @@ def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -
 
 
 def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
-    """The anchor followed from the parameters as written to `values`."""
+    """Follow the anchor from the parameters of the mechanism to `values`."""
     written = tuple([value for _, value in module.PARAMETERS])
     u, z = module.ANCHOR
     model = module.bound(written)
@@ -90,55 +90,55 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
                 continue
         step *= 0.5
         if step < _SHORTEST:
-            return Reached(model, pose, _opens(module, values, u, pose, block))
+            return Reached(model, pose, _failure(module, values, u, pose, block))
     else:
-        return Reached(model, pose, f"{_said(module, values)}: too far from the parameters as written")
+        return Reached(model, pose, f"{_changed(module, values)}: too far from the parameters as written")
     if not pose.watch <= tolerance:
         name, value = max(zip(model.WATCHES, model.watches(pose.values), strict=True), key=lambda row: abs(row[1]))
         gap = f"{abs(value) * model.SIZE:.4g} {model.LENGTH_UNIT}"
-        return Reached(model, pose, f"{_said(module, values)}: the redundant row {name} is open by about {gap}")
+        return Reached(model, pose, f"{_changed(module, values)}: redundant row {name} does not close: gap about {gap}")
     return Reached(model, pose, "")
 
 
 def _is_trusted(pose: Pose, trial: Pose) -> bool:
-    """As on a way of the drivers: corrections small against the determinants, none of which falls steeply."""
+    """Return whether corrections are small compared with the determinants and no determinant falls steeply."""
     if TRUST * trial.moved > min(trial.margin, pose.margin) or trial.margin == 0.0:
         return False
     pairs = zip(pose.determinants, trial.determinants, strict=True)
     return all(after >= FALL * before if before > 0.0 else after <= FALL * before for before, after in pairs)
 
 
-def _said(module: Any, values: Vector) -> str:
-    """'parameters coupler = 9': those that differ from what is written."""
+def _changed(module: Any, values: Vector) -> str:
+    """Return 'parameters coupler = 9': those that differ from the mechanism's."""
     pairs = zip(module.PARAMETERS, values, strict=True)
     return "parameters " + ", ".join(f"{name} = {value:.12g}" for (name, old), value in pairs if value != old)
 
 
-def _opens(module: Any, values: Vector, u: Vector, pose: Pose, block: int) -> str:
-    """Why the way ends: the rows that do not close with these parameters, and the smallest gap that they leave."""
+def _failure(module: Any, values: Vector, u: Vector, pose: Pose, block: int) -> str:
+    """Return why the path ends: the rows that do not close with these parameters, and their smallest gap."""
     try:
         model = module.bound(values)
     except (ArithmeticError, ValueError) as error:
-        told = str(error)  # a length that is not positive; or a division by zero, the root of something negative
-        return f"{_said(module, values)}: {told if ' must be ' in told else NO_NUMBER}"
+        why = str(error)  # a length that is not positive; or a division by zero, the root of something negative
+        return f"{_changed(module, values)}: {why if ' must be ' in why else NO_NUMBER}"
     if block < 0:
         sizes = [abs(determinant) for determinant in pose.determinants]
         block = sizes.index(min(sizes)) if sizes else -1
     if block < 0:
-        return f"{_said(module, values)}: the mechanism does not close"
+        return f"{_changed(module, values)}: the mechanism does not close"
     rows = ", ".join(module.ROWS[block])
     try:
         gap = _gap(model, u, pose.z, block)
-    except (ArithmeticError, ValueError):  # a length of zero, say, with which another block has no solution at all
+    except (ArithmeticError, ValueError):  # for example a length of zero, with which another block has no solution
         gap = 0.0
     if gap > 1e-9:
         left = f"{gap * module.SIZE:.4g} {module.LENGTH_UNIT}"
-        return f"{_said(module, values)}: the mechanism does not close: rows {rows} stay open by {left}"
-    return f"{_said(module, values)}: lie behind a singular point, where rows {rows} are dependent"
+        return f"{_changed(module, values)}: the mechanism does not close: rows {rows} leave a gap of {left}"
+    return f"{_changed(module, values)}: beyond a singular point, where rows {rows} are dependent"
 
 
 def _gap(model: Model, u: Vector, z: Vector, block: int) -> float:
-    """Smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt)."""
+    """Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt)."""
     first, last = model.BLOCKS[block]
     damping, best, left = 1e-3, list(z), None
     for _ in range(_ITERATIONS):

@@ -1,4 +1,4 @@
-"""A function of one variable made of pieces: what laws of motion and lifts of cams are at run time."""
+"""A piecewise function of one variable: laws of motion and lifts of cams at run time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CurveData = tuple[tuple[float, ...], tuple[Piece, ...]]  # n - 1 ascending break
 
 
 def curve(data: CurveData, order: int, x: float) -> float:
-    """The derivative of the given order (0: the value) at x.
+    """Return the derivative of the given order (0: the value) at x.
 
         f = c_0 s^n + ... + c_n + a sin(w s + p),   s = x - o        on the piece that holds x
 
@@ -40,5 +40,5 @@ def curve(data: CurveData, order: int, x: float) -> float:
 
 @cache
 def _factors(count: int, order: int) -> tuple[float, ...]:
-    """What the derivative of s^n puts before its power, n!/(n - order)!, for n from count - 1 down to order."""
+    """Return the factors of the derivatives of s^n, n!/(n - order)!, for n from count - 1 down to order."""
     return tuple(float(perm(power, order)) for power in range(count - 1, order - 1, -1))

@@ -4,14 +4,13 @@ Every solved block is a source. Its rows are known to a few roundings of their t
 
     |dz| = |J^-1| R (4 eps + residual + eps |z|)        R: scales of the rows, in lengths
 
-which moves all blocks that come after it. How far the outputs and their rates go is not estimated but tried: position,
-velocity and acceleration are formed again at the moved pose, where they take up what a bad condition makes of it, with
-what rounding adds at each stage. The sum over the sources counts. Near a singular point, of determinant m, errors grow
-like 1/m, 1/m^2, 1/m^3. On a bridge the difference of its two widths, and the errors of the poses that carry it, are the
-source.
+which moves all blocks that come after it. The effect on outputs and rates is computed, not estimated: position,
+velocity and acceleration are formed again at the moved pose, so that they contain the effect of a bad condition and of
+rounding at each stage. The estimate is the sum over the sources. Near a singular point, of determinant m, errors grow
+like 1/m, 1/m^2, 1/m^3. On a bridge the source is the difference of its two widths and the errors of its nodes.
 
-Where no pose is bridged and no block has more than two unknowns, nothing here branches on a value: the same text then
-serves arrays, the values of many poses at once (see kinfmu.fmu.block_estimates).
+Where no pose is bridged and no block has more than two unknowns, no code here branches on a value, so that it also
+takes arrays, the values of many poses at once (see kinfmu.fmu.block_estimates).
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ from .tracks import MIXED, Track, held_blocks, rates_in_time
 from .worst_case_step import worst_case_step
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
-UNBOUNDED = 0.5  # change of a determinant, as a part of it, within a pose's error: rates are not known then
-MOST_SOURCES = 3  # of a mechanism with more blocks those that move farthest count for all
-NOTHING_KNOWN = inf, inf, inf
+UNBOUNDED = 0.5  # relative change of a determinant within a pose's error from which rates are unknown
+MOST_SOURCES = 3  # with more blocks, those that move farthest represent all
+UNKNOWN_ERRORS = inf, inf, inf
 
 
 class DriverMotion(NamedTuple):
-    """How blocks are driven: speeds and accelerations, of the only driver per unit of it; held: blocks given."""
+    """Speeds and accelerations of the drivers (with one driver: 1 and 0), and the bits of the blocks held."""
 
     ud: Vector
     udd: Vector
@@ -48,7 +47,7 @@ class UnknownRates(NamedTuple):
 
 
 class Source(NamedTuple):
-    """What unknowns may be wrong by: z, and the derivatives by rounding, or those given of blocks that are held."""
+    """Errors of the unknowns: of z, of the derivatives by rounding, and the derivatives given of held blocks."""
 
     z: Vector
     first: Vector
@@ -58,7 +57,7 @@ class Source(NamedTuple):
 
 
 def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[float, float, float]:
-    """Estimated errors of q, qd, qdd: the largest among the outputs, in radians and sizes, a second and a second^2."""
+    """Return estimated errors of q, qd, qdd: the largest of the outputs, in radians and sizes, per s and per s^2."""
     driven = _driver_motion(pose, ud, udd)
     rates = _rates(model, pose, driven)
     first, second, speed, curve = rates
@@ -87,19 +86,19 @@ def estimated_errors(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple
             squares[1] += qd * qd
             squares[2] += qdd * qdd
     except (ArithmeticError, ValueError):  # exactly singular, or the sine of an overflow
-        return NOTHING_KNOWN
+        return UNKNOWN_ERRORS
     for own, v, slope in _bridged(model, pose, ud, rates):
         for order, off in enumerate(own.bridge.missed(own, slope)):
             squares[order] += (off * v**order) ** 2
     if not isfinite(sum(squares)):
-        return NOTHING_KNOWN
+        return UNKNOWN_ERRORS
     if lost or _is_at_a_crossing(model, pose, rates):
         return least[0] + sqrt(squares[0]), inf, inf
     return least[0] + sqrt(squares[0]), least[1] + sqrt(squares[1]), least[2] + sqrt(squares[2])
 
 
 def _bridged(model: Model, pose: Pose, ud: Vector, rates: UnknownRates) -> list[tuple[Pose, float, float]]:
-    """What of a pose is interpolated, with its driver's speed in radians and sizes, and its steepest slope."""
+    """Return the interpolated parts of a pose, with their driver's speed in radians and sizes, and steepest slope."""
     if pose.bridge is not None:
         return [(pose, abs(ud[0]) / model.REACH[0], rates.speed * model.REACH[0])]
     found = []
@@ -122,7 +121,7 @@ def _is_singular_between(pose: Pose, there: Found) -> bool:
 
 
 def _is_at_a_crossing(model: Model, pose: Pose, rates: UnknownRates) -> bool:
-    """True where branches cross and no bridge holds: whose rates these are is not known.
+    """Return whether branches cross without a bridge: to which branch the rates belong is unknown.
 
     There the rates stay as they are while the determinant falls; right before a dead centre they are steep.
     """
@@ -156,7 +155,7 @@ def with_driver_errors(
     off: tuple[Vector, Vector],
     errors: tuple[float, float, float],
 ) -> tuple[float, float, float]:
-    """The errors with what drivers add whose speeds and accelerations are off by as much as `off` says, each >= 0."""
+    """Return the errors plus those caused by errors `off` >= 0 of the drivers' speeds and accelerations."""
     of_q, of_qd, of_qdd = errors
     here = _motion(model, pose, ud, udd)
     for k, (speed, acceleration) in enumerate(zip(*off)):  # noqa: B905  one a driver, both
@@ -177,13 +176,13 @@ def _shifted(values: Vector, k: int, more: float) -> Vector:
 
 
 def _motion(model: Model, pose: Pose, ud: Vector, udd: Vector) -> Vector:
-    """Positions, rates and accelerations of the outputs."""
+    """Return positions, rates and accelerations of the outputs."""
     rates = _rates(model, pose, _driver_motion(pose, ud, udd))
     return model.motion(pose.values, ud, udd, rates.first, rates.second)  # type: ignore[no-any-return]
 
 
 def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, float, float]:
-    """The largest differences of two rows of motion, of each order, in radians and sizes; inf for what is no number."""
+    """Return the largest differences of two rows of motion, of each order, in radians and sizes; inf for a NaN."""
     if isfinite(sum(there) + sum(here)):
         return model.differences(there, here)  # type: ignore[no-any-return]  # generated code has no types
     n = len(model.OUTPUTS)
@@ -192,7 +191,7 @@ def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, floa
 
 
 def _largest(model: Model, there: Vector, here: Vector) -> float:
-    """The largest difference of two rows of outputs, in radians and sizes."""
+    """Return the largest difference of two rows of outputs, in radians and sizes."""
     largest = 0.0
     for name, a, b in zip(model.OUTPUTS, there, here):  # noqa: B905  one an output, all
         gap = abs(a - b) if name[-4:] == ".phi" else abs(a - b) / model.SIZE
@@ -221,7 +220,7 @@ def _rates(model: Model, pose: Pose, driven: DriverMotion) -> UnknownRates:
 
 
 def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> list[Source]:
-    """What each block adds, the worst ones if there are many, and the bridge."""
+    """Return the sources of the blocks, only the largest ones if there are many."""
     n = len(model.UNKNOWNS)
     rounding = ROUNDINGS * EPS + pose.residual
     matrices = model.jacobians(pose.values)
@@ -261,7 +260,7 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
 
 
 def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
-    """What interpolation adds: the difference of two widths, and what the nearest nodes are wrong by."""
+    """Return the source of a bridge: the difference of its two widths, and the errors of its nearest nodes."""
     half = pose.bridge.half
     nodes = [_of_node(model, node, half) for node in pose.bridge.span.nodes[2:4]]
     rounding = [max(pair) for pair in zip(*nodes)]  # noqa: B905  one an unknown, both
@@ -279,7 +278,7 @@ def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRat
 
 
 def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
-    """What a bridge of one track adds, in time."""
+    """Return the source of the bridge of one track, in time."""
     alone = _driver_motion(own, ALONE, AT_REST)
     along = _rates(track, own, alone)
     off = _of_bridge(track, own, alone, along)
@@ -300,7 +299,7 @@ def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverM
 
 
 def _of_node(model: Model, node: Pose, half: float) -> Vector:
-    """What a node that carries a bridge may be wrong by, in each unknown: z, half z' and half^2 z'' together."""
+    """Return the error of a bridge's node in each unknown: of z, half z' and half^2 z'' together."""
     driven = _driver_motion(node, ALONE, AT_REST)
     rates = _rates(model, node, driven)
     squares = [0.0] * len(node.z)
@@ -315,7 +314,7 @@ def _of_node(model: Model, node: Pose, half: float) -> Vector:
 def _moved(
     model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates, source: Source
 ) -> tuple[Found, Vector, Vector]:
-    """What `position` gives at the pose that a source moves to, and its first and second derivative."""
+    """Return the result of `position` at the pose moved by a source, and its first and second derivative."""
     z = tuple([a + d for a, d in zip(pose.z, source.z)])  # noqa: B905
     there = evaluated(model, pose.u, z)
     values = there[-1]
@@ -326,7 +325,7 @@ def _moved(
 
 
 def _added(there: Vector, here: Vector, more: Vector) -> Vector:
-    """There and more, away from here: two errors that happen to cancel are no smaller for it."""
+    """Return `there` moved by `more` away from `here`, so that two errors cannot cancel by chance."""
     along = 0.0
     for a, b, c in zip(there, here, more):  # noqa: B905  one an unknown, all
         along += (a - b) * c

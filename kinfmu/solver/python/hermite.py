@@ -12,7 +12,7 @@ class Hermite:
 
         p(x) = sum_i c_i prod_{j<i} (x - x_j),   every node three times
 
-    c by divided differences, where a difference over equal nodes is the derivative over its factorial.
+    c are divided differences, where a difference over equal nodes is the derivative over its factorial.
     """
 
     __slots__ = ("_terms",)
@@ -35,7 +35,7 @@ class Hermite:
         self._terms = tuple(zip(reversed(coefficients), reversed(repeated), strict=True))  # as they are evaluated
 
     def __call__(self, x: float) -> Samples:
-        """p, p', p'' at x."""
+        """Return p, p', p'' at x."""
         value = slope = curve = 0.0
         for coefficient, node in self._terms:
             d = x - node
@@ -47,7 +47,7 @@ class Hermite:
 
 @cache  # few combinations of nodes and places are ever asked for
 def weights(nodes: tuple[float, ...], x: float) -> tuple[Samples, ...]:
-    """What f, f' and f'' of each node count for the value of the interpolating polynomial at x."""
+    """Return the weights of f, f' and f'' of each node in the value of the interpolating polynomial at x."""
     zero: Samples = (0.0, 0.0, 0.0)
     unit: tuple[Samples, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rows = []

@@ -52,13 +52,14 @@ def limit_message(model: Model, limit: Limit, target: Vector) -> str:
     """Return why a target cannot be reached, in one line."""
     if limit.block == TOO_FAR:
         return (
-            f"{place(model, target)} is too far from {place(model, limit.u)}: more than {MOST_STEPS} steps on one way"
+            f"{place(model, target)} is too far from {place(model, limit.u)}: more than {MOST_STEPS} steps on one path"
         )
     names = ", ".join(model.UNKNOWNS[slice(*model.BLOCKS[limit.block])]) if limit.block >= 0 else "the joints"
-    why = f"branches of {names} cross" if limit.crosses else f"{names} would part"
+    loop = f"the loop of {names}" if limit.block >= 0 else names
+    why = f", where branches of {names} cross" if limit.crosses else f"; beyond it {loop} cannot close"
     if limit.crosses and len(target) > 1:
         why += "; the crossing depends on several drivers, so no bridge is built"
     if not differs(model, target, limit.u, LOCATED):
-        return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit, where {why}"
+        return f"{place(model, target, LOCATED)} cannot be reached: to these digits it is the limit{why}"
     asked = place(model, target, ROUGHLY if differs(model, target, limit.u, ROUGHLY) else LOCATED)
-    return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}, where {why}"
+    return f"{asked} cannot be reached: the limit is {place(model, limit.u, LOCATED)}{why}"

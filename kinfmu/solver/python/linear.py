@@ -9,7 +9,7 @@ Matrix = list[list[float]]
 
 
 class Singular(ArithmeticError):  # noqa: N818  # a state of the matrix, not a fault
-    """A matrix has no usable pivot left."""
+    """A matrix without a usable pivot."""
 
 
 class LU:
@@ -25,7 +25,7 @@ class LU:
 
 
 def factor(matrix: Matrix) -> LU:
-    """LU factors of A (k, k); Singular if a row or a pivot vanishes."""
+    """Return LU factors of A (k, k); Singular if a row or a pivot vanishes."""
     k = len(matrix)
     scales, rows = [], []
     for row in matrix:
@@ -55,17 +55,17 @@ def factor(matrix: Matrix) -> LU:
 
 
 def row_part(matrix: Matrix, usual: tuple[float, ...]) -> float:
-    """The least length of a row over its usual one, at most 1: rows scaled to unit length hide one that vanishes."""
+    """Return the smallest length of a row relative to its usual one, at most 1; scaling hides a row that vanishes."""
     return min(1.0, *[sqrt(sum([e * e for e in row])) / u for row, u in zip(matrix, usual, strict=True)])
 
 
 def column_part(matrix: Matrix, usual: tuple[float, ...]) -> float:
-    """The same of the columns, for a tall matrix."""
+    """Return the same of the columns, for a tall matrix."""
     return row_part([list(column) for column in zip(*matrix, strict=True)], usual)
 
 
 def lu_solve(factors: LU, right: list[float]) -> list[float]:
-    """x with A x = b from the factors of A."""
+    """Return x with A x = b from the factors of A."""
     rows, k = factors.lu, len(factors.order)
     x = [right[i] * factors.scales[i] for i in factors.order]
     for i in range(1, k):
@@ -89,7 +89,7 @@ class QR:
 
 
 def qr_factor(matrix: Matrix) -> QR:
-    """Householder QR of A (m, k), m >= k, for least squares; Singular if a column vanishes or depends on others."""
+    """Return Householder QR of A (m, k), m >= k; Singular if a column vanishes or depends on others."""
     m, k = len(matrix), len(matrix[0])
     columns = [[matrix[i][j] for i in range(m)] for j in range(k)]
     lengths = [sqrt(sum(entry * entry for entry in column)) for column in columns]
@@ -111,7 +111,7 @@ def qr_factor(matrix: Matrix) -> QR:
 
 
 def qr_solve(factors: QR, right: list[float]) -> list[float]:
-    """x that minimizes |A x - b| from the factors of A."""
+    """Return x that minimizes |A x - b| from the factors of A."""
     b, columns, k = list(right), factors.columns, len(factors.columns)
     for reflector in factors.reflectors:
         _reflect(reflector, sum(entry * entry for entry in reflector), b)
@@ -122,7 +122,7 @@ def qr_solve(factors: QR, right: list[float]) -> list[float]:
 
 
 def unclosed(matrix: Matrix, right: list[float], damping: float) -> list[float]:
-    """b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: what of b lies outside the columns of A."""
+    """Return b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: the part of b outside the columns of A."""
     columns = list(zip(*matrix, strict=True))
     normal = [[sum(map(mul, one, other)) for other in columns] for one in columns]
     for k, row in enumerate(normal):
@@ -138,7 +138,7 @@ def _reflect(reflector: list[float], square: float, column: list[float]) -> None
 
 
 def orientation(a: Matrix, b: Matrix) -> float:
-    """det(A^T B) of two tall matrices over the lengths of its rows: negative if their orientations differ."""
+    """Return det(A^T B) of two tall matrices over the lengths of its rows: negative if their orientations differ."""
     columns = list(zip(*b, strict=True))
     product = [[sum(map(mul, one, other)) for other in columns] for one in zip(*a, strict=True)]
     try:
@@ -148,10 +148,10 @@ def orientation(a: Matrix, b: Matrix) -> float:
 
 
 def reciprocal_condition(matrix: Matrix) -> float:
-    """1 / cond of the equilibrated matrix (rows, then columns, scaled to unit length), in the 1-norm; 0 if singular.
+    """Return 1 / cond of the equilibrated matrix in the 1-norm, 0 if singular; rows, then columns have unit length.
 
-    For a tall matrix that of R in A = QR, its rows as they are: where one of them vanishes the others carry the block,
-    and what rounding leaves of it must not count.
+    Of a tall matrix it is that of R in A = QR, without scaling its rows: where one of them vanishes the others carry
+    the block, and its rounding errors must not count.
     """
     m, k = len(matrix), len(matrix[0])
     if m == k == 2:
@@ -180,7 +180,7 @@ def reciprocal_condition(matrix: Matrix) -> float:
 
 
 def _reciprocal_condition_of_two(matrix: Matrix) -> float:
-    """The same for 2 x 2, where the inverse is at hand."""
+    """Return the same for 2 x 2, with the inverse written out."""
     (a, b), (c, d) = matrix
     p, q = sqrt(a * a + b * b), sqrt(c * c + d * d)
     if not isfinite(p + q):

@@ -8,24 +8,25 @@ from .status import Status
 
 Vector = tuple[float, ...]
 Model = Any  # a generated module: see kinfmu.codegen.python.emit
-Found = tuple[Any, ...]  # what its `position` gives
+Found = tuple[Any, ...]  # result of its `position`
 
 EPS = 2.220446049250313e-16
 POLISHED = 0.1  # determinant below which Newton goes on until the residual no longer falls
-UNDECIDED = 1e-6  # determinant below which a way ends: as small where lengths make a change point within 1e-12
+UNDECIDED = 1e-6  # determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant
 STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
 ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
 AT_REST: Vector = (0.0,)
 
 
 class Pose:
-    """A value; what is derived from it is computed when first asked for.
+    """An assembled pose at given driver values; derivatives are computed when first used.
 
-    u: driver values; z: unknowns of all blocks; determinants: one a block, 1 far from singular, 0 at a singular point;
-    margin: the smallest of their sizes; residual: the largest length of a block's residuals, relative to the size;
-    moved: largest correction of the prediction, in radians and sizes; watch: largest residual of the rows set aside,
-    relative to the size; values: numbers of the position stage that later stages use. road: the singular stretches
-    known on the way here; bridge: the one that this pose was interpolated by. status and message: see Status.
+    u: driver values; z: unknowns of all blocks; determinants: one for each block, 1 far from singular, 0 at a singular
+    point; margin: the smallest of their sizes; residual: the largest length of a block's residuals, relative to the
+    size; moved: largest correction of the prediction, in radians and sizes; watch: largest residual of the *watches*
+    (redundant rows, which are not solved but monitored), relative to the size; values: numbers of the position stage
+    that later stages use; singularities: the map known here; bridge: the one by which this pose was interpolated;
+    status and message: see Status.
     """
 
     __slots__ = (
@@ -61,7 +62,7 @@ class Pose:
         ) = found
         self.singularities = singularities  # a SingularityMap; with several drivers one for each; None: none known
         self.bridge: Any = None
-        self.base: Pose | None = None  # where to go on from, if not from here: see advance
+        self.base: Pose | None = None  # the pose that the next path starts from, if not this one: see advance
         self.status: int = 0
         self.message = ""
         self.tracks: tuple[tuple[Any, Pose], ...] = ()  # with several drivers: each track, and its pose
@@ -69,18 +70,18 @@ class Pose:
 
     @property
     def is_bridged(self) -> bool:
-        """True if unknowns of the pose are interpolated."""
+        """Whether unknowns of the pose are interpolated."""
         if not self.tracks:
             return self.bridge is not None
         return any(own.bridge is not None for _, own in self.tracks)
 
     @property
     def good(self) -> bool:
-        """True if the pose holds numbers."""
+        """Whether the pose holds numbers."""
         return self.status <= 2
 
     def found(self) -> Found:
-        """What `position` gave for this pose."""
+        """Return the result of `position` for this pose."""
         return (
             self.z,
             self.determinants,
@@ -94,7 +95,7 @@ class Pose:
 
 
 def tangent_of(model: Model, pose: Pose) -> tuple[Vector, Vector]:
-    """First and second derivative of z with respect to the only driver."""
+    """Return first and second derivative of z with respect to the only driver."""
     tangent = pose.tangent
     if tangent is None:
         tangent = pose.tangent = model.tangent(pose.values)
@@ -102,7 +103,7 @@ def tangent_of(model: Model, pose: Pose) -> tuple[Vector, Vector]:
 
 
 def directed(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vector]:
-    """First and second derivative of z on a straight way of the drivers."""
+    """Return first and second derivative of z on a straight path of the drivers."""
     if len(direction) == 1:
         return tangent_of(model, pose)
     zd = model.velocity(pose.values, direction)
@@ -110,7 +111,7 @@ def directed(model: Model, pose: Pose, direction: Vector) -> tuple[Vector, Vecto
 
 
 def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
-    """A pose without numbers: what could not be reached from `start`, and why."""
+    """Return a pose without numbers, with the reason why `u` cannot be reached from `start`."""
     pose = Pose(u, start.found(), start.singularities)
     pose.status = status
     pose.message = message
@@ -118,20 +119,20 @@ def failed(start: Pose, u: Vector, status: Status, message: str) -> Pose:
 
 
 def with_map(pose: Pose, singularities: Any) -> Pose:
-    """The same pose with other singular stretches known."""
+    """Return the same pose with another singularity map."""
     other = Pose(pose.u, pose.found(), singularities)
     other.tangent = pose.tangent
     return other
 
 
 def position(model: Model, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0) -> Found:
-    """What the model's `position` gives; near a singular pose Newton goes on until the residual no longer falls."""
+    """Return the result of the model's `position`; near a singular pose Newton goes on while the residual falls."""
     found: Found = model.position(u, z, zd, zdd, s, held)
     return found if found[2] >= POLISHED or held < 0 else polished(model, u, found, held)
 
 
 def polished(model: Model, u: Vector, found: Found, held: int = 0) -> Found:
-    """What Newton gives that goes on from a pose near a singular one; the pose as it is where that wins nothing."""
+    """Continue Newton from a pose near a singular one; return the pose as it is where that gains nothing."""
     if held and not any(abs(size) < POLISHED and not held >> k & 1 for k, size in enumerate(found[1])):
         return found  # the blocks near a singular pose are not solved for
     rest = (0.0,) * len(found[0])
@@ -145,9 +146,9 @@ def polished(model: Model, u: Vector, found: Found, held: int = 0) -> Found:
 
 
 def evaluated(model: Model, u: Vector, z: Vector, held: int = -1) -> Found:
-    """What `position` gives for unknowns that are known: held blocks (all, if nothing is said) are not solved for.
+    """Return the result of `position` at given unknowns; held blocks (default: all) are not solved for.
 
-    s = -0.0 at rest leaves z as it is, to the bit.
+    With s = -0.0 and zero rates z stays as it is, to the bit.
     """
     rest = (0.0,) * len(z)
     return position(model, u, z, rest, rest, -0.0, held)

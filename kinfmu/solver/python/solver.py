@@ -21,11 +21,13 @@ TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
 
 class Solver:
-    """Follows the branch of a mechanism that its anchor lies on. All methods are pure: state is in the poses.
+    """A solver that follows the branch of its anchor. All methods are pure: state is in the poses.
 
-    model: a module generated from a SolvePlan; tolerance: residual relative to the size above which the status of a
-    sample is not ok (Newton always goes to round-off); anchor: a good pose to follow all others from, the model's own
-    if None.
+    Args:
+        model: Module generated from a SolvePlan.
+        tolerance: Residual relative to the size above which a sample is not ok; Newton always goes to round-off.
+        anchor: A good pose from which all others are followed; default: the model's own.
+
     """
 
     def __init__(self, model: Model, tolerance: float = TOLERANCE, anchor: Pose | None = None) -> None:
@@ -41,7 +43,7 @@ class Solver:
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
-        """The pose at driver values u, followed from the good pose `start` in a straight line of the driver values."""
+        """Return the pose at driver values u, followed from a good pose in a straight line of the driver values."""
         if self._tracks:
             return self._by_tracks(start, u)
         if start.base is not None and u != start.u:
@@ -72,7 +74,7 @@ class Solver:
         return self._checked(pose)
 
     def _by_tracks(self, start: Pose, u: Vector) -> Pose:
-        """The pose put together from those of the tracks, each followed along its own driver."""
+        """Return the pose that consists of the poses of the tracks, each followed along its own driver."""
         if u == start.u and (start.tracks or start.singularities):
             return start
         near = self._near(start, u)  # most samples: one trusted step of all drivers
@@ -86,7 +88,7 @@ class Solver:
         return self._checked(pose) if pose.good else pose
 
     def _assembled(self, start: Pose, u: Vector, target: Vector, z: Vector) -> Pose:
-        """The pose of the tracks at u, on the way from `start` to `target`; all other blocks are as z has them."""
+        """Return the pose of the tracks at u, on the path from `start` to `target`; all other blocks are as in z."""
         known = {track.driver: own for track, own in start.tracks}
         parts = []
         for k, solver in enumerate(self._tracks):
@@ -94,7 +96,7 @@ class Solver:
                 continue
             before = known.get(k) or on_track(solver.model, start)
             own = solver.solve(before, (u[k],))
-            if not own.good and u is not target:  # the message is to tell of the target
+            if not own.good and u is not target:  # the message names the target
                 beyond = solver.solve(before, (target[k],))
                 own = own if beyond.good else beyond
             if not own.good:
@@ -103,7 +105,7 @@ class Solver:
             parts.append((solver.model, own))
         try:
             pose = Pose(u, evaluated(self.model, u, z))
-        except (ArithmeticError, ValueError):  # a coordinate that is given outright has no value there
+        except (ArithmeticError, ValueError):  # an assigned coordinate has no value there
             return failed(start, target, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), target))
         pose.tracks = tuple(parts)
         maps = {track.driver: own.singularities for track, own in parts}
@@ -117,9 +119,9 @@ class Solver:
         return pose
 
     def _followed(self, start: Pose, target: Vector) -> Pose:
-        """The pose at `target` where blocks depend on several drivers: those follow the tracks in trusted steps.
+        """Return the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
 
-        The drivers go straight. As in `advance`, but at each step the tracks are solved first, and the other blocks are
+        The path is straight, as in `advance`, but at each step the tracks are solved first, and the other blocks are
         predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
         """
         model, pose = self.model, start
@@ -166,8 +168,9 @@ class Solver:
         return failed(start, target, Status.OUTSIDE, limit_message(self._mixed, limit, target))
 
     def _mixed_step(self, pose: Pose, u: Vector, target: Vector) -> Pose | None:
-        """One step of all blocks, or None if those that depend on several drivers cannot be trusted to stay on their
-        branch; a failed pose if the tracks end before.
+        """Return one step of all blocks, or a failed pose if the tracks end before it.
+
+        None if the blocks that depend on several drivers cannot be trusted to stay on their branch.
         """
         there = self._assembled(pose, u, target, pose.z)
         if not there.good:
@@ -187,13 +190,13 @@ class Solver:
         return there
 
     def _mixed_limit(self, before: Pose, pose: Pose, direction: Vector) -> Limit:
-        """Where the way of the blocks that depend on several drivers ends, just beyond a pose."""
+        """Return where the path of the blocks that depend on several drivers ends, just beyond a pose."""
         slopes, _ = rates_in_time(self.model, pose, direction, (0.0,) * len(direction))
         mixed = self._mixed.with_rest(pose.z, slopes)
         return limit_beyond(mixed, on_track(mixed, before), on_track(mixed, pose), direction)
 
     def _near(self, start: Pose, u: Vector) -> Pose | None:
-        """The pose one trusted step away, if it and the step are far from all that is singular on a track."""
+        """Return the pose one trusted step away, or None if a track is near a singular point there."""
         if start.status or start.base is not None or not self._is_apart(start):
             return None
         direction, distance = straight_path(self.model, start.u, u)
@@ -212,7 +215,7 @@ class Solver:
         return near
 
     def _is_apart(self, pose: Pose) -> bool:
-        """True if the blocks of all tracks are regular, and the others not near singular."""
+        """Return whether the blocks of all tracks are regular, and the others not near singular."""
         margin: float = pose.margin
         if margin >= REGULAR or self._mixed is None:
             return margin >= REGULAR
@@ -220,7 +223,7 @@ class Solver:
         return margin >= NEAR_SINGULAR and min(of_tracks) >= REGULAR
 
     def _again(self, start: Pose) -> Pose:
-        """The pose at the driver values of `start`: `start` itself, unless nothing has judged it yet, as the anchor."""
+        """Return the pose at the driver values of `start`: `start` itself, or its checked copy if it is the anchor."""
         pose = start
         if start.margin < REGULAR and start.status == Status.OK and start.singularities is None:
             singularities = surveyed(self.model, start, start) if self._one else None
@@ -235,28 +238,30 @@ class Solver:
         return self._checked(with_map(pose, pose.singularities))
 
     def _checked(self, pose: Pose) -> Pose:
-        """The pose, rejected if its rows do not close or the rows set aside as redundant do not hold."""
+        """Return the pose, rejected if its rows or its watches do not close."""
         tolerance = self.tolerance
         if not (pose.residual <= tolerance and pose.watch <= tolerance):
             self._reject(pose)
         return pose
 
     def _reject(self, pose: Pose) -> None:
-        """A pose counts only if its rows close and the rows set aside as redundant hold too."""
+        """Set status and message of a pose whose rows or watches do not close."""
         if not pose.residual <= self.tolerance:
             pose.status = Status.NOT_CONVERGED
-            pose.message = f"{place(self.model, pose.u)}: residual {pose.residual:.2g} of the size is left"
+            pose.message = (
+                f"{place(self.model, pose.u)}: the rows do not close: residual {pose.residual:.2g} of the size"
+            )
             return
         open_rows = zip(self.model.WATCHES, self.watch(pose), strict=True)
         name, value = max(open_rows, key=lambda row: abs(row[1]))
         gap = abs(value) * self.model.SIZE
         pose.status = Status.INCONSISTENT
         pose.message = (
-            f"{place(self.model, pose.u)}: the redundant row {name} is open by {gap:.3g} {self.model.LENGTH_UNIT}"
+            f"{place(self.model, pose.u)}: redundant row {name} does not close: gap {gap:.3g} {self.model.LENGTH_UNIT}"
         )
 
     def _first(self, pose: Pose, ud: Vector) -> Vector:
-        """What the model's rates start from: z' = dz/du with one driver, else zd."""
+        """Return the argument of the model's rates: z' = dz/du with one driver, else zd."""
         if self._one:
             return tangent_of(self.model, pose)[0]
         return (
@@ -266,34 +271,34 @@ class Solver:
         )
 
     def _both(self, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
-        """What the model's accelerations start from: z' and z'' with one driver, else zd and zdd."""
+        """Return the arguments of the model's accelerations: z' and z'' with one driver, else zd and zdd."""
         if self._one:
             return tangent_of(self.model, pose)
         return rates_in_time(self.model, pose, ud, udd)
 
     def outputs(self, pose: Pose) -> Vector:
-        """Positions of the model's OUTPUTS."""
+        """Return positions of the model's OUTPUTS."""
         return self.model.outputs(pose.values)  # type: ignore[no-any-return]  # generated code has no types
 
     def rates(self, pose: Pose, ud: Vector) -> Vector:
-        """Rates of the OUTPUTS at driver speeds ud."""
+        """Return rates of the OUTPUTS at driver speeds ud."""
         return self.model.rates(pose.values, ud, self._first(pose, ud))  # type: ignore[no-any-return]
 
     def accelerations(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
-        """Accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
+        """Return accelerations of the OUTPUTS at driver speeds ud and accelerations udd."""
         first, second = self._both(pose, ud, udd)
         return self.model.accelerations(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 
     def motion(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
-        """Positions, rates and accelerations of the OUTPUTS in one row: what they share is computed once."""
-        if self._one and pose.tangent is None:  # the rule in an FMU: each pose is read once, and before the next step
+        """Return positions, rates and accelerations of the OUTPUTS in one row; common terms are computed once."""
+        if self._one and pose.tangent is None:  # the rule in an FMU: each pose is read once, before the next step
             pose.tangent, row = self.model.first_motion(pose.values, ud, udd)
             return row  # type: ignore[no-any-return]
         first, second = pose.tangent or self._both(pose, ud, udd)
         return self.model.motion(pose.values, ud, udd, first, second)  # type: ignore[no-any-return]
 
     def watch(self, pose: Pose) -> Vector:
-        """Rows set aside as redundant, relative to the size."""
+        """Return the residuals of the watches, relative to the size."""
         return tuple(self.model.watches(pose.values))
 
     def margin(self, pose: Pose) -> float:
@@ -303,16 +308,23 @@ class Solver:
     def errors(
         self, pose: Pose, ud: Vector, udd: Vector, off: tuple[Vector, Vector] | None = None
     ) -> tuple[float, float, float]:
-        """Estimated errors of q, qd, qdd at driver speeds ud and accelerations udd, the largest among the outputs.
+        """Return estimated errors of q, qd, qdd, the largest of the outputs; see estimate.
 
-        In radians, and relative to the size for lengths; see estimate. off: by how much ud and udd may be off
-        themselves; None if they are exact.
+        Args:
+            pose: A good pose.
+            ud: Speeds of the drivers.
+            udd: Accelerations of the drivers.
+            off: Errors of ud and udd; default: they are exact.
+
+        Returns:
+            Errors in radians, and relative to the size for lengths.
+
         """
         errors = estimated_errors(self.model, pose, ud, udd)
         return errors if off is None else with_driver_errors(self.model, pose, ud, udd, off, errors)
 
     def dump(self, pose: Pose) -> list[Any]:
-        """A pose as plain numbers; `restore` gives one that behaves the same to the bit."""
+        """Return a pose as plain numbers; `restore` gives one that behaves the same to the bit."""
         if self._tracks:
             maps = pose.singularities and [None if one is None else one.dump() for one in pose.singularities]
             parts = [self._tracks[track.driver].dump(own) for track, own in pose.tracks]
@@ -324,7 +336,7 @@ class Solver:
         return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, known, number, base]
 
     def restore(self, data: list[Any]) -> Pose:
-        """The pose that was dumped."""
+        """Return the pose that `dump` gave as plain numbers."""
         if self._tracks:
             return self._restored(*data)
         u, z, iterations, status, message, known, number, base = data
@@ -349,7 +361,7 @@ class Solver:
         parts: list[Any],
         base: list[list[float]] | None,
     ) -> Pose:
-        """The same of a pose that is put together from tracks."""
+        """Return the same of a pose that consists of tracks."""
         pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
         pose.iterations, pose.status, pose.message = iterations, status, message
         if base is not None:
@@ -370,5 +382,5 @@ class Solver:
 
 
 def _solver_of(track: Track, anchor: Pose) -> Solver:
-    """A solver of a track alone; the whole is what counts for the tolerance."""
+    """Return a solver of a track alone; the tolerance applies to the whole pose only."""
     return Solver(track, inf, on_track(track, anchor))

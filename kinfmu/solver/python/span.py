@@ -1,4 +1,4 @@
-"""Span: what is interpolated across a singular point, from six regular poses around it."""
+"""Span: interpolation across a singular point from six regular poses around it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from .hermite import Hermite, weights
 from .pose import Model, Pose, Vector, evaluated, tangent_of
 
-REGULAR = 0.19  # determinant from which a block is solved as elsewhere; less than the sine at a bridge's last node
+REGULAR = 0.19  # determinant from which a block is regular; less than the sine at a bridge's last node
 PLACES = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the nodes, in half widths
 _INNER = PLACES[1:5]
 _OUTER = (*PLACES[:2], *PLACES[4:])
@@ -17,8 +17,8 @@ _OUTER = (*PLACES[:2], *PLACES[4:])
 class Span:
     """The unknowns of singular blocks around `centre`, for a single driver.
 
-    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: bit a block that is interpolated. The inner four nodes
-    give the numbers, the outer four a second opinion: their difference is the error estimate.
+    nodes: six poses at -4, -2, -1, 1, 2, 4 half widths; held: one bit for each block, set if it is interpolated.
+    The inner four nodes give the numbers; their difference from the outer four is the error estimate.
     """
 
     __slots__ = ("_inner", "_middle", "_outer", "centre", "half", "held", "model", "nodes")
@@ -38,13 +38,13 @@ class Span:
         self._middle: tuple[Vector, Vector] | None = None
 
     def read(self, x: float) -> tuple[Vector, Vector, Vector]:
-        """z and its two derivatives with respect to the driver at x = (u - centre) / half."""
+        """Return z and its two derivatives with respect to the driver at x = (u - centre) / half."""
         if self._inner is None:
             self._inner = _polynomials(self.model, self.half, _INNER, self.nodes[1:5])
         return _read(self._inner, x, self.half)
 
     def difference(self, x: float) -> tuple[Vector, Vector, Vector]:
-        """What the outer nodes say less than the inner ones, in z and its two derivatives: the error estimate."""
+        """Return the difference of inner and outer nodes, in z and its two derivatives: the error estimate."""
         if self._outer is None:
             self._outer = _polynomials(self.model, self.half, _OUTER, [*self.nodes[:2], *self.nodes[4:]])
         a, b = self.read(x), _read(self._outer, x, self.half)
@@ -52,7 +52,7 @@ class Span:
         return z, zd, zdd
 
     def middle(self) -> tuple[Vector, Vector]:
-        """z at the centre by the inner nodes, and by the outer ones."""
+        """Return z at the centre by the inner nodes, and by the outer ones."""
         if self._middle is None:
             inner = combined(self.model, self.half, weights(_INNER, 0.0), self.nodes[1:5])
             outer = combined(self.model, self.half, weights(_OUTER, 0.0), [*self.nodes[:2], *self.nodes[4:]])
@@ -60,24 +60,24 @@ class Span:
         return self._middle
 
     def apart(self) -> float:
-        """Largest difference of the two at the centre, in radians and sizes."""
+        """Return the largest difference of the two at the centre, in radians and sizes."""
         inner, outer = self.middle()
         scales = self.model.UNKNOWN_SCALES
         return float(max([abs(a - b) / c for a, b, c in zip(inner, outer, scales, strict=True)]))
 
     def dump(self) -> list[Any]:
-        """Plain numbers from which `restored_span` makes the same span."""
+        """Return plain numbers from which `restored_span` makes an equal span."""
         return [self.centre, self.half, [[list(node.u), list(node.z)] for node in self.nodes]]
 
 
 def restored_span(model: Model, data: list[Any]) -> Span:
-    """The span that was dumped."""
+    """Return the span that `dump` gave as plain numbers."""
     centre, half, nodes = data
     return Span(model, centre, half, [Pose(tuple(u), evaluated(model, tuple(u), tuple(z))) for u, z in nodes])
 
 
 def combined(model: Model, half: float, by: Sequence[Vector], poses: Sequence[Pose]) -> Vector:
-    """z of the Hermite polynomials through poses, at a place whose weights are known."""
+    """Return z of the Hermite polynomials through poses, at a place with known weights."""
     total = [0.0] * len(model.UNKNOWNS)
     for pose, (w0, w1, w2) in zip(poses, by, strict=True):
         zd, zdd = tangent_of(model, pose)
@@ -87,7 +87,7 @@ def combined(model: Model, half: float, by: Sequence[Vector], poses: Sequence[Po
 
 
 def _polynomials(model: Model, half: float, places: tuple[float, ...], poses: Sequence[Pose]) -> list[Hermite]:
-    """One polynomial an unknown, over x = (u - centre) / half; the derivatives are with respect to x."""
+    """Return one polynomial for each unknown, over x = (u - centre) / half; the derivatives are with respect to x."""
     tangents = [tangent_of(model, pose) for pose in poses]
     return [
         Hermite(
@@ -101,7 +101,7 @@ def _polynomials(model: Model, half: float, places: tuple[float, ...], poses: Se
 
 
 def _read(polynomials: list[Hermite], x: float, half: float) -> tuple[Vector, Vector, Vector]:
-    """z and its two derivatives with respect to the driver at x."""
+    """Return z and its two derivatives with respect to the driver at x."""
     per_x = 1.0 / half
     values = [polynomial(x) for polynomial in polynomials]
     return (

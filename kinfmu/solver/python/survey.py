@@ -25,7 +25,7 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> SingularityMap | None:
             if again is not None:
                 return known.with_bridge(again, pose.u[0])
     reach: float = model.REACH[0]
-    before = pose if abs(here - pose.u[0]) > 1e-3 * reach else _beside(model, trial, low[0], 0.02 * reach)
+    before = pose if abs(here - pose.u[0]) > 1e-3 * reach else _nearby(model, trial, low[0], 0.02 * reach)
     if before is None:
         return singularities
     for block in low:  # upstream first
@@ -44,7 +44,7 @@ def surveyed(model: Model, pose: Pose, trial: Pose) -> SingularityMap | None:
     return singularities
 
 
-def _beside(model: Model, pose: Pose, block: int, distance: float) -> Pose | None:
+def _nearby(model: Model, pose: Pose, block: int, distance: float) -> Pose | None:
     """Return a pose at a distance from another, on the side where a block's determinant grows, if any."""
     for offset in (distance, -distance):
         other = follow_path(model, pose, pose.u[0] + offset)

@@ -1,7 +1,7 @@
-"""Tracks: what depends on one driver alone is followed along that driver, whatever the other drivers do.
+"""Tracks: blocks that depend on one driver alone are followed along that driver, independently of the others.
 
 The blocks that depend on one driver, as those of two machines in one file do, are a mechanism with that driver: its
-track. A track has singular points, bridges and limits of its own. A pose of the whole is put together from one pose of
+track. A track has singular points, bridges and limits of its own. A pose of the whole mechanism consists of one pose of
 each track. Blocks that depend on several drivers come after the tracks: they follow both the drivers and the tracks.
 """
 
@@ -22,7 +22,7 @@ MIXED = -1  # in place of a block's driver: it depends on several
 class Track:
     """The blocks of a model that depend on one of its drivers, as a model with that driver alone.
 
-    driver: its position; MIXED: the blocks that depend on several drivers, as a model with all drivers. u, z: driver
+    driver: its index; MIXED: the blocks that depend on several drivers, as a model with all drivers. u, z: driver
     values and unknowns of an assembled pose: there the rest of the model stays.
     """
 
@@ -63,32 +63,34 @@ class Track:
         self.BLOCKS = tuple(pairwise(ends))
 
     def with_rest(self, z: Vector, slopes: Vector) -> Track:
-        """The same blocks while the rest of the model is at other unknowns, and moves.
+        """Return the same blocks while the rest of the model is at other unknowns and moves.
 
-        slopes: derivatives of the unknowns of the rest along the way that the drivers go; their second derivatives are
-        0. What `z` and `slopes` have of the blocks themselves does not count.
+        Args:
+            z: Unknowns of the whole model; those of the track's own blocks are not used.
+            slopes: Their derivatives along the path of the drivers; second derivatives are 0.
+
         """
         there = copy(self)
         there._z, there._slopes = z, slopes
         return there
 
     def of(self, whole: Sequence[Any]) -> tuple[Any, ...]:
-        """What the track has of a row with one item an unknown of the model."""
+        """Return the track's items of a row with one item for each unknown of the model."""
         return tuple([whole[k] for k in self.places])
 
     def put(self, own: Sequence[float], whole: Sequence[float]) -> Vector:
-        """The row with the track's items in it."""
+        """Return the row with the track's items in it."""
         values = list(whole)
         for k, value in zip(self.places, own, strict=True):
             values[k] = value
         return tuple(values)
 
     def mask(self, held: int) -> int:
-        """Bits of the track's blocks as bits of the model's."""
+        """Return bits of the track's blocks as bits of the model's."""
         return sum([1 << block for k, block in enumerate(self.blocks) if held >> k & 1])
 
     def position(self, u: Vector, z: Vector, zd: Vector, zdd: Vector, s: float, held: int = 0, *enough: float) -> Found:
-        """As a model's `position`."""
+        """Return the same as a model's `position`."""
         still = (0.0,) * len(self._z)
         driven = u if self.driver == MIXED else (*self._u[: self.driver], u[0], *self._u[self.driver + 1 :])
         found = self._model.position(
@@ -117,12 +119,12 @@ class Track:
         )
 
     def tangent(self, values: Any) -> tuple[Vector, Vector]:
-        """As a model's `tangent`."""
+        """Return the same as a model's `tangent`."""
         zd = self.velocity(values, self._along)
         return zd, self.acceleration(values, self._along, self._rest, zd)
 
     def velocity(self, values: Any, ud: Vector, given: Vector = (), held: int = 0) -> Vector:
-        """As a model's `velocity`."""
+        """Return the same as a model's `velocity`."""
         whole = self.put(given or (0.0,) * len(self.places), self._slopes)
         driven = self._driven(ud)
         return self.of(self._model.velocity(values, driven, whole, self._outside | self.mask(held)))
@@ -130,7 +132,7 @@ class Track:
     def acceleration(
         self, values: Any, ud: Vector, udd: Vector, zd: Vector, given: Vector = (), held: int = 0
     ) -> Vector:
-        """As a model's `acceleration`."""
+        """Return the same as a model's `acceleration`."""
         still = (0.0,) * len(self._z)
         first, whole = self.put(zd, self._slopes), self.put(given or (0.0,) * len(self.places), still)
         mask = self._outside | self.mask(held)
@@ -140,18 +142,18 @@ class Track:
         return (*self._rest[: self.driver], rate[0], *self._rest[self.driver + 1 :]) if len(rate) == 1 else rate
 
     def jacobians(self, values: Any) -> list[Matrix]:
-        """As a model's `jacobians`."""
+        """Return the same as a model's `jacobians`."""
         every = self._model.jacobians(values)
         return [every[k] for k in self.blocks]
 
     def residuals(self, values: Any) -> list[list[float]]:
-        """As a model's `residuals`."""
+        """Return the same as a model's `residuals`."""
         every = self._model.residuals(values)
         return [every[k] for k in self.blocks]
 
 
 def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
-    """The track of each driver, None for a driver that no block depends on alone; none at all if there is no track."""
+    """Return the track of each driver, None where no block depends on it alone; an empty row if there is no track."""
     by = getattr(model, "BLOCK_DRIVERS", ())
     if not by or max(by) == MIXED:
         return ()
@@ -159,7 +161,7 @@ def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
 
 
 def held_blocks(pose: Pose) -> int:
-    """Bits of the blocks that are interpolated at a pose."""
+    """Return bits of the blocks that are interpolated at a pose."""
     held = 0 if pose.bridge is None else pose.bridge.span.held
     for track, own in pose.tracks:
         if own.bridge is not None:
@@ -168,7 +170,7 @@ def held_blocks(pose: Pose) -> int:
 
 
 def on_track(track: Track, pose: Pose) -> Pose:
-    """What a track has of a pose of the whole."""
+    """Return the track's part of a pose of the whole mechanism."""
     if track.driver == MIXED:
         determinants = tuple([pose.determinants[k] for k in track.blocks])
         margin = min([abs(determinant) for determinant in determinants])
@@ -179,7 +181,7 @@ def on_track(track: Track, pose: Pose) -> Pose:
 
 
 def rates_in_time(model: Model, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
-    """First and second derivative of the unknowns in time; of blocks that are interpolated by the chain rule."""
+    """Return first and second derivative of the unknowns in time; interpolated blocks by the chain rule."""
     held = held_blocks(pose) if pose.is_bridged else 0
     if not held:
         zd = tuple(model.velocity(pose.values, ud))

@@ -8,10 +8,10 @@ _LOW = 2.430840202602477e-10  # [rad]; the rest
 
 
 def turned(angle: float, turns: float) -> float:
-    """angle + turns * 2 pi [rad], rounded about once."""
+    """Return angle + turns * 2 pi [rad], rounded about once."""
     return angle + turns * _HIGH + turns * _LOW
 
 
 def whole_turns(angle: float) -> int:
-    """The whole number of turns nearest to an angle [rad]."""
+    """Return the whole number of turns nearest to an angle [rad]."""
     return round(angle / TURN)

@@ -10,7 +10,14 @@ from .pose import Vector
 
 
 def worst_case_step(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[float]:
-    """J^-1 (s R), signs s chosen so that the unknown that can be moved farthest is."""
+    """Return J^-1 (s R) (k,) with those signs s that move the unknown that can move farthest as far as possible.
+
+    Args:
+        matrix: J (m, k) of a block, m >= k.
+        rows: R, scales of its rows, in lengths.
+        scales: Of its unknowns.
+
+    """
     k = len(scales)
     if len(rows) == k == 1:
         return (abs(rows[0] / matrix[0][0]),)
@@ -27,7 +34,7 @@ def worst_case_step(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[fl
 
 
 def _worst_case_step_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
-    """The same for 2 x 2, with the inverse written out: its columns (d p, -c p) and (-b q, a q)."""
+    """Return the same for 2 x 2, with the inverse written out: its columns (d p, -c p) and (-b q, a q)."""
     (a, b), (c, d) = matrix
     det = a * d - b * c
     p, q = rows[0] / det, rows[1] / det
@@ -44,7 +51,7 @@ def choose(number: float, if_positive: float, otherwise: float) -> float:
 
 
 def _inverse(matrix: Matrix, rows: Vector) -> list[Sequence[float]]:
-    """Columns of J^-1, of the least-squares inverse if J is tall, each times the scale of its row."""
+    """Return the columns of J^-1 (of the least-squares inverse if J is tall), each times the scale of its row."""
     m = len(rows)
     units = [[scale if j == i else 0.0 for j in range(m)] for i, scale in enumerate(rows)]
     if m == len(matrix[0]):

@@ -41,7 +41,7 @@ void probe_tell(const kf_pose *pose, double *z, double *numbers, int *counts)
 """
 
 
-class Told(NamedTuple):
+class Answer(NamedTuple):
     """A pose of the solver in C."""
 
     z: tuple[float, ...]
@@ -87,12 +87,12 @@ class Native:
     def message(self) -> str:
         return str(self.c.probe_message(self.solver).decode())
 
-    def solve(self, u: Sequence[float]) -> Told:
+    def solve(self, u: Sequence[float]) -> Answer:
         """A trial from the committed pose."""
         status = self.c.kf_solve(self.solver, self.good, numbers(u), self.found)
-        told = self.told()
-        assert told.status == status
-        return told
+        answer = self.answer()
+        assert answer.status == status
+        return answer
 
     def take(self, other: Native) -> None:
         """The state of another instance: the solver's first bytes and the committed pose's."""
@@ -104,13 +104,13 @@ class Native:
             self.good, self.found = self.poses
             ctypes.memmove(self.good, other.good, len(self.good))
 
-    def told_anchor(self) -> Told:
-        return self.told(ctypes.c_void_p(self.c.probe_anchor(self.solver)))
+    def anchor(self) -> Answer:
+        return self.answer(ctypes.c_void_p(self.c.probe_anchor(self.solver)))
 
-    def told(self, pose: Any = None) -> Told:
+    def answer(self, pose: Any = None) -> Answer:
         z, three, counts = numbers([0.0] * self.sizes["UNKNOWNS"]), numbers([0.0] * 3), (ctypes.c_int * 3)()
         self.c.probe_tell(self.found if pose is None else pose, z, three, counts)
-        return Told(tuple(z[: self.sizes["UNKNOWNS"]]), *three, *counts[:2])
+        return Answer(tuple(z[: self.sizes["UNKNOWNS"]]), *three, *counts[:2])
 
     def commit(self) -> None:
         self.good, self.found = self.found, self.poses[1] if self.found is self.poses[0] else self.poses[0]

@@ -1,4 +1,4 @@
-"""The solver in C under sanitizers, valgrind and other compilers: no byte read that was not written, none beside."""
+"""The solver in C under sanitizers, valgrind and other compilers: no byte is read unwritten or out of bounds."""
 
 from __future__ import annotations
 

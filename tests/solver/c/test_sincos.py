@@ -1,4 +1,4 @@
-"""Sine and cosine of the run time in C, beside 50 digits."""
+"""Sine and cosine of the run time in C, compared with 50 digits."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def angles() -> np.ndarray[Any, Any]:
     """Of all sizes up to 2^20 quarter turns, and as near to quarters as doubles are."""
     random = np.random.default_rng(5)
     quarters = math.pi / 2 * np.concatenate([np.arange(-40, 41), random.integers(-(2**20), 2**20, 400)])
-    beside = [np.nextafter(quarters, side) for side in (-np.inf, np.inf)]
+    near = [np.nextafter(quarters, side) for side in (-np.inf, np.inf)]
     widths = 10.0 ** random.uniform(-12, math.log10(2**20 * math.pi / 2), 4000)
-    return np.concatenate([[0.0, -0.0], quarters, *beside, random.uniform(-1, 1, 4000) * widths])
+    return np.concatenate([[0.0, -0.0], quarters, *near, random.uniform(-1, 1, 4000) * widths])
 
 
 def test_sine_and_cosine_are_right_to_1e_16_one_by_one_and_side_by_side(library: Any) -> None:
@@ -88,7 +88,7 @@ def test_beyond_2_to_the_20_quarters_half_an_ulp_of_the_angle_is_lost(library: A
     assert (errors(x, evaluated(library.one_by_one, x)) <= 1.3e-16 + 0.5 * np.spacing(np.abs(x))).all()
 
 
-def test_what_is_no_number_has_no_sine(library: Any) -> None:
+def test_the_sine_of_nan_and_infinity_is_nan(library: Any) -> None:
     x = np.array([math.nan, math.inf, -math.inf])
     for function in (library.one_by_one, library.side_by_side):
         assert np.isnan(evaluated(function, x)).all()

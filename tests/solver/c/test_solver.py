@@ -79,14 +79,14 @@ def assert_same(plan: SolvePlan, samples: Samples, flags: Sequence[str] = QUICK)
     python, c = solver_of(plan), Native(plan, flags)
     good, statuses = python.anchor, []
     for u in samples:
-        pose, told = python.solve(good, u), c.solve(u)
-        statuses.append(told.status)
-        assert told.status == pose.status, u
+        pose, answer = python.solve(good, u), c.solve(u)
+        statuses.append(answer.status)
+        assert answer.status == pose.status, u
         if not pose.good:
             assert c.message == pose.message
             continue
-        assert (told.z, told.iterations) == (pose.z, pose.iterations), u
-        assert (told.margin, told.residual, told.watch) == (pose.margin, pose.residual, pose.watch), u
+        assert (answer.z, answer.iterations) == (pose.z, pose.iterations), u
+        assert (answer.margin, answer.residual, answer.watch) == (pose.margin, pose.residual, pose.watch), u
         ud, udd = (0.7,) * len(u), (-0.3,) * len(u)
         row, wanted = (
             [value for row in c.motion(ud, udd) for value in row or ()],
@@ -176,7 +176,7 @@ SINGULAR: dict[str, tuple[Callable[[], Mechanism], Samples, set[Status]]] = {
 
 
 @pytest.mark.parametrize("name", SINGULAR)
-def test_c_and_python_are_the_same_about_singular_points_and_limits(name: str) -> None:
+def test_c_and_python_are_the_same_near_singular_points_and_limits(name: str) -> None:
     mechanism, samples, expected = SINGULAR[name]
     statuses = assert_same(compile_plan(mechanism()), samples)
     assert expected <= set(statuses)
@@ -229,23 +229,23 @@ def test_c_and_python_are_the_same_where_blocks_of_one_driver_and_of_several_are
 
 
 @pytest.mark.parametrize("mechanism", CHANGES)
-def test_parameters_are_followed_and_refused_alike(mechanism: Callable[[], Mechanism]) -> None:
+def test_parameters_are_followed_and_refused_by_both_solvers(mechanism: Callable[[], Mechanism]) -> None:
     plan = compile_plan(mechanism())
     c = Native(plan, QUICK)
     for change in CHANGES[mechanism]:
         values = tuple(change.get(parameter.name, parameter.value) for parameter in plan.parameters)
         python = with_parameters(load_module(plan), values)
         assert c.bind(values) == getattr(python, "message", ""), change
-        assert c.told_anchor().z == pytest.approx(python.anchor.z, rel=0, abs=1e-12)
+        assert c.anchor().z == pytest.approx(python.anchor.z, rel=0, abs=1e-12)
         for u in (1.2, 2.0, 7.5):
-            pose, told = python.solve(python.anchor, (u,)), c.solve((u,))
-            assert told.status == pose.status
+            pose, answer = python.solve(python.anchor, (u,)), c.solve((u,))
+            assert answer.status == pose.status
             assert c.message == pose.message or pose.good
             if pose.good:
-                assert told.z == pytest.approx(pose.z, rel=0, abs=1e-12)
+                assert answer.z == pytest.approx(pose.z, rel=0, abs=1e-12)
 
 
-def test_a_redundant_row_that_no_longer_holds_is_told_alike() -> None:
+def test_both_solvers_report_a_redundant_row_that_no_longer_holds() -> None:
     reference = kinfmu.load("fourbar")
     joints = tuple(replace(joint, length="bar") if joint.name == "AB" else joint for joint in reference.joints)
     plan = compile_plan(replace(reference, joints=joints, parameters={"bar": 1.0}))
@@ -254,21 +254,21 @@ def test_a_redundant_row_that_no_longer_holds_is_told_alike() -> None:
         assert c.bind((bar,)) == getattr(with_parameters(load_module(plan), (bar,)), "message", "")
     assert c.solve((1.1,)).status == Status.OK
     for u in (3.0, 1.0 + 4.0 * math.pi):
-        told = c.solve((u,))
-        assert told.status == Status.OK
+        answer = c.solve((u,))
+        assert answer.status == Status.OK
 
 
-def test_numbers_that_are_none_are_told_alike() -> None:
+def test_both_solvers_report_values_that_are_not_numbers() -> None:
     plan = compile_plan(kinfmu.load("five_bar"))
     python, c = solver_of(plan), Native(plan, QUICK)
     for u in ((math.nan, 1.0), (1.0, math.inf), (1e300, 1.0)):
-        pose, told = python.solve(python.anchor, u), c.solve(u)
-        assert told.status == pose.status == Status.OUTSIDE
+        pose, answer = python.solve(python.anchor, u), c.solve(u)
+        assert answer.status == pose.status == Status.OUTSIDE
         assert c.message == pose.message
 
 
 @pytest.mark.parametrize("name", ["fourbar", "double_pendulum"])
-def test_trials_leave_no_trace_and_a_copy_of_the_bytes_does_the_same_in_another_instance(name: str) -> None:
+def test_trials_leave_no_trace_and_a_copy_of_the_bytes_behaves_the_same(name: str) -> None:
     plan = compile_plan(kinfmu.load(name))
     one, other, again = Native(plan), Native(plan), Native(plan)
     rng = random.Random(5)  # noqa: S311  # samples, not secrets
@@ -279,19 +279,19 @@ def test_trials_leave_no_trace_and_a_copy_of_the_bytes_does_the_same_in_another_
         if k % 10 == 0:
             again.take(one)
         u = rng.choice([u + rng.uniform(-0.2, 0.4), middle + rng.uniform(-4.0, 4.0), math.pi * rng.randrange(6)])
-        told = [solver.solve((u,)) for solver in (one, other, again)]
-        if told[0].status <= Status.BRIDGED:
-            assert told[0] == told[1] == told[2]
+        answer = [solver.solve((u,)) for solver in (one, other, again)]
+        if answer[0].status <= Status.BRIDGED:
+            assert answer[0] == answer[1] == answer[2]
             rows = [solver.motion((1.0,), (0.5,)) for solver in (one, other, again)]
             assert rows[0] == rows[1] == rows[2]
             for solver in (one, other, again):
                 solver.commit()
         else:
-            assert [pose.status for pose in told] == [told[0].status] * 3
+            assert [pose.status for pose in answer] == [answer[0].status] * 3
             assert one.message == other.message == again.message
 
 
-def test_what_is_not_wanted_is_not_written_and_what_is_wanted_is_the_same() -> None:
+def test_only_requested_tables_are_written_with_the_same_numbers() -> None:
     for name, drivers in (("crank_rocker", 1), ("five_bar", 2)):
         c = Native(compile_plan(kinfmu.load(name)), QUICK)
         start = load_model(compile_plan(kinfmu.load(name))).ANCHOR[0]

@@ -36,9 +36,9 @@ static void draw(const double *from, double *u)
 
 typedef struct {
     double rows[3][KF_OUTPUTS], errors[3], margin;
-} told;
+} numbers;
 
-static void tell(kf_solver *solver, kf_pose *pose, told *all)
+static void read_numbers(kf_solver *solver, kf_pose *pose, numbers *all)
 {
     double ud[KF_DRIVERS], udd[KF_DRIVERS];
     int k;
@@ -55,7 +55,7 @@ static void walk(kf_solver *solver, kf_solver *other, int turns, int *counts)
 {
     kf_pose *const poses = malloc(3 * sizeof *poses);
     kf_pose *good = &solver->anchor, *found = &poses[0];
-    told *const all = malloc(2 * sizeof *all);
+    numbers *const all = malloc(2 * sizeof *all);
     double u[KF_DRIVERS];
     int k;
     while (turns-- > 0) {
@@ -76,8 +76,8 @@ static void walk(kf_solver *solver, kf_solver *other, int turns, int *counts)
                 if (kf_solve(other, start, u, again) != status) {
                     abort();
                 }
-                tell(solver, found, &all[0]);
-                tell(other, again, &all[1]);
+                read_numbers(solver, found, &all[0]);
+                read_numbers(other, again, &all[1]);
                 if (memcmp(&all[0], &all[1], sizeof all[0]) != 0) {
                     abort();
                 }
@@ -87,7 +87,7 @@ static void walk(kf_solver *solver, kf_solver *other, int turns, int *counts)
         k = (int)kf_solve(solver, good, u, found);
         ++counts[k];
         if (KF_GOOD(k)) {
-            tell(solver, found, &all[0]);
+            read_numbers(solver, found, &all[0]);
             good = found;
             found = found == &poses[0] ? &poses[1] : &poses[0];
         } else if (solver->message[0] == '\0' || strlen(solver->message) >= KF_MESSAGE) {

@@ -1,5 +1,5 @@
-/* Messages to the host. A message tells why an answer is not OK; text is finished before it is handed over, since hosts
- * show the format of a message at best.
+/* Messages to the host, which state why an answer is not OK. They are formatted here, since some hosts show only the format
+ * of a message.
  */
 #include "instance.h"
 
@@ -14,22 +14,22 @@ kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char 
     char text[KF_LONGEST];
     const int category = answer == KF_WARN ? 0 : answer == KF_DISCARD ? 1 : 2;
     va_list arguments;
-    if (instance->tell != NULL && !instance->silent && !(instance->muted >> category & 1u)) {
+    if (instance->send != NULL && !instance->silent && !(instance->muted >> category & 1u)) {
         va_start(arguments, format);
         vsnprintf(text, sizeof text, format, arguments);
         va_end(arguments);
-        instance->tell(instance->host, answer, kf_categories[category], text);
+        instance->send(instance->host, answer, kf_categories[category], text);
     }
     return answer;
 }
 
-/* An array of a call is NULL: Error if it should have elements. */
+/* Answer a call in which an array is NULL: Error if it should have elements. */
 kf_answer kf_no_array(const kf_instance *instance, size_t count)
 {
     return count ? kf_answered(instance, KF_ERROR, "a call with %zu elements has NULL for an array", count) : KF_DONE;
 }
 
-/* Of the categories named, or of all if none is. */
+/* Switch logging of the categories named on or off; of all if none is named. */
 kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const char *const *categories)
 {
     kf_answer answer = KF_DONE;
@@ -46,7 +46,7 @@ kf_answer kf_set_logging(kf_instance *instance, bool on, size_t count, const cha
         if (category < 3) {
             named |= 1u << category;
         } else {
-            answer = kf_answered(instance, KF_WARN, "log category '%s' is not known; categories: %s, %s, %s",
+            answer = kf_answered(instance, KF_WARN, "unknown log category '%s'; categories: %s, %s, %s",
                             categories[k] ? categories[k] : "(NULL)", kf_categories[0], kf_categories[1],
                             kf_categories[2]);
         }

@@ -1,12 +1,13 @@
 /* Derivatives: of outputs with respect to inputs, parameters and time; of outputs over time; of inputs over a step.
  *
- * A direction of what is known moves the drivers by (du, dv, da): values, speeds, accelerations. With R(v) the rates of the
+ * A direction of the known variables moves the drivers by (du, dv, da): values, speeds, accelerations. With R(v) the rates of the
  * outputs at driver speeds v, and H(v, w) the bilinear part of their accelerations, H(v, v) = accelerations at rest of v,
  *
  *     d values = R(du),   d rates = R(dv) + H(ud, du),   d accelerations = R(da) + 2 H(ud, dv) + T du
  *
- * come from the linear solves of the pose. T, the third derivative, what diagnostics change by, and what parameters of the
- * geometry do (in initialization only: each trial binds them anew) are central differences of sixth order:
+ * come from the linear solves of the pose. T, the third derivative, and the derivatives of diagnostics and
+ * with respect to parameters of the geometry (in initialization only: each trial binds them anew) are central differences
+ * of sixth order:
  *
  *     f' = (45 (f1 - f-1) - 9 (f2 - f-2) + (f3 - f-3)) / 60 h
  */
@@ -16,16 +17,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define STEP 2e-3    /* [rad, sizes], far from singular points: both rounding and what is cut off stay near 1e-13 */
-#define SMALLEST 0.1 /* of a margin that the step goes with the square of: functions bend so fast near singular points */
-#define TRIES 12     /* halvings of the step where a trial cannot be had */
+#define STEP 2e-3    /* [rad, sizes], far from singular points: rounding and truncation errors are both near 1e-13 */
+#define SMALLEST 0.1 /* margin below which the step is reduced by its square, since curvature grows so near singular points */
+#define TRIES 12     /* halvings of the step where a trial has no solution */
 
 static const double weights[3] = {45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
 
 /* A direction: of the drivers, of the parameters. */
 typedef struct {
     double du[KF_DRIVERS], dv[KF_DRIVERS], da[KF_DRIVERS];
-} kf_way;
+} kf_direction;
 
 static const double at_rest[KF_DRIVERS];
 
@@ -70,17 +71,17 @@ static void add_bilinear(kf_state *s, const double *v, const double *w, double f
     }
 }
 
-/* How the drivers move when the inputs do; estimated rates follow the values that they are estimated from. */
-static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
+/* Return how the drivers move with the inputs; estimated rates follow the values that they are estimated from. */
+static void direction_of_inputs(kf_state *s, const double *seed, kf_direction *direction)
 {
     kf_sample still[KF_SAMPLES];
     double dv[KF_DRIVERS], da[KF_DRIVERS], u[KF_DRIVERS], t;
-    const bool has_inputs = s->model_exchange || s->rates != KF_RATES_ESTIMATED; /* of rates, that count */
+    const bool has_inputs = s->model_exchange || s->rates != KF_RATES_ESTIMATED; /* of rates that are used */
     int k;
     for (k = 0; k < KF_DRIVERS; ++k) {
-        way->du[k] = seed[3 * k];
-        way->dv[k] = has_inputs ? seed[3 * k + 1] : 0.0;
-        way->da[k] = has_inputs ? seed[3 * k + 2] : 0.0;
+        direction->du[k] = seed[3 * k];
+        direction->dv[k] = has_inputs ? seed[3 * k + 1] : 0.0;
+        direction->da[k] = has_inputs ? seed[3 * k + 2] : 0.0;
     }
     if (s->model_exchange || (s->ended && !s->touched)) { /* no estimates, or they come from samples alone */
         return;
@@ -90,15 +91,15 @@ static void way_of_inputs(kf_state *s, const double *seed, kf_way *way)
         memset(still[k].u, 0, sizeof still[k].u);
     }
     kf_moment(s, &t, u);
-    kf_estimated_rates(still, s->samples, t, way->du, dv, da);
+    kf_estimated_rates(still, s->samples, t, direction->du, dv, da);
     for (k = 0; k < KF_DRIVERS; ++k) {
-        way->dv[k] += s->sources[3 * k + 1] ? 0.0 : dv[k];
-        way->da[k] += s->sources[3 * k + 2] ? 0.0 : da[k];
+        direction->dv[k] += s->sources[3 * k + 1] ? 0.0 : dv[k];
+        direction->da[k] += s->sources[3 * k + 2] ? 0.0 : da[k];
     }
 }
 
-/* How the drivers move with time and with the constants of their laws: differences of the laws. */
-static void way_of_time(kf_state *s, const double *seed, double time_seed, kf_way *way)
+/* Return how the drivers move with time and with the constants of their laws, by differences of the laws. */
+static void direction_of_time(kf_state *s, const double *seed, double time_seed, kf_direction *direction)
 {
     const double *const constants = KF_REAL(s, KF_PART_CONSTANTS);
     double moved[KF_ROOM(KF_CONSTANTS)], u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS], fastest, h;
@@ -119,15 +120,15 @@ static void way_of_time(kf_state *s, const double *seed, double time_seed, kf_wa
             }
             kf_drive(&s->solver.model, s->time + sign * j * h * time_seed, moved, u, ud, udd);
             for (k = 0; k < KF_DRIVERS; ++k) {
-                way->du[k] += weight * u[k];
-                way->dv[k] += weight * ud[k];
-                way->da[k] += weight * udd[k];
+                direction->du[k] += weight * u[k];
+                direction->dv[k] += weight * ud[k];
+                direction->da[k] += weight * udd[k];
             }
         }
     }
 }
 
-/* A trial: what parts say at driver values u, with speeds and accelerations, by a solver from a start. */
+/* Evaluate the parts at driver values u, with speeds and accelerations, by a solver from a start. */
 static bool try_at(kf_solver *solver, kf_pose *start, kf_pose *pose, const double *const drive[3], unsigned parts,
                    double *row)
 {
@@ -184,7 +185,7 @@ static bool add_differences(kf_instance *instance, const double *du, kf_solver *
             if (other && !kf_solver_bind(other, moved)) {
                 return false;
             }
-            if (other && s->driven_by_time) { /* parameters may drive, too */
+            if (other && s->driven_by_time) { /* drivers may depend on parameters, too */
                 kf_drive(&other->model, s->time, KF_REAL(s, KF_PART_CONSTANTS), u, ud, udd);
             }
             if (!try_at(solver, start, pose, drive, parts, instance->trial)) {
@@ -215,11 +216,11 @@ static kf_answer differences(kf_instance *instance, const double *du, kf_solver 
     for (k = 0; k < TRIES && !done; ++k, h *= 0.5) {
         done = add_differences(instance, du, other, seed, h, parts);
     }
-    if (s->asked != s->committed) { /* the trials went where the pose was; it is solved again when it is wanted */
+    if (s->asked != s->committed) { /* the trials overwrote the pose; it is solved again when needed */
         s->solved = false;
     }
     if (!done) {
-        return kf_answered(instance, KF_DISCARD, "there is no directional derivative: no pose beside this one can be had");
+        return kf_answered(instance, KF_DISCARD, "there is no directional derivative: no pose near this one can be reached");
     }
     return KF_DONE;
 }
@@ -257,29 +258,29 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
     const unsigned linear = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES);
     kf_state *const s = &instance->now;
     double *const seed = instance->seed, *const slope = instance->slope;
-    kf_way way;
+    kf_direction direction;
     kf_answer answer = KF_DONE;
     int k;
-    memset(&way, 0, sizeof way);
+    memset(&direction, 0, sizeof direction);
     memset(slope, 0, sizeof instance->slope);
     if (s->driven_by_time) {
-        way_of_time(s, seed + kf_part_first[KF_PART_CONSTANTS], time_seed, &way);
+        direction_of_time(s, seed + kf_part_first[KF_PART_CONSTANTS], time_seed, &direction);
     } else {
-        way_of_inputs(s, seed, &way);
+        direction_of_inputs(s, seed, &direction);
     }
-    add_rates(s, way.du, slope + kf_part_first[KF_PART_VALUES]);
-    add_rates(s, way.dv, slope + kf_part_first[KF_PART_RATES]);
-    add_bilinear(s, s->ud, way.du, 1.0, slope + kf_part_first[KF_PART_RATES]);
-    add_rates(s, way.da, slope + kf_part_first[KF_PART_ACCELERATIONS]);
-    add_bilinear(s, s->ud, way.dv, 2.0, slope + kf_part_first[KF_PART_ACCELERATIONS]);
+    add_rates(s, direction.du, slope + kf_part_first[KF_PART_VALUES]);
+    add_rates(s, direction.dv, slope + kf_part_first[KF_PART_RATES]);
+    add_bilinear(s, s->ud, direction.du, 1.0, slope + kf_part_first[KF_PART_RATES]);
+    add_rates(s, direction.da, slope + kf_part_first[KF_PART_ACCELERATIONS]);
+    add_bilinear(s, s->ud, direction.dv, 2.0, slope + kf_part_first[KF_PART_ACCELERATIONS]);
     for (k = 0; k < KF_DRIVERS; ++k) {
         double *const driven = slope + kf_part_first[KF_PART_DRIVEN] + 3 * k;
-        driven[0] = way.du[k];
-        driven[1] = way.dv[k];
-        driven[2] = way.da[k];
+        driven[0] = direction.du[k];
+        driven[1] = direction.dv[k];
+        driven[2] = direction.da[k];
     }
-    if (length_of(way.du) > 0.0 && (parts & ~linear)) {
-        answer = differences(instance, way.du, NULL, NULL, length_of(way.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
+    if (length_of(direction.du) > 0.0 && (parts & ~linear)) {
+        answer = differences(instance, direction.du, NULL, NULL, length_of(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
     }
     if (answer == KF_DONE) {
         answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts & ~KF_BIT(KF_PART_DRIVEN));
@@ -293,7 +294,7 @@ static bool is_unknown(unsigned reference)
     return place < KF_REALS && !(KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS);
 }
 
-/* What may move: inputs, time and tunable parameters; before the end of initialization the fixed ones too. */
+/* Variables that may be differentiated by: inputs, time and tunable parameters; before the end of initialization the fixed ones too. */
 static bool is_known(const kf_state *s, unsigned reference)
 {
     const unsigned place = KF_PLACE(reference);

@@ -1,4 +1,4 @@
-/* What drives: the law, the inputs, or rates estimated from samples of the inputs, for hosts that wire no rates.
+/* Driver values and rates: by the law, by inputs, or estimated from samples of the inputs if the host wires no rates.
  *
  *     a = 2 (d2 - d1) / (t2 - t0),   v = d2 + (d2 - d1) (t2 - t1) / (t2 - t0),   d1, d2 the two slopes
  *
@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#define UNSURE 2.0 /* what one term more says may change by this much over the step */
+#define UNSURE 2.0 /* factor by which the next term may change over the step */
 
 /* A rate beyond KF_LARGEST, from samples at almost the same time, is no estimate. */
 static double usable(double rate)
@@ -89,7 +89,7 @@ void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t,
 }
 
 /* The time and u of the sample that rates are estimated at, and how many seconds later they hold: 0, but a step at the end
- * of a step that followed derivatives of inputs. What is extrapolated is no sample.
+ * of a step that followed derivatives of inputs. Extrapolated values are not samples.
  */
 double kf_moment(const kf_state *s, double *t, double *u)
 {
@@ -109,8 +109,8 @@ double kf_moment(const kf_state *s, double *t, double *u)
     return 0.0;
 }
 
-/* Find where the speed (order 1) and the acceleration (order 2) of each driver come from, as the parameter `rates` says. By
- * default inputs count first, then the derivatives that the host gave of inputs of lower order, then estimates. Model
+/* Find the source of the speed (order 1) and the acceleration (order 2) of each driver, by the parameter `rates`. By
+ * default inputs come first, then the derivatives that the host gave of inputs of lower order, then estimates. Model
  * exchange does not estimate.
  */
 KF_RARE void kf_find_rate_sources(kf_state *s)
@@ -221,7 +221,7 @@ void kf_law(const kf_state *s, double t, double *u, double *ud, double *udd)
     }
 }
 
-/* u, ud, udd of what is asked for. */
+/* u, ud, udd of the requested pose. */
 void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
 {
     if (s->driven_by_time) {
@@ -235,7 +235,7 @@ void kf_asked_drive(const kf_state *s, double *u, double *ud, double *udd)
     }
 }
 
-/* u, ud, udd of the last commit, where the last good values stem from; at rest before the first. */
+/* u, ud, udd of the last commit, from which the last good values come; at rest before the first. */
 static void committed_drive(const kf_state *s, double *u, double *ud, double *udd)
 {
     const kf_sample *const last = s->samples ? &s->history[s->samples - 1] : NULL;
@@ -253,7 +253,7 @@ static void committed_drive(const kf_state *s, double *u, double *ud, double *ud
     }
 }
 
-/* u, ud, udd of what is shown. */
+/* u, ud, udd of the pose shown. */
 void kf_find_drive(kf_state *s)
 {
     if (!s->drive_known) {
@@ -281,7 +281,7 @@ static double largest_gap(const double *there, const double *here)
     return largest;
 }
 
-/* Estimated errors of q, qd, qdd of what is shown, with the errors of estimated rates; infinite if unknown. */
+/* Estimated errors of q, qd, qdd of the pose shown, with the errors of estimated rates; infinite if unknown. */
 static void find_errors(kf_state *s, double errors[3])
 {
     kf_pose *const pose = kf_shown(s);

@@ -14,7 +14,7 @@ typedef struct {
 } instance2;
 
 /* In FMI 2.0 a message is a format, in which `#r1#` is replaced by a variable: % and # of the text are doubled. */
-static void tell(const void *host, kf_answer answer, const char *category, const char *message)
+static void send(const void *host, kf_answer answer, const char *category, const char *message)
 {
     const instance2 *const instance = host;
     char text[2 * KF_LONGEST];
@@ -54,7 +54,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
     return c ? (fmi2Status)kf_set_logging(common(c), loggingOn != fmi2False, nCategories, categories) : fmi2Error;
 }
 
-/* Nothing is read from the resources, so no path is too strange; memory is the C library's. */
+/* Resources are not read, so any path is accepted; memory comes from the C library. */
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
 {
@@ -64,7 +64,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     instance2 *instance;
     (void)fmuResourceLocation;
     (void)visible;
-    (void)loggingOn; /* there are no debug messages: all that are sent tell why a status is not OK */
+    (void)loggingOn; /* there are no debug messages: all messages sent state why a status is not OK */
     if (!kf_token_fits(fmuGUID)) {
         if (logger) {
             logger(environment, name, fmi2Error, kf_categories[2], "the guid is not that of this FMU, " KF_TOKEN);
@@ -79,7 +79,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     memcpy(instance->name, name, strlen(name) + 1);
     instance->logger = logger;
     instance->environment = environment;
-    instance->common.tell = logger ? tell : NULL;
+    instance->common.send = logger ? send : NULL;
     instance->common.host = instance;
     kf_start(&instance->common, fmuType == fmi2ModelExchange);
     return instance;
@@ -93,7 +93,7 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    (void)toleranceDefined; /* Newton goes to round-off whatever tolerance is asked for */
+    (void)toleranceDefined; /* Newton always goes to round-off, whatever the tolerance */
     (void)tolerance;
     return c ? (fmi2Status)kf_set_experiment(common(c), startTime, stopTimeDefined != fmi2False, stopTime) : fmi2Error;
 }
@@ -246,7 +246,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return (fmi2Status)answer;
 }
 
-/* Model exchange: there are no continuous states; events are jumps of what drives over time, and changes of status. */
+/* Model exchange: there are no continuous states; events are jumps of drivers over time and changes of status. */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
@@ -365,7 +365,7 @@ fmi2Status fmi2CancelStep(fmi2Component c)
     return unsupported(c, "cancelStep: steps are done when doStep returns");
 }
 
-/* Steps are never pending: what is told is how the last one ended. */
+/* Steps are never pending: the status is that of the last one. */
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
 {

@@ -12,7 +12,7 @@ typedef struct {
     fmi3InstanceEnvironment environment;
 } instance3;
 
-static void tell(const void *host, kf_answer answer, const char *category, const char *message)
+static void send(const void *host, kf_answer answer, const char *category, const char *message)
 {
     const instance3 *const instance = host;
     instance->logger(instance->environment, (fmi3Status)answer, category, message);
@@ -38,7 +38,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
     return instance ? (fmi3Status)kf_set_logging(common(instance), loggingOn, nCategories, categories) : fmi3Error;
 }
 
-/* Nothing is read from the resources, so no path is too strange. */
+/* Resources are not read, so any path is accepted. */
 static fmi3Instance instantiate(const char *token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                 const char *refusal, bool model_exchange)
 {
@@ -58,7 +58,7 @@ static fmi3Instance instantiate(const char *token, fmi3InstanceEnvironment envir
     }
     instance->logger = logger;
     instance->environment = environment;
-    instance->common.tell = logger ? tell : NULL;
+    instance->common.send = logger ? send : NULL;
     instance->common.host = instance;
     kf_start(&instance->common, model_exchange);
     return instance;
@@ -71,7 +71,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     (void)instanceName;
     (void)resourcePath;
     (void)visible;
-    (void)loggingOn; /* there are no debug messages: all that are sent tell why a status is not OK */
+    (void)loggingOn; /* there are no debug messages: all messages sent state why a status is not OK */
     return instantiate(instantiationToken, instanceEnvironment, logMessage, NULL, true);
 }
 
@@ -121,7 +121,7 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    (void)toleranceDefined; /* Newton goes to round-off whatever tolerance is asked for */
+    (void)toleranceDefined; /* Newton always goes to round-off, whatever the tolerance */
     (void)tolerance;
     if (instance == NULL) {
         return fmi3Error;
@@ -507,7 +507,7 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
-/* Events are jumps of what drives over time, and changes of status; there are no continuous states. */
+/* Events are jumps of drivers over time and changes of status; there are no continuous states. */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {

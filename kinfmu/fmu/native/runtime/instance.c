@@ -1,4 +1,4 @@
-/* The life of an instance: initialization, steps, what is asked for and what is committed. */
+/* The life of an instance: initialization, steps, requested and committed poses. */
 #include "instance.h"
 
 #include <float.h>
@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define SAME_TIME 1e-9 /* of a step: hosts add up time with rounding errors, which move no pose */
-#define JUST_AFTER 4e-15 /* of the numbers that a jump is worked out from */
+#define JUST_AFTER 4e-15 /* relative to the numbers from which a jump is computed */
 #define LATE 1e-3      /* of a step: a sum of a million steps may end this late */
 
 bool kf_token_fits(const char *token)
@@ -36,7 +36,7 @@ void kf_start(kf_instance *instance, bool model_exchange)
     kf_forget(s);
 }
 
-/* What is asked for */
+/* Requested poses */
 
 inline void kf_forget_motion(kf_state *s)
 {
@@ -75,7 +75,7 @@ static KF_RARE kf_answer bind(kf_instance *instance)
     return s->unsolvable ? kf_answered(instance, KF_ERROR, "%s", s->solver.message) : KF_DONE;
 }
 
-/* The pose at driver values u from the committed one, in poses[asked]. */
+/* Solve at driver values u from the committed pose, into poses[asked]. */
 static void solve(kf_state *s, const double *u)
 {
     s->solver.tolerance = *KF_REAL(s, KF_PART_TOLERANCE);
@@ -118,9 +118,9 @@ inline kf_pose *kf_shown(kf_state *s)
     return &s->poses[KF_GOOD(s->status) ? s->asked : s->committed];
 }
 
-/* What is committed */
+/* Committed poses */
 
-/* The pose asked for becomes the one that all others are followed from. */
+/* Commit the requested pose: all others are followed from it. */
 static void commit_pose(kf_state *s)
 {
     memcpy(s->committed_u, KF_POSE_U(&s->poses[s->asked]), sizeof s->committed_u);
@@ -130,7 +130,7 @@ static void commit_pose(kf_state *s)
     s->touched = false;
 }
 
-/* The same, as a sample at time t; step: the size of the step that t is an end of, 0 if there is none. */
+/* Commit as a sample at time t; step: size of the step that begins or ends at t, 0 if there is none. */
 static void commit(kf_state *s, double t, double step)
 {
     kf_sample *sample;
@@ -152,8 +152,8 @@ static void commit(kf_state *s, double t, double step)
     commit_pose(s);
 }
 
-/* A step that cannot be done. Asked for again from the same point, no smaller, it will not be possible either: the master
- * that goes on nevertheless is told to stop.
+/* Answer a step that is impossible. If the host requests it again from the same point and no smaller, it is impossible
+ * again, and the host is asked to stop.
  */
 static KF_RARE kf_answer discard(kf_instance *instance, double time, double step, double at)
 {
@@ -166,8 +166,8 @@ static KF_RARE kf_answer discard(kf_instance *instance, double time, double step
     return kf_answered(instance, KF_DISCARD, "at t = %g s: %s", at, s->message);
 }
 
-/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. Where they or their rates are beyond
- * KF_LARGEST there is no pose.
+/* The inputs at the end of a step that follows their derivatives: sum of d^n h^n / n!. Beyond KF_LARGEST of them
+ * or their rates there is no pose.
  */
 static KF_RARE void move_inputs(kf_state *s, double step)
 {
@@ -259,15 +259,15 @@ static kf_answer step_by_time(kf_instance *instance, double time, double step)
 static kf_answer warn_of_inputs(kf_instance *instance)
 {
     kf_state *const s = &instance->now;
-    if (!s->driven_by_time || !s->stray || s->stray_told) {
+    if (!s->driven_by_time || !s->stray || s->stray_warned) {
         return KF_DONE;
     }
-    s->stray_told = true;
+    s->stray_warned = true;
     return kf_answered(instance, KF_WARN, "%s was set, but driven_by_time is true: the law drives, inputs have no effect",
                        kf_name_of(s->stray));
 }
 
-/* A step past the stop time of the experiment, other than by rounding. */
+/* Answer a step past the stop time of the experiment by more than rounding. */
 static bool is_past_stop(const kf_state *s, double time, double step)
 {
     return time + step - s->stop_time > LATE * step + 4.0 * DBL_EPSILON * fabs(s->stop_time);
@@ -295,7 +295,7 @@ static KF_RARE kf_answer refuse_step(const kf_instance *instance, double time, d
     return kf_answered(instance, KF_ERROR, "doStep from t = %g s by %g s: they must be finite, the step at least 0", time, step);
 }
 
-/* Whether a step can be done that is, by rounding, not between the start and the stop time. */
+/* Return whether a step is possible that is outside start and stop time by no more than rounding. */
 static KF_RARE bool is_all_but_inside(const kf_state *s, double time, double step)
 {
     return s->mode == KF_STEPPING && isfinite(time + step) && step >= 0.0 && time >= s->start_time - SAME_TIME * step &&
@@ -436,7 +436,7 @@ kf_answer kf_set_time(kf_instance *instance, double time)
     return KF_DONE;
 }
 
-/* wants_event: solver.status is another one than at the last event. */
+/* wants_event: solver.status differs from that at the last event. */
 kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
 {
     kf_state *const s = &instance->now;
@@ -445,7 +445,7 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
     if (s->mode != KF_CONTINUOUS && s->mode != KF_EVENTS) {
         return kf_answered(instance, KF_ERROR, "completedIntegratorStep: the instance is not in continuous-time mode");
     }
-    if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: it is too late for a smaller one */
+    if (!KF_GOOD(kf_ask(instance))) { /* the host has accepted the step: a smaller one is no longer possible */
         return kf_answered(instance, KF_ERROR, "at t = %g s: %s", s->time, s->message);
     }
     if (is_past_stop(s, last, s->time - last)) {
@@ -456,14 +456,14 @@ kf_answer kf_complete_integrator_step(kf_instance *instance, bool *wants_event)
     return warn_of_inputs(instance);
 }
 
-/* A time at which the law is beyond its jump, whatever it rounds. */
+/* Return a time at which the law is beyond its jump in spite of rounding. */
 static double just_after(double jump, double period, double times)
 {
     const double at = jump + times * period;
     return at + JUST_AFTER * (fabs(jump) + fabs(at) + period);
 }
 
-/* The next time at which what drives jumps: its value, speed or acceleration. */
+/* Return the next time at which a driver's value, speed or acceleration jumps. */
 bool kf_next_event(const kf_instance *instance, double *time)
 {
     const kf_state *const s = &instance->now;

@@ -2,7 +2,7 @@
  *
  * The protocol is that of the python flavour (kinfmu/fmu/slave.py): a set marks; a get solves from the *committed* pose
  * and caches; a step (in model exchange: a completed integrator step) commits the pose. Trial values never influence a
- * result, so a host may go back.
+ * result, so a host may go back in time.
  */
 #ifndef KF_INSTANCE_H
 #define KF_INSTANCE_H
@@ -26,10 +26,10 @@ typedef enum {
     KF_TERMINATED
 } kf_mode;
 
-/* Where the rate of a driver comes from: an estimate, its own input, a derivative given of the driver's value or speed. */
+/* Source of a driver's rate: an estimate, its own input, or a given derivative of the driver's value or speed. */
 typedef enum { KF_RATE_ESTIMATED, KF_RATE_INPUT, KF_RATE_OF_VALUE, KF_RATE_OF_SPEED } kf_rate_source;
 
-/* How many rates of the drivers are given, and not estimated. */
+/* Number of drivers' rates that are given, not estimated. */
 typedef enum { KF_NO_RATES, KF_SOME_RATES, KF_ALL_RATES } kf_given_rates;
 
 /* A communication point and the driver values there. */
@@ -38,30 +38,30 @@ typedef struct {
     double u[KF_DRIVERS];
 } kf_sample;
 
-/* Everything that a result depends on, and what is known of it: plain data, so that the state of an FMU is a copy of it.
+/* All that a result depends on, and the results known so far: plain data, so that the state of an FMU is a copy of it.
  *
  * `real` holds the Real variables by their place in the list; a bit of `known` is set if those of a part are up to date.
  */
 typedef struct {
     kf_pose poses[2];
-    int committed, asked; /* which of the poses; the same one if what is asked for is what was committed */
-    bool solved;          /* poses[asked] is what is asked for */
+    int committed, asked; /* indices of poses; equal if the requested pose is the committed one */
+    bool solved;          /* poses[asked] is the requested pose */
     kf_status status, committed_status;
-    char message[KF_MESSAGE]; /* why the pose asked for cannot be had */
+    char message[KF_MESSAGE]; /* why the requested pose is unreachable */
     unsigned known;
     bool drive_known;
-    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS]; /* what drives what is shown */
+    double u[KF_DRIVERS], ud[KF_DRIVERS], udd[KF_DRIVERS]; /* values, speeds and accelerations of the drivers of the pose shown */
     double real[KF_REALS];
     kf_mode mode;
     bool model_exchange, driven_by_time;
     int rates; /* the parameter: KF_RATES_AUTO, _ESTIMATED or _WIRED */
     bool unbound; /* parameters were set and not yet bound */
-    bool unsolvable; /* they cannot be had */
+    bool unsolvable; /* they have no solution */
     double time;  /* the communication point, or the point that a failed step asked for */
     bool touched; /* something was set since the last commit */
-    bool ahead;   /* what is asked for is the end of a step that failed, not what was set */
+    bool ahead;   /* requested is the end of a failed step, not the values set */
     unsigned stray;         /* value reference of an input that was set, 0 if none was */
-    bool stray_told;        /* the host was warned that time drives */
+    bool stray_warned;        /* the host was warned that an input has no effect while time drives */
     bool wired[3 * KF_DRIVERS]; /* rates seen other than 0 */
     unsigned char sources[3 * KF_DRIVERS]; /* kf_rate_source of each rate */
     kf_given_rates given; /* how many of them are not estimated */
@@ -84,7 +84,7 @@ typedef struct {
 
 #define KF_STATE_SIZE (offsetof(kf_state, solver) + KF_SOLVER_STATE)
 
-/* The list of variables that was asked for last, and the parts that they belong to: hosts ask for the same over and over. */
+/* The list of variables read last, and the parts that they belong to: hosts read the same list again and again. */
 #define KF_LISTED 96
 typedef struct {
     size_t count;
@@ -92,21 +92,21 @@ typedef struct {
     unsigned references[KF_LISTED];
 } kf_list;
 
-typedef void (*kf_tell)(const void *host, kf_answer answer, const char *category, const char *message);
+typedef void (*kf_send)(const void *host, kf_answer answer, const char *category, const char *message);
 
 typedef struct {
     kf_state now;
-    kf_tell tell;     /* hands messages to the host; `host` is what it is handed */
+    kf_send send;     /* passes messages to the host, with `host` as its argument */
     const void *host;
     bool silent;
-    unsigned muted; /* a bit a category */
+    unsigned muted; /* one bit for each category */
     kf_list list;
     double seed[KF_REALS], slope[KF_REALS], total[KF_REALS], trial[KF_REALS]; /* of directional derivatives */
 } kf_instance;
 
 #define KF_LONGEST (KF_MESSAGE + 120) /* bytes of a message with its context */
 
-/* Messages: `kf_answered` formats one, hands it to the host and returns `answer`. */
+/* Messages: `kf_answered` formats one, passes it to the host and returns `answer`. */
 extern const char *const kf_categories[3];
 KF_RARE kf_answer kf_answered(const kf_instance *instance, kf_answer answer, const char *format, ...);
 KF_RARE kf_answer kf_no_array(const kf_instance *instance, size_t count);
@@ -152,7 +152,7 @@ size_t kf_serialized_size(void);
 kf_answer kf_serialize(kf_instance *instance, const void *state, unsigned char *bytes, size_t size);
 kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size_t size, void **state);
 
-/* What the files of the instance share. */
+/* Shared by the files of the instance. */
 #define KF_BIT(part) (1u << (part))
 #define KF_POSE_PARTS                                                                                                  \
     (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
@@ -168,12 +168,12 @@ kf_status kf_ask_anew(kf_instance *instance);
 kf_pose *kf_shown(kf_state *state);
 kf_answer kf_read(kf_instance *instance, unsigned parts);
 void kf_find_drive(kf_state *state);
-/* Times at which what drives jumps, and the periods after which it does again, 0 if it does not: events.c. */
+/* Times at which drivers jump, and periods after which they jump again, 0 if they do not: events.c. */
 void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods);
 void kf_end_of_step(kf_state *state, double step);
 void kf_drop_input_derivatives(kf_state *state);
 void kf_find_rate_sources(kf_state *state);
-void kf_touch(kf_state *state); /* something is set: what is shown is that at the current time, not at the commit */
+void kf_touch(kf_state *state); /* a variable is set: values shown are those at the current time, not at the commit */
 void kf_law(const kf_state *state, double t, double *u, double *ud, double *udd);
 void kf_asked_drive(const kf_state *state, double *u, double *ud, double *udd);
 void kf_find_errors(kf_state *state, double errors[3]);
@@ -183,7 +183,7 @@ void kf_estimated_rates(const kf_sample *samples, int count, double t, const dou
 void kf_errors_of_estimated_rates(const kf_sample *samples, int count, double t, const double *u, double ahead,
                                   double *of_ud, double *of_udd);
 
-/* Whether a call can be done as far as its arguments go: an instance, and arrays that are there. */
+/* Return whether a call has valid arguments: an instance, and arrays that are not NULL. */
 static inline kf_answer kf_check(const kf_instance *instance, const void *references, const void *values, size_t count)
 {
     if (instance == NULL) {
@@ -192,7 +192,7 @@ static inline kf_answer kf_check(const kf_instance *instance, const void *refere
     return references == NULL || values == NULL ? kf_no_array(instance, count) : KF_DONE;
 }
 
-/* The pose asked for, good or not. */
+/* Solve for the requested pose; it may be good or not. */
 static inline kf_status kf_ask(kf_instance *instance)
 {
     return instance->now.solved ? instance->now.status : kf_ask_anew(instance);

@@ -1,7 +1,7 @@
-/* States: a copy of what an instance knows.
+/* States: copies of the data of an instance.
  *
- * Serialized: the FMU's token, so that it fits no other one; a checksum, since a solver that goes on from changed bytes may
- * do anything; and the copy.
+ * Serialized: the FMU's token, so that no other FMU accepts it; a checksum, since the behaviour of a solver with changed
+ * bytes is undefined; and the copy.
  */
 #include "instance.h"
 

@@ -36,7 +36,7 @@ kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const
 
 /* Get */
 
-/* Positions, rates and accelerations in one go, if more than one of them is wanted: what they share is computed once. */
+/* Compute positions, rates and accelerations together if more than one is wanted: common terms are computed once. */
 static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
 {
     double *const values = parts & KF_BIT(KF_PART_VALUES) ? KF_REAL(s, KF_PART_VALUES) : NULL;
@@ -48,7 +48,7 @@ static KF_WHOLE void read_motion(kf_state *s, unsigned parts)
     kf_motion(&s->solver, kf_shown(s), s->ud, s->udd, values, rates, accelerations);
 }
 
-/* What drives in effect: what was asked for, even where it cannot be had. */
+/* The effective driver values: those requested, even where they are unreachable. */
 static void read_driven(kf_state *s)
 {
     double *const driven = KF_REAL(s, KF_PART_DRIVEN);
@@ -62,9 +62,7 @@ static void read_driven(kf_state *s)
     }
 }
 
-/* Bring parts (a bit each) up to date; Discard if they belong to a pose that cannot be had: then they are the last good
- * ones.
- */
+/* Bring parts (a bit each) up to date; Discard if their pose is unreachable: then they keep the last good values. */
 kf_answer kf_read(kf_instance *instance, unsigned parts)
 {
     const unsigned motion = KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS);
@@ -106,7 +104,7 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
     return KF_DONE;
 }
 
-/* A list with the time in it, or with what is no Real variable. */
+/* Read a list that holds the time or variables that are not Real. */
 static KF_RARE kf_answer get_unusual(kf_instance *instance, const unsigned *references, size_t count, double *values)
 {
     kf_answer answer = KF_DONE;
@@ -264,7 +262,7 @@ static void set_input(kf_state *s, unsigned k, double value)
     kf_touch(s);
 }
 
-/* Nothing is set: an array is NULL, or the instance is terminated. */
+/* Refuse to set: an array is NULL, or the instance is terminated. */
 static KF_RARE kf_answer set_nothing(const kf_instance *instance, const unsigned *references, size_t count,
                                      const double *values)
 {
