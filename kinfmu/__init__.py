@@ -1,4 +1,4 @@
-"""kinfmu: planar kinematics, from a mechanism file to an FMU and logs that can be reviewed.
+"""kinfmu: planar kinematics, from a mechanism file to an FMU and logs.
 
     import kinfmu
 
@@ -6,7 +6,7 @@
     run = kinfmu.solve(mech, crank_angle=[0.0, 0.5, 1.0])
     run["coupler.x"]
 
-Names are imported when first used, so that `import kinfmu` costs next to nothing.
+Names are imported when first used, so that `import kinfmu` takes a few milliseconds.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ _HOME = {
     "solve": "kinfmu.sweep",
 }
 
-_ROOMS = ("draw", "log")
+_PACKAGES = ("draw", "log")
 
 __all__ = [
     "VERSION",
@@ -196,8 +196,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name from its home when it is first used."""
-    if name in _ROOMS:
+    """Import a public name from its package when it is first used."""
+    if name in _PACKAGES:
         return import_module(f"kinfmu.{name}")
     if name in _HOME:
         value = globals()[name] = getattr(import_module(_HOME[name]), name)
@@ -206,4 +206,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, *_ROOMS])
+    return sorted([*globals(), *_HOME, *_PACKAGES])

@@ -1,4 +1,4 @@
-"""python -m kinfmu: the command line, where the command `kinfmu` is not on the path."""
+"""The command line as `python -m kinfmu`, for when the command `kinfmu` is not on the path."""
 
 from kinfmu.cli import main
 

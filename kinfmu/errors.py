@@ -1,20 +1,20 @@
-"""Everything that kinfmu raises on purpose.
+"""The errors that kinfmu raises on purpose.
 
     KinfmuError
-    |-- RequestError            what a caller asked for is not there or cannot be meant: a name, a value, a span of time
-    |-- MechanismError          the mechanism as written cannot be used: file, table, key and what would be valid
-    |   |-- InconsistentError   a constraint contradicts the others: the gap says by how much
+    |-- RequestError            a request is invalid: an unknown name, a wrong value, a wrong time span
+    |-- MechanismError          the mechanism as written is invalid: file, table, key and what would be valid
+    |   |-- InconsistentError   a constraint contradicts the others, by `gap`
     |   |-- MobilityError       drivers and degrees of freedom do not match
-    |-- AssemblyError           the bodies cannot be put together near the start pose
-    |   |-- AmbiguousStartError the start pose lies where branches cross and nothing says which one is meant
-    |-- PoseError               a sample that cannot be reached, or where the solver gave up
+    |-- AssemblyError           the bodies cannot be assembled near the start pose
+    |   |-- AmbiguousStartError the start pose lies where branches cross, so the branch is not defined
+    |-- PoseError               a sample is unreachable, or the solver did not converge
     |-- CompilerError           compiling generated C
     |-- FmuError                building or stepping an FMU
     |-- LogError                writing or reading a log
     |-- FigureError             drawing a figure
     |-- MissingPackageError     an optional package is not installed
 
-Each message is one line that names the thing, the value and what would be valid; the data stay on the exception.
+Each message is one line with the place, the value and what would be valid; the exception also carries the data.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from collections.abc import Iterable
 
 
 class KinfmuError(Exception):
-    """Root of all errors raised on purpose; keyword arguments stay on the exception as attributes."""
+    """Root of all errors raised on purpose; keyword arguments become attributes of the exception."""
 
     def __init__(self, message: str, **data: object) -> None:
         super().__init__(message)
@@ -37,15 +37,15 @@ class KinfmuError(Exception):
 
 
 class RequestError(KinfmuError):
-    """What a caller asked for is not there or cannot be meant; on the command line that is wrong usage."""
+    """A request is invalid: an unknown name or a wrong value; on the command line: wrong usage."""
 
 
 class MechanismError(KinfmuError):
-    """The mechanism as written cannot be used."""
+    """The mechanism as written is invalid."""
 
 
 class InconsistentError(MechanismError):
-    """A constraint contradicts the others; `gap` is by how much, as a length."""
+    """A constraint contradicts the others; `gap` is the misfit as a length."""
 
 
 class MobilityError(MechanismError):
@@ -53,15 +53,15 @@ class MobilityError(MechanismError):
 
 
 class AssemblyError(KinfmuError):
-    """The bodies cannot be put together near the start pose."""
+    """The bodies cannot be assembled near the start pose."""
 
 
 class AmbiguousStartError(AssemblyError):
-    """The start pose lies where branches cross and nothing says which one is meant."""
+    """The start pose lies where branches cross, so the branch is not defined."""
 
 
 class PoseError(KinfmuError):
-    """A sample that cannot be reached, or where the solver gave up."""
+    """A sample is unreachable, or the solver did not converge."""
 
 
 class CompilerError(KinfmuError):
@@ -85,7 +85,7 @@ class MissingPackageError(KinfmuError):
 
 
 MOST_LISTED = 100  # names in a message
-OTHER_WORDS = {  # of other programs and of drawings, by what they are called here
+OTHER_WORDS = {  # words of other programs and of drawings, with the words of kinfmu
     **dict.fromkeys(("pin", "hinge", "pivot", "rotational", "rotary"), "revolute"),
     **dict.fromkeys(("prismatic", "slider", "slide", "sliding", "linear"), "translational"),
     **dict.fromkeys(("weld", "welded", "rigid"), "fixed"),
@@ -100,7 +100,7 @@ LONGEST_WORD = 200  # characters of a word that may be a misspelt name
 
 
 def listed(names: Iterable[str]) -> str:
-    """`a, b, c`, or `none`: how messages list what would be valid; of more than MOST_LISTED names the first."""
+    """Return `a, b, c`, or `none`, for messages; of more than MOST_LISTED names only the first."""
     names = list(names)
     if len(names) > MOST_LISTED:
         names[MOST_LISTED - 1 :] = [f"... ({len(names)} in all)"]
@@ -108,12 +108,12 @@ def listed(names: Iterable[str]) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """`; did you mean 'coupler'?` when something known is close to `word`, else nothing."""
+    """Return `; did you mean 'coupler'?` if a known word is close to `word`, else ''."""
     import difflib
 
-    if len(word) > LONGEST_WORD:  # no misspelt name, and slow to compare
+    if len(word) > LONGEST_WORD:  # not a misspelt name, and slow to compare
         return ""
     known = list(known)
-    near = [meant for meant in [OTHER_WORDS.get(word.lower())] if meant in known]
+    near = [ours for ours in [OTHER_WORDS.get(word.lower())] if ours in known]
     near = near or difflib.get_close_matches(word, known, n=1) or [k for k in known if k.lower() == word.lower()]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -1,6 +1,6 @@
 """Units: what a number in a mechanism file may carry, and what every variable declares. Names of variables.
 
-Lengths stay in the mechanism's own unit all the way through; angles are radians inside, and files may write degrees.
+Lengths keep the mechanism's unit everywhere; angles are radians inside, and files may use degrees.
 Variables are named `<body>.x .y .phi`, their rates `.vx .vy .omega`, accelerations `.ax .ay
 .alpha`; points likewise.
 """
@@ -13,11 +13,11 @@ from typing import Annotated, NamedTuple
 
 
 class Quantity(NamedTuple):
-    """The kind of a number: what it measures and which derivative it is, with respect to time if nothing is said."""
+    """The kind of a number: what it measures and which derivative it is; default: of order 0, with respect to time."""
 
     kind: str  # "length", "angle", "time" or "number"
     order: int = 0  # 0 position, 1 speed, 2 acceleration
-    per: str = "time"  # or "angle", "length": what the derivative is taken to
+    per: str = "time"  # or "angle", "length": the variable of the derivative
 
 
 Length = Annotated[float, Quantity("length")]
@@ -27,46 +27,46 @@ Number = Annotated[float, Quantity("number")]
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
-HIGHEST_ORDER = 7  # of a derivative that units are written for
+HIGHEST_ORDER = 7  # of a derivative with a unit
 
 
 def looks_like_degrees(angle: float) -> bool:
-    """True for a number of radians that looks as if degrees were meant: 30, 45, 60, 75, ..., of either sign."""
+    """Return True for an angle [rad] that is probably in degrees: 30, 45, 60, 75, ..., of either sign."""
     return abs(angle) >= 30.0 and angle % 15.0 == 0.0
 
 
 def in_turns(angle: float) -> str:
-    """An angle [rad] as messages tell it beside its number: '57.3 turns' of 360 rad."""
+    """Return an angle [rad] in turns, for messages: '57.3 turns' for 360 rad."""
     return f"{abs(angle) / ANGLES['rev']:.3g} turns"
 
 
 def unit_of(quantity: Quantity, length_unit: str) -> str:
-    """The unit a variable of this quantity declares, such as `rad/s` or `mm/s2`."""
+    """Return the unit that a variable of this quantity declares, such as `rad/s` or `mm/s2`."""
     units = {"length": length_unit, "angle": "rad", "time": "s", "number": "1"}
     per = f"/{_power(units[quantity.per], quantity.order)}" if quantity.order else ""
     return units[quantity.kind] + per
 
 
 def quantity_in(unit: str, length_unit: str) -> Quantity:
-    """The quantity of a variable that declares this unit: the inverse of `unit_of`, a number for what is not known."""
+    """Return the quantity of a declared unit, the inverse of `unit_of`; an unknown unit gives a number."""
     known = every_unit(length_unit)
     return known[unit][0] if unit in known else Quantity("number")
 
 
 def _power(unit: str, order: int) -> str:
-    """'s' and 's2'."""
+    """Return 's' or 's2'."""
     return unit if order == 1 else f"{unit}{order}"
 
 
 def _bases(kind: str, length_unit: str) -> dict[str, float]:
-    """Units of a length, an angle or a time with their factors into the unit used inside."""
+    """Return the units of a length, an angle or a time with their factors into the unit used inside."""
     if kind != "length":
         return ANGLES if kind == "angle" else SECONDS
     return {unit: metres / METRES[length_unit] for unit, metres in METRES.items()} | {length_unit: 1.0}
 
 
 def factors(quantity: Quantity, length_unit: str) -> dict[str, float]:
-    """Every unit that may be written for `quantity`, with its factor into the unit used inside."""
+    """Return every unit that files accept for `quantity`, with its factor into the unit used inside."""
     if quantity.kind == "number" or quantity.order > HIGHEST_ORDER:
         return {}
     base = _bases(quantity.kind, length_unit)
@@ -86,7 +86,7 @@ def factors(quantity: Quantity, length_unit: str) -> dict[str, float]:
 
 
 def display_units(unit: str) -> dict[str, float]:
-    """Display units of a declared unit with their factors (display value = factor * value), for FMI."""
+    """Return the display units of a declared unit with their factors (display value = factor * value), for FMI."""
     base, slash, per = unit.partition("/")
     if base == "rad":
         return {f"deg{slash}{per}": 180.0 / math.pi}
@@ -97,7 +97,7 @@ def display_units(unit: str) -> dict[str, float]:
 
 @cache
 def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
-    """Every unit that may be written for any quantity, with that quantity and its factor into the unit used inside."""
+    """Return every unit that files accept, with its quantity and its factor into the unit used inside."""
     pairs = (("length", "time"), ("angle", "time"), ("length", "angle"), ("angle", "length"))
     rates = [Quantity(kind, order, per) for kind, per in pairs for order in range(1, HIGHEST_ORDER + 1)]
     return {
@@ -111,13 +111,13 @@ _DERIVATIVES = {"x": ("x", "vx", "ax"), "y": ("y", "vy", "ay"), "phi": ("phi", "
 
 
 def derivative_name(name: str, order: int) -> str:
-    """'coupler.vx' of 'coupler.x' and order 1; order 0 is the name itself."""
+    """Return 'coupler.vx' for 'coupler.x' and order 1; order 0 gives the name itself."""
     owner, _, coordinate = name.rpartition(".")
     return f"{owner}.{_DERIVATIVES[coordinate][order]}"
 
 
 def quantity_of(name: str, order: int = 0, per: str = "time") -> Quantity:
-    """What a coordinate such as 'coupler.x' or 'coupler.phi' measures, or its derivative of the given order."""
+    """Return the quantity of a coordinate such as 'coupler.x' or 'coupler.phi', or of its derivative."""
     return Quantity("angle" if name.endswith(".phi") else "length", order, per)
 
 

@@ -1,6 +1,6 @@
-"""Drivers, one a file: a driver is a row whose target moves by a law.
+"""Drivers, one per file: a driver is a row whose target follows a law.
 
-Adding one is a file and a line here.
+To add one, write a file and add a line here.
 """
 
 from __future__ import annotations

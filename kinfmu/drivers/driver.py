@@ -15,7 +15,7 @@ from kinfmu.units import Quantity
 class Driver(ABC):
     """One driving row Phi(q, t): a measured quantity follows u(t).
 
-        Phi = measure - u(t), or what the measure has in its place        (1 row)
+        Phi = measure - u(t)        (1 row; a measure may define its own row)
 
     A leaf is a frozen dataclass with fields `name`, its own keys, and last `law`. `noun` names the input of an FMU:
     a driver `crank` with noun `angle` has the inputs `crank_angle`, `crank_speed` and `crank_acceleration`.
@@ -29,25 +29,25 @@ class Driver(ABC):
 
     @abstractmethod
     def measured(self) -> Measure:
-        """The driven quantity."""
+        """Return the driven quantity."""
 
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that the row touches, ground included."""
+        """Return the names of the bodies in the row, ground included."""
         return self.measured().bodies()
 
     def residual(self, at: Placement, target: Value) -> Value:
-        """Phi of the driving row for a target u."""
+        """Return Phi of the driving row for a target u."""
         return self.measured().row(at, target)
 
     @property
     def law_kinds(self) -> tuple[str, str]:
-        """What the law leads and what it follows."""
+        """Kinds of the law's output and of its input."""
         return self.quantity.kind, "time"
 
     def check(self) -> None:
-        """Raise a MechanismError for values that cannot be meant; numbers are finite and references valid by then."""
+        """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""
         self.law.check(f"[drivers.{self.name}]")
 
     def inputs(self) -> tuple[str, str, str]:
-        """Names of the inputs for value, speed and acceleration."""
+        """Return the names of the inputs for value, speed and acceleration."""
         return f"{self.name}_{self.noun}", f"{self.name}_speed", f"{self.name}_acceleration"

@@ -1,1 +1,1 @@
-"""Files: written whole or not at all, and how their names end."""
+"""Files that are written completely or not at all, and suffixes of file names."""

@@ -18,15 +18,15 @@ PATIENCE = 5.0  # [s] to wait for the lock of a folder, which is held for less t
 
 
 class BeingWrittenError(OSError):
-    """Another process, or another sink of this one, writes to the file."""
+    """Another process, or another sink of this process, writes to the file."""
 
     def __init__(self) -> None:
-        super().__init__("a run that goes on writes to it; choose another name, or wait until it has ended")
+        super().__init__("a run in progress writes to it; choose another name, or wait until it has ended")
         self.strerror = self.args[0]
 
 
 def write_whole(path: str | Path, data: bytes) -> None:
-    """Write a file; an OSError leaves an older one as it was. What is no file, such as /dev/stdout, is written to."""
+    """Write a file; an OSError leaves an older file unchanged. A device such as /dev/stdout is written to directly."""
     path = Path(path)
     if path.exists() and not path.is_file():
         path.write_bytes(data)
@@ -37,9 +37,14 @@ def write_whole(path: str | Path, data: bytes) -> None:
 
 @contextmanager
 def replacement(target: Path) -> Iterator[Path]:
-    """Give an empty file next to `target` that takes its place when the block ends without an error.
+    """Yield an empty file next to `target` that replaces it when the block ends without an error.
 
-    target: the file itself, no link to it. Raises an OSError if a file cannot be written or is being written to.
+    Args:
+        target: The file itself, not a link to it.
+
+    Raises:
+        OSError: The file cannot be written or is being written to.
+
     """
     temporary = hidden_sibling(target)
     try:

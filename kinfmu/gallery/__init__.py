@@ -1,4 +1,4 @@
-"""The gallery: mechanisms that come with kinfmu, and finding a mechanism by name or file."""
+"""The gallery: mechanisms that come with kinfmu; loading and saving mechanisms."""
 
 from __future__ import annotations
 

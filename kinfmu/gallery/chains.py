@@ -1,4 +1,4 @@
-"""Chains of any length: mechanisms by rule, to see how the cost of a sample grows with the mechanism."""
+"""Chains of any length, to measure how the cost of a sample grows with the mechanism."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ LONGEST_CHAIN = 10_000  # loops or links
 
 
 def fourbar_chain(count: int) -> Mechanism:
-    """`count` parallelogram four-bars side by side, each rocker the crank of the next (the N-four-bar benchmark).
+    """Return `count` parallelogram four-bars side by side, each rocker the crank of the next (N-four-bar benchmark).
 
-    Ground pivots at 0, 1, ..., count; bars `bar_0` ... of length 1 stand on them, couplers `coupler_1` ... of length 1
-    join their tips. 2 count + 1 bodies, mobility 1, `count` blocks of two unknowns; all bars stay parallel, so
-    bar_k.phi = crank angle, and all blocks are singular together at 0 and pi.
+    Ground pivots are at 0, 1, ..., count; bars `bar_0` ... of length 1 turn about them, couplers `coupler_1` ... of
+    length 1 join their tips. 2 count + 1 bodies, mobility 1, `count` blocks of two unknowns; all bars stay parallel, so
+    bar_k.phi is the crank angle, and all blocks are singular together at 0 and pi.
     """
     start = math.radians(60.0)
     c, s = math.cos(start), math.sin(start)
@@ -46,9 +46,9 @@ def fourbar_chain(count: int) -> Mechanism:
 
 
 def open_chain(count: int) -> Mechanism:
-    """`count` links of length 1, pinned one to the next, each at a fixed small angle to the one before: no loop at all.
+    """Return `count` links of length 1, each pinned to the previous one at a fixed small angle, without a loop.
 
-    Every coordinate follows from the one before it, so nothing is left to iterate: phi_k = phi_1 + (k - 1) bend.
+    Every coordinate follows from the previous one, without iteration: phi_k = phi_1 + (k - 1) bend.
     """
     bend = 0.5 * math.pi / count
     bodies = [Body("ground", {"O": Point(0.0, 0.0)})]
@@ -74,7 +74,7 @@ CHAINS: dict[str, Callable[[int], Mechanism]] = {"fourbar_chain": fourbar_chain,
 
 
 def chain(name: str, count: str) -> Mechanism:
-    """The chain that `fourbar_chain:1000` names, given as 'fourbar_chain' and '1000'."""
+    """Return the chain of `fourbar_chain:1000`, given as 'fourbar_chain' and '1000'."""
     if not count.isdecimal() or not 1 <= int(count) <= LONGEST_CHAIN:
         raise RequestError(f"{name}:{count}: the count must be a whole number from 1 to {LONGEST_CHAIN}")
     return CHAINS[name](int(count))

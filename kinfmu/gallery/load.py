@@ -1,4 +1,4 @@
-"""The gallery: mechanisms that come with kinfmu, and finding a mechanism by name or file."""
+"""Loading mechanisms by name or file, and saving them."""
 
 from __future__ import annotations
 
@@ -14,24 +14,37 @@ from kinfmu.mechanism.toml_text import text
 
 
 def folder() -> Path:
-    """Where the gallery lies: `fmus/` of a checkout, or inside the installed package."""
+    """Return the folder of the gallery: `fmus/` of a checkout, or inside the installed package."""
     package = Path(str(files("kinfmu")))
     installed, checkout = package / "fmus", package.parent / "fmus"
     return installed if installed.is_dir() else checkout
 
 
 def names() -> list[str]:
-    """Names of the gallery's mechanisms."""
+    """Return the names of the gallery's mechanisms."""
     return sorted(path.parent.name for path in folder().glob("*/mechanism.toml"))
 
 
 def has(name: str) -> bool:
-    """True for a name that `load` knows: one of the gallery, or a chain of any length such as 'fourbar_chain:1000'."""
+    """Return True for a name that `load` accepts: of the gallery, or of a chain such as 'fourbar_chain:1000'."""
     return name in names() or (name.partition(":")[0] in CHAINS and ":" in name)
 
 
 def load(mechanism: str | Path) -> Mechanism:
-    """A mechanism by its gallery name or from a .toml file; chains also as 'fourbar_chain:1000', of any length."""
+    """Load a mechanism.
+
+    Args:
+        mechanism: A name of the gallery ('fourbar'), a chain with its length ('fourbar_chain:1000'), or the path of a
+            mechanism file (.toml).
+
+    Returns:
+        The mechanism.
+
+    Raises:
+        RequestError: The name is unknown.
+        MechanismError: The file cannot be read or its mechanism is invalid.
+
+    """
     if isinstance(mechanism, str) and suffix_of(mechanism) != ".toml" and "/" not in mechanism:
         name, colon, count = mechanism.partition(":")
         if colon and name in CHAINS:
@@ -47,7 +60,19 @@ def load(mechanism: str | Path) -> Mechanism:
 
 
 def save(mechanism: Mechanism, path: str | Path) -> Path:
-    """Write a mechanism file; `load` gives the same mechanism back."""
+    """Write a mechanism file, which `load` reads as the same mechanism.
+
+    Args:
+        mechanism: The mechanism.
+        path: Path of the file; an older file is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        MechanismError: The file cannot be written.
+
+    """
     path = Path(path)
     try:
         write_whole(path, text(mechanism).encode())

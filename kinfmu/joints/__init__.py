@@ -1,6 +1,6 @@
-"""Joints, one a file: each is its residual in plain arithmetic, and everything else follows from that formula.
+"""Joints, one per file: each is its residual in plain arithmetic, and everything else follows from that formula.
 
-Adding a joint is one file and one line here.
+To add a joint, write a file and add a line here.
 """
 
 from __future__ import annotations

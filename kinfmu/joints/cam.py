@@ -1,4 +1,4 @@
-"""What cams with a lift law have in common: a follower that goes along with the angle of a cam."""
+"""The contract of cams with a lift law: a follower whose position depends on the angle of a cam."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from kinfmu.measures import AngleBetween, Measure
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Placement
 
-_LOOKS = 24  # angles in a turn that a lift is looked at, to see how large it is
+_SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
 
 
 class Cam(Joint):
-    """A follower led by a cam: a measure of it follows the cam's angle against the body that holds both.
+    """A cam and follower: a measure of the follower depends on the cam's angle relative to the body that holds both.
 
         Phi = measure - offset - f(phi_k - phi_i)        (1 row, scale 1)
 
-    A leaf says between what, and along or about what it lifts.
+    A leaf defines the bodies and the measure of the follower.
     """
 
     cam: str
@@ -30,16 +30,16 @@ class Cam(Joint):
     led: ClassVar[str]  # 'length' or 'angle': what the lift is
 
     def holder(self) -> str:
-        """Body i, which holds the cam's axle and the follower's guide or pivot."""
+        """Return body i, which holds the cam's axle and the follower's guide or pivot."""
         return self.bodies()[0]
 
     @abstractmethod
     def follower(self) -> Measure:
-        """What the lift is of."""
+        """Return the measure of the follower."""
 
     @property
     def law_kinds(self) -> tuple[str, str]:
-        """What the law leads and what it follows."""
+        """Kinds of the law's output and of its input."""
         return self.led, "angle"
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
@@ -50,7 +50,7 @@ class Cam(Joint):
         return (self.led,)
 
     def reach(self) -> float:
-        lifts = [abs(self.offset + self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS)]
+        lifts = [abs(self.offset + self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES)]
         return max(lifts) if self.led == "length" else 0.0
 
     def conditions(self) -> tuple[Condition, ...]:
@@ -71,5 +71,5 @@ class Cam(Joint):
 
 
 def closing(law: Law) -> tuple[Condition, ...]:
-    """What makes a law of an angle come back after a turn."""
+    """Return the conditions for a law of an angle to be periodic over a turn."""
     return tuple(Condition(f"law: {key}", value, "0") for key, value in law.zeros().items())

@@ -12,7 +12,7 @@ from kinfmu.laws.law import TURN
 from kinfmu.measures.arithmetic import Value, atan2, sqrt
 from kinfmu.measures.placement import Placement, PointPair, body_of
 
-_LOOKS = 360  # angles at which the radius is looked at, one a degree
+_SAMPLES = 360  # angles at which the radius is sampled, one per degree
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class CamRoller(Joint):
 
     @property
     def law_kinds(self) -> tuple[str, str]:
-        """What the law leads and what it follows."""
+        """Kinds of the law's output and of its input."""
         return "length", "angle"
 
     def bodies(self) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ class CamRoller(Joint):
         return (sqrt(d_x * d_x + d_y * d_y) - self.law.at(angle),)
 
     def reach(self) -> float:
-        return max(float(self.law.at(k * TURN / _LOOKS)) for k in range(_LOOKS))
+        return max(float(self.law.at(k * TURN / _SAMPLES)) for k in range(_SAMPLES))
 
     def conditions(self) -> tuple[Condition, ...]:
         return closing(self.law)
@@ -64,7 +64,7 @@ class CamRoller(Joint):
         why = self.law.why_not_periodic()
         if why:
             raise MechanismError(f"{where} law: {why}; a pitch curve must close", joint=self.name)
-        for degrees in range(_LOOKS):
+        for degrees in range(_SAMPLES):
             radius = self.law.at(math.radians(degrees))
             if not radius > 0.0:
                 raise MechanismError(

@@ -29,7 +29,7 @@ class Coupling(Joint):
 
     @property
     def law_kinds(self) -> tuple[str, str]:
-        """What the law leads and what it follows."""
+        """Kinds of the law's output and of its input."""
         return self.output.kind, self.input.kind
 
     @property

@@ -9,7 +9,7 @@ from kinfmu.measures import DistanceBetween
 from kinfmu.measures.placement import PointPair
 from kinfmu.units import Length
 
-SHORTEST = 1e-30  # [length]; squares of anything shorter run out of digits
+SHORTEST = 1e-30  # [length]; squares of shorter lengths lose their digits
 
 
 @dataclass(frozen=True)

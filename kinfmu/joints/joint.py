@@ -1,4 +1,4 @@
-"""The contract of a joint: one formula, everything else follows."""
+"""The contract of a joint: one formula, from which everything else follows."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from kinfmu.measures.placement import Placement
 
 
 class Condition(NamedTuple):
-    """What a number of a joint must be; it may follow from parameters, so it is in any arithmetic.
+    """A condition on a number of a joint, which may depend on parameters and so be of any arithmetic.
 
-    key: how messages call it; required: 'positive', 'other than 0' or '0' (to NEARLY).
+    Attributes:
+        key: Its name in messages.
+        value: The number.
+        required: 'positive', 'other than 0' or '0' (within `NEARLY`).
+
     """
 
     key: str
@@ -25,64 +29,66 @@ class Joint(ABC):
     """Constraint rows Phi(q) = 0 between bodies.
 
     A leaf is a frozen dataclass whose first field is `name`; its other fields are the keys of its table in a mechanism
-    file, and their annotations say how the reader checks them. `residual` is plain arithmetic without branches on
+    file, and their annotations define values and meanings. `residual` is plain arithmetic without branches on
     values, so that one formula serves direct evaluation, derivative tests, arrays and generated code.
     """
 
-    type: ClassVar[str]  # how mechanism files call it
-    labels: ClassVar[tuple[str, ...]]  # one word a row, such as "x"
+    type: ClassVar[str]  # its name in mechanism files
+    labels: ClassVar[tuple[str, ...]]  # one word per row, such as "x"
     name: str
 
     @property
     def depends_on_origin(self) -> bool:
-        """True if it depends on where the world's origin lies and `moved` cannot make up for it."""
+        """True if it depends on the world's origin and `moved` cannot correct for a shift."""
         return False
 
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that the rows touch, ground included."""
+        """Return the names of the bodies in its rows, ground included."""
 
     @abstractmethod
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        """Phi, one value a row; zero where the joint holds."""
+        """Return Phi, one value per row; zero where the joint holds."""
 
-    def check(self) -> None:  # noqa: B027  most joints take any values
-        """Raise a MechanismError for values that cannot be meant; numbers are finite and references valid by then."""
+    def check(self) -> None:  # noqa: B027  most joints accept all values
+        """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""
 
     def conditions(self) -> tuple[Condition, ...]:
-        """What `check` asks of numbers alone: where parameters are set without the file, it is asked again."""
+        """Return the conditions of `check` on numbers; they are tested again when parameters are set at run time."""
         return ()
 
     def moved(self, dx: float, dy: float) -> Joint:  # noqa: ARG002  absolute joints depend on it
-        """The joint when the whole mechanism stands elsewhere; the same unless it is absolute."""
+        """Return the joint for a mechanism shifted by (dx, dy); the same unless it is absolute."""
         return self
 
     def reach(self) -> float:
-        """The largest length that it holds by itself [length]: what the size of a mechanism counts besides bodies."""
+        """Return the largest length in its own numbers [length], which counts for the size of the mechanism."""
         return 0.0
 
     def scales(self) -> tuple[float, ...]:
-        """Residual per unit of the row's kind, one a row: |residual| / scale is the gap, to first order."""
+        """Return residual per unit of the row's kind, one per row: |residual| / scale is the gap, to first order."""
         return (1.0,) * len(self.labels)
 
     def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
-        """By how much each row is open, in the mechanism's unit of length or in radians."""
+        """Return the gap of each row, in the mechanism's unit of length or in radians."""
         return tuple(r / scale for r, scale in zip(residual, self.scales(), strict=True))
 
     def kinds(self) -> tuple[str, ...]:
-        """'length' or 'angle', one a row: what its gap is."""
+        """Return the kind of each row's gap, 'length' or 'angle'."""
         return ("length",) * len(self.labels)
 
 
 class Held(Joint):
     """One measured quantity, held at a value.
 
-    Phi = measure - value, or what the measure has in its place        (1 row)
+        Phi = measure - value        (1 row; a measure may define its own row)
+
+    Leaves define `measured`.
     """
 
     @abstractmethod
     def measured(self) -> tuple[Measure, float]:
-        """The measure and the value at which it is held."""
+        """Return the measure and the value at which it is held."""
 
     def bodies(self) -> tuple[str, ...]:
         return self.measured()[0].bodies()
@@ -90,10 +96,6 @@ class Held(Joint):
     def residual(self, at: Placement) -> tuple[Value, ...]:
         measure, value = self.measured()
         return (measure.row(at, value),)
-
-    def reach(self) -> float:
-        """The largest length that it holds by itself [length]: what the size of a mechanism counts besides bodies."""
-        return 0.0
 
     def scales(self) -> tuple[float, ...]:
         measure, value = self.measured()

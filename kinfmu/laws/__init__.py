@@ -1,6 +1,6 @@
-"""Laws, one a file, rises in one: how one quantity follows another, as a driver time and a follower its cam.
+"""Laws, one per file, with all rises in one: how one quantity follows another, such as a cam follower the cam.
 
-Adding one is a file and a line here.
+To add one, write a file and add a line here.
 """
 
 from __future__ import annotations

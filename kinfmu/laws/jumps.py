@@ -1,4 +1,4 @@
-"""Where a law jumps: its value, its rate or its acceleration."""
+"""Arguments at which a law jumps: in its value, rate or acceleration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ SAME = 1e-9  # of the largest value at the breaks and midway between them; small
 class Jumps(NamedTuple):
     """Arguments at which a law jumps.
 
-    at: those of one period, in any order; period: the distance at which they come again, 0 if they do not.
+    Attributes:
+        at: Those of one period, in any order.
+        period: The distance at which they repeat, 0 if they do not.
+
     """
 
     at: tuple[Value, ...] = ()

@@ -16,14 +16,14 @@ from kinfmu.units import Quantity
 
 
 class LawQuantity(NamedTuple):
-    """What a number of a law measures, whatever the law leads: a driver over time, or a follower over a cam's angle."""
+    """What a number of a law measures, in terms of the law's u and x."""
 
     of: str  # "led" like u, "argument" like x, "angle" or "number"
     order: int = 0  # ... per x^order
     is_positive: bool = False
 
     def quantity(self, led: str, argument: str) -> Quantity:
-        """The quantity when u is of the kind `led` and x of the kind `argument` ('length', 'angle', 'time')."""
+        """Return the quantity if u is of the kind `led` and x of the kind `argument` ('length', 'angle', 'time')."""
         kind = {"led": led, "argument": argument}.get(self.of, self.of)
         if self.order and kind == argument:  # radians per radian are a number
             return Quantity("number", self.order - 1, argument if self.order > 1 else "time")
@@ -39,13 +39,13 @@ Frequency = Annotated[float, LawQuantity("angle", 1)]
 
 Path = tuple[str | int, ...]
 TURN = 2.0 * math.pi  # [rad]
-NEARLY = 1e-9  # of a turn; by how much a law may miss it, so that degrees and rounding do no harm
+NEARLY = 1e-9  # of a turn; a period may miss a turn by this much, because of rounding in degrees
 
 
 class Constant(NamedTuple):
     """A number of a law and what it measures."""
 
-    value: Any  # a float; in a mechanism that is being made, whatever was written
+    value: Any  # a float; before the mechanism is resolved also text or an expression
     measures: LawQuantity
 
 
@@ -55,52 +55,52 @@ class Law(ABC):
         u = f(x)
 
     A leaf is a frozen dataclass; its fields are keys of the driver's or joint's table in a mechanism file, and their
-    annotations say how the reader takes them. Its constants become FMU parameters `<driver>.<name>`.
+    annotations define their values. Its constants become FMU parameters `<driver>.<name>`.
     """
 
-    type: ClassVar[str]  # how mechanism files call it
+    type: ClassVar[str]  # its name in mechanism files
 
     @abstractmethod
     def target(self, x: Value, **constants: Value) -> Value:
-        """f(x), in plain arithmetic, with the constants given by name."""
+        """Return f(x), in plain arithmetic, with the constants given by name."""
 
     def jumps(self, **constants: Value) -> Jumps:  # noqa: ARG002  smooth laws have none
         """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
         return Jumps()
 
     def numbers(self) -> dict[Path, Constant]:
-        """Every number of the law, by its path in the law's table; here the fields that are numbers."""
+        """Return every number of the law, by its path in the law's table; here the fields that are numbers."""
         return {(key,): Constant(getattr(self, key), said) for key, said in number_fields(type(self)).items()}
 
     def with_numbers(self, values: Mapping[Path, Any]) -> Law:
-        """The law with these numbers in place of its own."""
+        """Return the law with other values of some numbers."""
         return replace(self, **{str(path[0]): value for path, value in values.items()})  # type: ignore[type-var]
 
     def constants(self) -> dict[str, Constant]:
-        """The numbers that stay open until the law is evaluated, by name."""
+        """Return the numbers that stay symbolic until the law is evaluated, by name."""
         return {str(path[0]): constant for path, constant in self.numbers().items()}
 
     def at(self, x: Value) -> Value:
-        """f(x) with the law's own constants."""
+        """Return f(x) with the law's own constants."""
         return self.target(x, **{name: constant.value for name, constant in self.constants().items()})
 
     def check(self, where: str) -> None:
-        """Raise a MechanismError for numbers that cannot be meant; `where` names the table, as in '[drivers.crank]'."""
+        """Raise a MechanismError for invalid numbers; `where` is the table in messages, such as '[drivers.crank]'."""
         for path, (value, measures) in self.numbers().items():
             if measures.is_positive and not value > 0.0:
                 raise MechanismError(f"{where} {path[0]} = {float(value)!r} must be positive")
 
     @property
     def repeats(self) -> bool:
-        """True if it is meant to repeat: if its table says so."""
+        """True if its table declares it periodic."""
         return False
 
     def zeros(self) -> Mapping[str, Value]:
-        """Numbers that are 0 where f(x + 2 pi) is f(x), by what they are; in any arithmetic, as parameters may be."""
+        """Return descriptions and values of numbers that are 0 if f(x + 2 pi) is f(x), in any arithmetic."""
         return {}
 
     def why_not_periodic(self) -> str:
-        """Why f(x + 2 pi) is not f(x) for all x, as the end of a sentence about the law; empty if it is.
+        """Return why f(x + 2 pi) is not f(x) for all x, for messages; '' if it is.
 
         For laws of an angle: the lift of a cam, the radius of a pitch curve.
         """
@@ -109,7 +109,7 @@ class Law(ABC):
 
 @cache
 def number_fields(cls: type[Law]) -> Mapping[str, LawQuantity]:
-    """The fields of a law class that are numbers, with what they measure."""
+    """Return the fields of a law class that are numbers, with what they measure."""
     hints = get_type_hints(cls, include_extras=True)
     said = {key.name: getattr(hints[key.name], "__metadata__", ()) for key in fields(cls)}  # type: ignore[arg-type]
     return {key: found for key, all_said in said.items() for found in all_said if isinstance(found, LawQuantity)}

@@ -121,7 +121,7 @@ class MotionSequence(Law):
 
     def why_not_periodic(self) -> str:
         if not self.repeat:
-            return "its sequence does not repeat; say repeat = true"
+            return "its sequence does not repeat; set repeat = true"
         whole = sum(segment.duration for segment in self.segments)
         if abs(whole - TURN) > NEARLY * TURN:
             return f"the durations of its sequence add up to {math.degrees(whole):.9g} deg, not to a turn of 360 deg"

@@ -16,7 +16,7 @@ from kinfmu.solver.python.curve import CurveData, Piece
 
 NOT_A_KNOT, NATURAL, PERIODIC = ENDS = ("not_a_knot", "natural", "periodic")
 FEWEST = {NOT_A_KNOT: 4, NATURAL: 3, PERIODIC: 4}
-EDGE = 1e-12  # of the table's width; times k h miss the last point by rounding, and still belong to the table
+EDGE = 1e-12  # of the table's width; times k h that miss the last point by rounding still belong to the table
 SAME = 1e-9  # of the largest value; by how much the ends of a periodic table may differ
 _X, _U = LawQuantity("argument"), LawQuantity("led")
 
@@ -88,7 +88,7 @@ class Spline(Law):
             raise MechanismError(f"{where} points must be numbers; a table cannot hold expressions of parameters")
         for k, ((x, _), (following, _)) in enumerate(pairwise(self.points), start=2):
             if not following > x:
-                why = "is there twice" if following == x else f"comes after {x!r}"
+                why = "appears twice" if following == x else f"comes after {x!r}"
                 raise MechanismError(f"{where} points: x = {following!r} of point {k} {why}; x must ascend")
         if self.ends == PERIODIC:
             first, last = self.points[0][1], self.points[-1][1]
@@ -103,7 +103,7 @@ class Spline(Law):
 
     def why_not_periodic(self) -> str:
         if self.ends != PERIODIC:
-            return "its table does not repeat; say ends = 'periodic'"
+            return "its table does not repeat; set ends = 'periodic'"
         width = self.points[-1][0] - self.points[0][0]
         times = round(TURN / width)
         if times < 1 or abs(width * times - TURN) > NEARLY * TURN:
@@ -120,7 +120,7 @@ def _pair(point: Any) -> tuple[Any, Any]:
 
 
 def spline_data(points: Sequence[tuple[float, float]], ends: str) -> CurveData:
-    """The cubic spline through the points, from its second derivatives m_k at them.
+    """Return the cubic spline through the points, from its second derivatives m_k at them.
 
     h_k-1 m_k-1 + 2 (h_k-1 + h_k) m_k + h_k m_k+1 = 6 ((u_k+1 - u_k) / h_k - (u_k - u_k-1) / h_k-1)
     """
@@ -143,7 +143,7 @@ def spline_data(points: Sequence[tuple[float, float]], ends: str) -> CurveData:
 
 
 def _rows(h: Sequence[float], slope: Sequence[float]) -> tuple[list[float], list[float], list[float], list[float]]:
-    """Lower, main and upper diagonal and right side for the inner points 1 to n - 1."""
+    """Return lower, main and upper diagonal and right side for the inner points 1 to n - 1."""
     inner = range(1, len(h))
     main = [2.0 * (h[k - 1] + h[k]) for k in inner]
     right = [6.0 * (slope[k] - slope[k - 1]) for k in inner]
@@ -155,7 +155,7 @@ def _natural(h: Sequence[float], slope: Sequence[float]) -> list[float]:
 
 
 def _not_a_knot(h: Sequence[float], slope: Sequence[float]) -> list[float]:
-    """m_0 lies on the line through m_1 and m_2, so that the first two pieces are one cubic; the end alike."""
+    """m_0 lies on the line through m_1 and m_2, so that the first two pieces are one cubic; likewise at the end."""
     lower, main, upper, right = _rows(h, slope)
     first, last = h[0] / h[1], h[-1] / h[-2]
     main[0] += h[0] * (1.0 + first)
@@ -179,7 +179,7 @@ def _periodic(h: Sequence[float], slope: Sequence[float]) -> list[float]:
 def tridiagonal(
     lower: Sequence[float], main: Sequence[float], upper: Sequence[float], right: Sequence[float]
 ) -> list[float]:
-    """Solution of a tridiagonal system with a dominant main diagonal, (n,); lower[0] and upper[n - 1] are not used."""
+    """Solve a tridiagonal system with a dominant main diagonal, (n,); lower[0] and upper[n - 1] are unused."""
     pivots, sides = [main[0]], [right[0]]
     for k in range(1, len(main)):
         factor = lower[k] / pivots[-1]

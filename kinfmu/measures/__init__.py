@@ -1,4 +1,4 @@
-"""Measures: quantities of a pose that a joint holds, a driver drives, or a joint couples to one another."""
+"""Measures: quantities of a pose that a joint holds, a driver drives or a coupling relates."""
 
 from __future__ import annotations
 

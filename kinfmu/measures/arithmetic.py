@@ -1,7 +1,7 @@
-"""The arithmetic in which joints and laws are written: `+ - * /` of the operands, and the functions from here.
+"""The arithmetic of joints and laws: `+ - * /` of the operands, and the functions of this module.
 
 One formula serves floats (direct evaluation), complex numbers (derivative tests), Taylor numbers (the dense reference)
-and symbols (generated code): each room that brings its own kind of number registers it with these functions.
+and symbols (generated code): a package with its own kind of number registers it with these functions.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ Value = Any  # float, complex, Taylor number, array or symbol: whatever the oper
 
 @singledispatch
 def sin(x: Value) -> Value:
-    """Sine of an angle [rad]."""
+    """Return the sine of an angle [rad]."""
     return math.sin(x)
 
 
 @singledispatch
 def cos(x: Value) -> Value:
-    """Cosine of an angle [rad]."""
+    """Return the cosine of an angle [rad]."""
     return math.cos(x)
 
 
 @singledispatch
 def sqrt(x: Value) -> Value:
-    """Square root."""
+    """Return the square root."""
     return math.sqrt(x)
 
 
 @singledispatch
 def floor(x: Value) -> Value:
-    """The largest whole number that is not above x; its derivative is 0, at the whole numbers too."""
+    """Return the largest whole number not above x; its derivative is 0, also at whole numbers."""
     return float(math.floor(x))
 
 
@@ -48,13 +48,13 @@ def curve(x: Value, data: CurveData, order: int = 0) -> Value:
 
 
 def atan2(y: Value, x: Value) -> Value:
-    """The angle of the vector (x, y) in [-pi, pi] [rad]; its derivative is that of the angle turned continuously."""
+    """Return the angle of the vector (x, y) in [-pi, pi] [rad]; its derivative is that of the continuous angle."""
     return atan2_like(x if isinstance(y, float | int) else y, y, x)
 
 
 @singledispatch
-def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  it decides by its type
-    """atan2(y, x) in the arithmetic of `like`, which is one of the two: what a new kind of number registers."""
+def atan2_like(like: Value, y: Value, x: Value) -> Value:  # noqa: ARG001  dispatched on its type
+    """Return atan2(y, x) in the arithmetic of `like`, one of the two: a new kind of number registers it."""
     return math.atan2(y, x)
 
 
@@ -63,13 +63,13 @@ def split_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]
 
         n = floor((x - begin) / p),   rest = x - n p,   p = the sum of `period`
 
-    Sum and product are each formed as two numbers, the rounded one and what it leaves (Knuth's sum, Dekker's product);
-    n p, rounded, would lose as many digits as n has. The rest has the derivative of x.
+    Sum and product are each formed as two numbers, the rounded one and its rounding error (Knuth's sum, Dekker's
+    product); n p, rounded, would lose as many digits as n has. The rest has the derivative of x.
 
     Args:
-        x: What is reduced.
+        x: The argument to reduce.
         begin: Where a period begins.
-        period: Parts of the period, which may have a rounded sum.
+        period: Parts of the period; their sum may be rounded.
 
     """
     whole: Value = 0.0
@@ -85,7 +85,7 @@ def split_periods(x: Value, begin: Value, *period: Value) -> tuple[Value, Value]
 def sine_of_line(slope: Value, x: Value, intercept: Value) -> Value:
     """Return sin(slope x + intercept), exact after thousands of turns.
 
-        sin(p + e) = sin p + e cos p,   p: the rounded phase, e: what rounding leaves of it, |e| <= eps |p|
+        sin(p + e) = sin p + e cos p,   p: the rounded phase, e: its rounding error, |e| <= eps |p|
 
     Args:
         slope: Angle per unit of x.
@@ -99,14 +99,14 @@ def sine_of_line(slope: Value, x: Value, intercept: Value) -> Value:
 
 
 def _exact_sum(a: Value, b: Value) -> tuple[Value, Value]:
-    """Return a + b, rounded, and what rounding leaves of it (Knuth)."""
+    """Return a + b, rounded, and its rounding error (Knuth)."""
     total = a + b
     back = total - a
     return total, (a - (total - back)) + (b - back)
 
 
 def _exact_product(a: Value, b: Value) -> tuple[Value, Value]:
-    """Return a b, rounded, and what rounding leaves of it (Dekker)."""
+    """Return a b, rounded, and its rounding error (Dekker)."""
     product = a * b
     (high, low), (high_too, low_too) = _halves(a), _halves(b)
     return product, ((high * high_too - product) + high * low_too + low * high_too) + low * low_too
@@ -124,8 +124,8 @@ cos.register(complex, cmath.cos)
 sqrt.register(complex, cmath.sqrt)
 
 
-# Complex numbers carry a derivative in their imaginary part (complex step): what has no analytic continuation follows
-# its real part, to first order.
+# Complex numbers carry a derivative in their imaginary part (complex step). Functions without an analytic continuation
+# are evaluated at the real part, with their derivative to first order.
 
 
 @floor.register

@@ -1,4 +1,4 @@
-"""The contract of a measure: a quantity of a pose that may be held (a joint), driven, or coupled to another."""
+"""The contract of a measure: a quantity of a pose that can be held (a joint), driven, or coupled to another."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ class Measure(ABC):
     `{ measure = "angle", of = "rocker" }`. `kind` is 'length' or 'angle'.
     """
 
-    type: ClassVar[str]  # how mechanism files call it
+    type: ClassVar[str]  # its name in mechanism files
     kind: ClassVar[str]
-    is_absolute: ClassVar[bool] = False  # True if it depends on where the world's origin lies
+    is_absolute: ClassVar[bool] = False  # True if it depends on the world's origin
 
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that it meets, ground included."""
+        """Return the names of its bodies, ground included."""
 
     @abstractmethod
     def value(self, at: Placement) -> Value:
-        """The quantity in a pose."""
+        """Return the quantity in a pose."""
 
     def row(self, at: Placement, target: Value) -> Value:
-        """A constraint that is zero where the quantity is `target`."""
+        """Return a residual that is zero where the quantity is `target`."""
         return self.value(at) - target
 
     def scale(self, target: float) -> float:  # noqa: ARG002  some rows depend on it
-        """Change of the row per change of the quantity, where it is `target`."""
+        """Return the change of the row per change of the quantity, where it is `target`."""
         return 1.0
 
     def gap(self, residual: float, target: float) -> float:
-        """By how much the quantity misses `target` where the row has this residual."""
+        """Return the difference of the quantity and `target` where the row has this residual."""
         return residual / self.scale(target)

@@ -1,4 +1,4 @@
-"""Where the bodies are, and how joints ask for it; what a text field of a joint may refer to."""
+"""The poses of the bodies as joints see them, and the references in text fields of joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kinfmu.measures.arithmetic import Value, cos, sin
 
 
 class Reference(NamedTuple):
-    """What a text field of a joint refers to, so that the reader can check it and say what would be valid."""
+    """What a text field of a joint refers to, so that the reader can check it."""
 
     kind: str  # "point": 'body.point', "body": a body's name, or "choice"
     choices: tuple[str, ...] = ()
@@ -24,7 +24,7 @@ Axis = Annotated[str, Reference("choice", ("x", "y"))]
 
 
 class Pose(NamedTuple):
-    """Where a body is: frame origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
+    """Pose of a body: frame origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
 
     x: Value
     y: Value
@@ -41,9 +41,12 @@ GROUND = Pose(0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 class Placement:
-    """The bodies in one pose of the mechanism; answers what joints ask of it, in any arithmetic.
+    """The bodies in one pose of the mechanism, in any arithmetic.
 
-    poses: Pose by body name; points: body-fixed coordinates (s_x, s_y) by 'body.point'.
+    Args:
+        poses: Pose by body name.
+        points: Body-fixed coordinates (s_x, s_y) by 'body.point'.
+
     """
 
     def __init__(self, poses: Mapping[str, Pose], points: Mapping[str, tuple[float, float]]) -> None:
@@ -51,24 +54,24 @@ class Placement:
         self.points = points
 
     def point(self, name: str) -> tuple[Value, Value]:
-        """World coordinates r + A s of 'body.point'."""
+        """Return the world coordinates r + A s of 'body.point'."""
         body = self.poses[name.partition(".")[0]]
         s_x, s_y = self.points[name]
         return body.x + body.c * s_x - body.s * s_y, body.y + body.s * s_x + body.c * s_y
 
     def angle(self, body: str) -> Value:
-        """Angle phi of a body [rad]."""
+        """Return the angle phi of a body [rad]."""
         return self.poses[body].phi
 
     def direction(self, body: str, angle: Value) -> tuple[Value, Value]:
-        """Unit vector at an angle [rad] to the x axis of a body's frame, in the world."""
+        """Return the unit vector at an angle [rad] to the x axis of a body's frame, in world coordinates."""
         pose = self.poses[body]
         e_x, e_y = unit_vector(angle)
         return pose.c * e_x - pose.s * e_y, pose.s * e_x + pose.c * e_y
 
 
 def unit_vector(angle: Value) -> tuple[Value, Value]:
-    """(cos, sin) of an angle [rad]; of a number exact along the axes."""
+    """Return (cos, sin) of an angle [rad], exact for numbers that are multiples of pi/2."""
     if not isinstance(angle, float | int):
         return cos(angle), sin(angle)
     quarter = angle / (0.5 * math.pi)
@@ -78,5 +81,5 @@ def unit_vector(angle: Value) -> tuple[Value, Value]:
 
 
 def body_of(point: str) -> str:
-    """'crank' of 'crank.tip'."""
+    """Return 'crank' of 'crank.tip'."""
     return point.partition(".")[0]

@@ -1,4 +1,4 @@
-"""Bodies, their points, and the run that a mechanism is meant for."""
+"""Bodies, their points, and the settings of a run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Point(NamedTuple):
 
 
 class Start(NamedTuple):
-    """A rough pose from which assembly starts; what is None is left to assembly."""
+    """A rough pose from which assembly starts; None: found by assembly."""
 
     x: float | None = None
     y: float | None = None
@@ -33,9 +33,17 @@ class Start(NamedTuple):
 class Body:
     """A rigid body with named points in its own frame.
 
-    points: name -> (s_x, s_y) [length]; start: rough pose (x, y, phi) of the frame, each may be None. Numbers may be
-    text with a unit or an expression of the mechanism's parameters, which the mechanism resolves ("a/2", "60 deg"). The
-    body named `ground` does not move: its frame is the world's.
+    The body named `ground` does not move: its frame is the world's. Numbers can be text with a unit or an expression of
+    the mechanism's parameters ("a/2", "60 deg"), which the mechanism resolves.
+
+    Args:
+        name: Name of the body.
+        points: Name -> (s_x, s_y) [length]. Default: none.
+        start: Rough pose (x, y, phi) of the frame [length, rad], each may be None. Default: all None.
+
+    Raises:
+        MechanismError: A point is not a pair.
+
     """
 
     name: str
@@ -66,7 +74,7 @@ class Body:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """The run that a mechanism is meant for: from start to stop in communication steps, all [s]."""
+    """Start, stop and communication step of the intended run, all [s]."""
 
     start: float = 0.0
     stop: float = 1.0

@@ -1,4 +1,4 @@
-"""What no mechanism can mean: names, references and values, each told with its table and key."""
+"""Checks of a mechanism: names, references and values; messages state table and key."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from kinfmu.units import METRES
 if TYPE_CHECKING:
     from kinfmu.mechanism.mechanism import Mechanism
 
-MOST_BODIES = 20_000  # what an ordinary machine holds
+MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
 Bodies = Mapping[str, Body]  # by name
 
 
 def check_names_and_unit(mechanism: Mechanism) -> None:
-    """Raise a MechanismError for a unit or a name that cannot be meant: places are found by names."""
+    """Raise a MechanismError for an invalid unit or name. This comes first: paths of numbers contain names."""
     if mechanism.length_unit not in METRES:
         raise MechanismError(
             f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length"
@@ -46,7 +46,7 @@ def check_names_and_unit(mechanism: Mechanism) -> None:
 
 
 def check_members(mechanism: Mechanism) -> None:
-    """Raise a MechanismError that names table and key for the first thing that cannot be meant."""
+    """Raise a MechanismError that states table and key of the first invalid reference or value."""
     if not mechanism.moving_bodies:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
     for body in mechanism.bodies:
@@ -63,7 +63,7 @@ def check_members(mechanism: Mechanism) -> None:
     for name, target in mechanism.points.items():
         _check_point(bodies, f"[points] {name}", target)
         if name in bodies:
-            raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would mean two things")
+            raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would be ambiguous")
     if isinstance(mechanism.coordinates, str):
         if mechanism.coordinates not in ("moving", "all"):
             raise MechanismError(
@@ -74,7 +74,7 @@ def check_members(mechanism: Mechanism) -> None:
         for name in mechanism.coordinates:
             if name not in known:
                 raise MechanismError(
-                    f"[outputs] coordinates: {quoted(name)} is no coordinate of this mechanism"
+                    f"[outputs] coordinates: {quoted(name)} is not a coordinate of this mechanism"
                     f"{suggestion(name, known)}; coordinates: {listed(known)}"
                 )
         if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
@@ -86,7 +86,7 @@ def _check_names(table: str, names: Iterable[str]) -> None:
     for name in names:
         check_name(f"[{table}]", name)
         if name in seen:
-            raise MechanismError(f"[{table}] '{name}' is there twice")
+            raise MechanismError(f"[{table}] '{name}' is defined twice")
         seen.add(name)
 
 
@@ -118,7 +118,7 @@ def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure)
 
 
 def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
-    """What the member says of its values; expressions in them are told with the parameters that they hold."""
+    """Run the member's own check; an error also states its expressions and the values of their parameters."""
     table = "joints" if isinstance(member, Joint) else "drivers"
     try:
         member.check()
@@ -127,9 +127,9 @@ def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
-        said = [f"{path_text(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
-        said += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
-        raise type(error)(f"{error} ({listed(said)})", **error.data) from None
+        causes = [f"{path_text(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
+        causes += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
+        raise type(error)(f"{error} ({listed(causes)})", **error.data) from None
 
 
 def _check_reference(bodies: Bodies, where: str, value: Any, reference: Reference, *, is_pair: bool) -> None:

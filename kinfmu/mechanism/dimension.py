@@ -1,4 +1,4 @@
-"""What an expression measures: a length, an angle, a time, products of their powers, or a pure number."""
+"""Dimensions of expressions: a length, an angle, a time, products of their powers, or a pure number."""
 
 from __future__ import annotations
 
@@ -12,16 +12,21 @@ _LENGTHS = {0: "a length", -1: "a speed", -2: "an acceleration"}
 
 
 class DimensionError(Exception):
-    """Two quantities do not go together; the message says which."""
+    """Two quantities are incompatible; the message names them."""
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """Powers of length and time; angles are pure numbers that are known to be angles.
+    """Powers of length and time; an angle is a pure number marked as an angle.
 
-    length, time: the powers; is_angle: radians are in it; is_bare: a number without a unit is in it as a factor, which
-    may be meant in the unit of its place ("3" as a length, and "3*a/b" too); is_known: False for a parameter without a
-    unit, of which nobody can say what it measures, and for what is computed of it.
+    Attributes:
+        length: Power of length.
+        time: Power of time.
+        is_angle: True if it contains radians.
+        is_bare: True if a factor is a number without a unit, which may have the unit of its key ("3" as a length, also
+            "3*a/b").
+        is_known: False for a parameter without a unit, whose quantity is unknown, and for values computed from it.
+
     """
 
     length: Fraction = Fraction(0)
@@ -32,7 +37,7 @@ class Dimension:
 
     @classmethod
     def of(cls, quantity: Quantity) -> Dimension:
-        """The dimension of a quantity."""
+        """Return the dimension of a quantity."""
         powers = {"length": 0, "angle": 0, "number": 0, "time": 0}
         powers[quantity.kind] += 1
         powers[quantity.per] -= quantity.order
@@ -40,7 +45,7 @@ class Dimension:
 
     @property
     def quantity(self) -> Quantity | None:
-        """The quantity that has this dimension; None if files know no unit for it, or if it is not known."""
+        """The quantity of this dimension; None if it is unknown or files have no unit for it."""
         if not self.is_known or self.is_open:
             return None
         for kind in ("angle" if self.is_angle else "number", "length", "time"):
@@ -52,11 +57,11 @@ class Dimension:
 
     @property
     def is_open(self) -> bool:
-        """True for a bare number, which takes the unit of its place."""
+        """True for a bare number, which takes the unit of its key."""
         return self.is_known and self.is_bare and not self.is_angle and self.length == 0 and self.time == 0
 
     def fits(self, other: Dimension) -> bool:
-        """True unless the two are known to measure different things."""
+        """Return False if the two are known to be different quantities."""
         if not (self.is_known and other.is_known) or self.is_open or other.is_open:
             return True
         return (self.length, self.time) == (other.length, other.time)
@@ -83,9 +88,9 @@ UNKNOWN = Dimension(is_known=False)
 def sum_of(a: Dimension, b: Dimension) -> Dimension:
     """Dimension of a + b and of a - b."""
     if not a.fits(b):
-        raise DimensionError(f"{a} and {b} do not add up")
-    telling = max(a, b, key=lambda d: 0 if d.is_open else 2 if d.is_known else 1)
-    return replace(telling, is_angle=a.is_angle or b.is_angle, is_bare=a.is_bare and b.is_bare)
+        raise DimensionError(f"{a} and {b} cannot be added")
+    known = max(a, b, key=lambda d: 0 if d.is_open else 2 if d.is_known else 1)
+    return replace(known, is_angle=a.is_angle or b.is_angle, is_bare=a.is_bare and b.is_bare)
 
 
 def product_of(a: Dimension, b: Dimension) -> Dimension:
@@ -127,5 +132,5 @@ def angle_of_ratio(a: Dimension) -> Dimension:
 def angle_of_pair(a: Dimension, b: Dimension) -> Dimension:
     """Dimension of atan2(a, b)."""
     if not a.fits(b):
-        raise DimensionError(f"two of a kind are needed, not {a} and {b}")
+        raise DimensionError(f"two quantities of the same kind are needed, not {a} and {b}")
     return ANGLE

@@ -1,12 +1,12 @@
 """Arithmetic expressions of parameters, as mechanism files hold them: "2*a + 5 mm".
 
     sum     = ["+" | "-"] product { ("+" | "-") product }
-    product = power { ("*" | "/") power }             a sign may stand before each factor
+    product = power { ("*" | "/") power }             each factor may have a sign
     power   = atom ["**" whole number]
     atom    = number [unit] | name | "pi" | function "(" sum { "," sum } ")" | "(" sum ")"
 
-A word right after a number is its unit; a unit with a slash, such as "mm/s", holds no blanks. Text is parsed here, by
-hand, and never handed to Python.
+A word directly after a number is its unit; a unit with a slash, such as "mm/s", contains no blanks. This module parses
+the text; Python never evaluates it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from kinfmu.units import every_unit
 
 LONGEST = 1000  # characters
 DEEPEST = 40  # parentheses within parentheses
-LARGEST_POWER = 20  # of an exponent; a polynomial of a higher degree has lost its digits
+LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits to rounding
 
 
 class Step(NamedTuple):
-    """One step of an expression in postfix order, and where it stands in the text."""
+    """One step of an expression in postfix order, and its position in the text."""
 
     operation: str  # "number", "name", "power", or a key of OPERATIONS
     at: int
@@ -40,7 +40,7 @@ class Step(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """How an operation computes, in any arithmetic and on dimensions."""
+    """An operation in any arithmetic and on dimensions."""
 
     arity: int
     value: Callable[..., Value]
@@ -77,14 +77,25 @@ FUNCTIONS = {
     "atan2": Operation(2, atan2, dimension.angle_of_pair),
 }
 OPERATIONS = {**OPERATORS, **CONSTANTS, **FUNCTIONS}
-WORDS = (*FUNCTIONS, *CONSTANTS)  # names that no parameter can have
+WORDS = (*FUNCTIONS, *CONSTANTS)  # reserved: no parameter can have these names
 
 
 class Expression:
     """An expression of parameters, parsed once.
 
-    text: as written; length_unit: the mechanism's, into which lengths with units are turned; names: the parameters in
-    it, each once, in their order. Equal if text and unit are. Raises a MechanismError that tells the place in the text.
+    Two expressions are equal if text and unit are equal.
+
+    Args:
+        text: Such as "2*a + 5 mm".
+        length_unit: Unit of length of the mechanism; lengths with other units are converted to it. Default: 'm'.
+
+    Attributes:
+        names: The parameters in it, each once, in their order.
+        steps: The operations in postfix order.
+
+    Raises:
+        MechanismError: The text is not an expression; the message states the position.
+
     """
 
     __slots__ = ("length_unit", "names", "steps", "text")
@@ -112,7 +123,7 @@ class Expression:
         return hash((self.text, self.length_unit))
 
     def __add__(self, shift: float) -> Expression:
-        """The expression with a length added, such as the way of the origin."""
+        """Return the expression plus a length, such as a shift of the origin."""
         moved = Expression.__new__(Expression)
         moved.text, moved.length_unit = f"({self.text}) + {shift!r}", self.length_unit
         end = len(self.text)
@@ -122,22 +133,27 @@ class Expression:
 
     @property
     def alone(self) -> str | None:
-        """The name of the parameter if the expression is nothing but that."""
+        """The name of the parameter if it is the whole expression, else None."""
         return self.steps[0].value if len(self.steps) == 1 and self.names else None
 
     @property
     def literal(self) -> Step | None:
-        """The number if the expression is nothing but one with its sign and its unit."""
+        """The number if the expression is only a number with its sign and unit, else None."""
         number, *signs = self.steps
         if number.operation != "number" or any(step.operation != "sign" for step in signs):
             return None
         return number._replace(value=-number.value if len(signs) % 2 else number.value)
 
     def value(self, values: Mapping[str, Value]) -> Value:
-        """The value with `values` of the parameters by name, in their arithmetic: floats, symbols, Taylor numbers.
+        """Return the value of the expression.
 
-        Raises a MechanismError for a name without a value, a division by zero, a root of a negative number and a number
-        too large, with the place.
+        Args:
+            values: Values of the parameters by name, in any arithmetic: floats, symbols, Taylor numbers.
+
+        Raises:
+            MechanismError: A name without a value, a division by zero, a root of a negative number, or a number that
+                is too large; the message states the position.
+
         """
         stack: list[Value] = []
         for step in self.steps:
@@ -155,7 +171,7 @@ class Expression:
                 except OverflowError:
                     raise self._wrong(step.at, "the number is too large") from None
                 except ValueError:
-                    what = f"{step.operation} of {quoted(stack[-1])}, which has none"
+                    what = f"{step.operation} of {quoted(stack[-1])} is undefined"
                     raise self._wrong(step.at, what) from None
         return stack[0]
 
@@ -171,7 +187,7 @@ class Expression:
         stack[len(stack) - arity :] = [result]
 
     def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
-        """What it measures if the parameters measure `dimensions`; a MechanismError where they do not go together."""
+        """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
         stack: list[Dimension] = []
         for step in self.steps:
             if step.operation == "number":
@@ -204,7 +220,7 @@ class Expression:
 
 
 def _power(base: Value, exponent: int) -> Value:
-    """base ** exponent by products alone, so that every arithmetic gives the same."""
+    """Return base ** exponent, by products only, so that every arithmetic gives the same bits."""
     product = base
     for _ in range(abs(exponent) - 1):
         product = product * base
@@ -225,7 +241,7 @@ _UNIT = re.compile(r"[ \t]*([A-Za-z_][A-Za-z0-9_]*)(/[A-Za-z_][A-Za-z0-9_]*)?")
 
 
 class _Parser:
-    """Text to steps, by recursive descent."""
+    """Parser from text to steps, by recursive descent."""
 
     def __init__(self, text: str, length_unit: str) -> None:
         self._text = text
@@ -331,7 +347,7 @@ class _Parser:
             raise self._wrong("a number, a name or '('")
 
     def _number(self, token: _Token) -> None:
-        """A number and the unit that follows it, which is the longest that is known."""
+        """Parse a number and its unit, the longest known one."""
         value, unit, measures = float(token.text), "", dimension.BARE
         match = _UNIT.match(self._text, self._at)
         if match:
@@ -352,7 +368,7 @@ class _Parser:
         self._next()
 
     def _inside(self, opening: _Token, count: int) -> None:
-        """What stands in parentheses: so many sums with commas between."""
+        """Parse parentheses with `count` sums, separated by commas."""
         self._depth += 1
         if self._depth > DEEPEST:
             raise MechanismError(
@@ -371,11 +387,11 @@ class _Parser:
         found = f"'{self._token.text}'" if self._token.kind != "end" else "the end"
         if self._token.kind == "character":
             found = quoted(self._token.text)
-        return MechanismError(f"{quoted(self._text)}, character {self._token.at + 1}: {found} where {valid} must stand")
+        return MechanismError(f"{quoted(self._text)}, character {self._token.at + 1}: expected {valid}, found {found}")
 
 
 class Computed(float):
-    """A number that was written as an expression: a float that remembers how."""
+    """A float with the expression from which it was computed."""
 
     __slots__ = ("expression",)
 

@@ -83,7 +83,7 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
     for key in table:
         if key not in _SEGMENT_KEYS:
             near = suggestion(key, _SEGMENT_KEYS)
-            raise MechanismError(f"{where} {quoted(key)} is no key{near}; keys: {listed(_SEGMENT_KEYS)}")
+            raise MechanismError(f"{where} {quoted(key)} is not a key{near}; keys: {listed(_SEGMENT_KEYS)}")
     text_of(f"{where} law", table.get("law", ""))
     words = [rise.type for rise in RISES]
     needed = ("law", "duration") if table.get("law") not in words else _SEGMENT_KEYS
@@ -94,7 +94,7 @@ def _segment(where: str, table: Mapping[str, Any]) -> Segment:
 
 
 def law_lines(law: Law, written: Callable[[Any], str]) -> Iterable[str]:
-    """The lines of a law in a mechanism file; written: turns a number, a truth, a text or a tuple of them into TOML."""
+    """Yield the lines of a law in a mechanism file; `written` converts a value to TOML."""
     yield f"law = {written(law.type)}"
     for key in keys_of(type(law)):
         value = getattr(law, key.name)

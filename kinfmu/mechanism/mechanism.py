@@ -1,4 +1,4 @@
-"""Mechanism: what the engineer writes."""
+"""Mechanism: the model that the engineer writes."""
 
 from __future__ import annotations
 
@@ -30,11 +30,28 @@ COORDINATES = ("x", "y", "phi")
 class Mechanism:
     """A planar mechanism: bodies, the joints between them, and the drivers that move it.
 
-    points: points of interest, name -> 'body.point'; coordinates: which generalized coordinates q holds: 'moving'
-    (without those that a joint fixes to a constant), 'all', or names such as 'coupler.x' in the wanted order.
-    parameters: numbers by name, which may be given as numbers or as text ("40 mm", "2*a") too. Wherever a number
-    stands, text with a unit or an expression of parameters may stand instead ("60 deg", "a/2 + 5 mm"); once made, the
-    mechanism holds the numbers there, and `expressions` says which of them are computed, by place.
+    Every number can also be given as text with a unit or as an expression of parameters ("60 deg", "a/2 + 5 mm"). The
+    mechanism converts them to numbers; `expressions` lists the computed ones.
+
+    Args:
+        name: Name of the mechanism and of its FMU.
+        bodies: The bodies; `ground` is added if it is missing.
+        joints: The joints between them.
+        drivers: One driver for each degree of freedom that the joints leave.
+        points: Points of interest, name -> 'body.point'. Default: none.
+        coordinates: The generalized coordinates in q: 'moving' (without those that a joint fixes to a constant), 'all',
+            or names such as 'coupler.x' in the wanted order. Default: 'moving'.
+        run: Start, stop and step of the intended run [s]. Default: 0, 1, 0.01.
+        length_unit: Unit of all lengths. Default: 'm'.
+        title: One line for people.
+        parameters: Parameters by name, also as plain numbers or text ("40 mm", "2*a"). Default: none.
+
+    Attributes:
+        expressions: The expressions of computed numbers, by path (see `NumberPath`).
+
+    Raises:
+        MechanismError: A name, reference or value is invalid; the message states table and key.
+
     """
 
     name: str
@@ -85,7 +102,7 @@ class Mechanism:
 
     @property
     def unused_parameters(self) -> tuple[str, ...]:
-        """Parameters to which no number of the mechanism refers, not by way of others either."""
+        """Parameters to which no number of the mechanism refers, directly or through other parameters."""
         open_ones = [name for expression in self.expressions.values() for name in expression.names]
         used: set[str] = set()
         while open_ones:
@@ -102,14 +119,16 @@ class Mechanism:
         return Members(self.bodies, self.joints, self.drivers, self.run)
 
     def with_expressions(self) -> Members:
-        """The members with expressions in the places where they were written, instead of their numbers."""
+        """Return the members with expressions as they were written, instead of their numbers."""
         return self.members.changed(lambda _, value, __: value.expression if isinstance(value, Computed) else value)
 
     def at(self, values: Mapping[str, Value]) -> Members:
-        """The members where parameters have these values, in any arithmetic: floats, symbols, Taylor numbers.
+        """Return the members for other values of parameters, unchecked (`with_parameters` checks).
 
-        Parameters that are not given are computed from those that are, or keep their numbers. Nothing is checked:
-        `with_parameters` does that.
+        Args:
+            values: Values by name, in any arithmetic: floats, symbols, Taylor numbers. Other parameters are computed
+                from them or keep their numbers.
+
         """
         known = parameter_values(self.parameters, values)
 
@@ -121,14 +140,20 @@ class Mechanism:
 
     @property
     def law_constants(self) -> tuple[LawConstant, ...]:
-        """Constants of the drivers' laws; those that expressions give follow from parameters and are not among them."""
+        """Settable constants of the drivers' laws; constants given by expressions follow from parameters instead."""
         return tuple(law_constants(self.drivers, self.expressions))
 
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
-        """The mechanism with other values of some parameters: numbers, text with a unit, or expressions.
+        """Return the mechanism with other values of some parameters.
 
-        Constants of laws go by their names, too, such as "crank.speed", as numbers or text with a unit. Raises a
-        RequestError for a name that is neither, a MechanismError for values with which the mechanism cannot be meant.
+        Args:
+            values: Parameters by name, as numbers, text with a unit, or expressions; constants of laws by names such as
+                "crank.speed", as numbers or text with a unit.
+
+        Raises:
+            RequestError: A name is neither a parameter nor a constant of a law.
+            MechanismError: A value is invalid.
+
         """
         parameters = dict(self.parameters)
         settable = {constant.name: constant for constant in self.law_constants}
@@ -143,13 +168,13 @@ class Mechanism:
                     f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
                 )
             old = parameters[name]
-            quantity = None if old.kind == "number" else old.quantity  # a pure number, or nobody could know
+            quantity = None if old.kind == "number" else old.quantity  # without a unit the new value decides
             parameters[name] = Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved
         return replace(self, parameters=parameters, drivers=with_law_constants(self.drivers, constants))
 
 
 def require_mechanism(value: object, purpose: str) -> None:
-    """Raise a RequestError if a value is not a Mechanism but its name, its path or anything else; purpose: 'solve'."""
+    """Raise a RequestError if a value is not a Mechanism, such as its name or path; purpose: 'solve'."""
     if isinstance(value, str | PurePath):
         raise RequestError(f"{purpose} needs a Mechanism: kinfmu.load({str(value)!r}) gives it")
     if not isinstance(value, Mechanism):

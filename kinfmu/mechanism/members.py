@@ -1,4 +1,4 @@
-"""The places of a mechanism where numbers stand, by name: where messages point, and where expressions may be."""
+"""The numbers of a mechanism by their paths, for messages and for expressions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 @dataclass(frozen=True)
 class Members:
-    """What has numbers in a mechanism, with the numbers in any arithmetic."""
+    """The parts of a mechanism that contain numbers, in any arithmetic."""
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
@@ -44,7 +44,7 @@ class Members:
         return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
 
     def changed(self, change: Change) -> Members:
-        """The members with change(place, value, quantity) in every place; what does not change stays the same."""
+        """Return the members with each number replaced by change(path, value, quantity); equal parts stay identical."""
         run = {key.name: change(("run", key.name), getattr(self.run, key.name), TIME) for key in fields(self.run)}
         return Members(
             tuple(_body(body, change) for body in self.bodies),
@@ -55,7 +55,7 @@ class Members:
 
 
 def path_text(place: NumberPath) -> str:
-    """A place as messages name it: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
+    """Return a path as in messages: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
     if place[0] == "run":
         return f"[run] {place[1]}"
     table, name, *path = place
@@ -99,6 +99,6 @@ def _law(law: Law, kinds: tuple[str, str], place: NumberPath, change: Change) ->
 
 
 def _replaced(member: Any, values: Mapping[str, Any]) -> Any:
-    """The member with these values in its fields; itself if they are there already."""
+    """Return the member with these values in its fields; itself if nothing changes."""
     new = {key: value for key, value in values.items() if value is not getattr(member, key)}
     return replace(member, **new) if new else member

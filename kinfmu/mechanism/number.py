@@ -1,4 +1,4 @@
-"""Numbers as engineers write them: plain, with a unit, or as an expression of parameters."""
+"""Numbers as engineers write them: bare, with a unit, or as an expression of parameters."""
 
 from __future__ import annotations
 
@@ -17,10 +17,17 @@ _EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
 
 
 def read_number(where: str, value: object, quantity: Quantity | None, length_unit: str) -> float | Expression:
-    """A number in the units used inside, or the expression that gives it; a MechanismError says what would be valid.
+    """Return a number in the units used inside, or the expression that gives it.
 
-    value: a number, text such as '60 deg' with a unit of that quantity (of any if it is None), text such as
-    '2*a + 5 mm', or an Expression.
+    Args:
+        where: The key in messages, such as '[joints.AB] length'.
+        value: A number, text such as '60 deg' or '2*a + 5 mm', or an Expression.
+        quantity: The quantity that the key needs; None: any.
+        length_unit: Unit of length of the mechanism.
+
+    Raises:
+        MechanismError: The value is not a number or has a wrong unit; the message states what would be valid.
+
     """
     if isinstance(value, Computed):
         value = value.expression
@@ -32,7 +39,7 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
             expression = Expression(value, length_unit)
         except MechanismError as error:
             plain = _PLAIN.fullmatch(value)
-            if plain and quantity and known:  # no expression was meant: what fits this place is enough to tell
+            if plain and quantity and known:  # a number with a wrong unit, not an expression
                 raise _wrong_unit(where, value, plain[1], known) from None
             raise expression_error(where, value, quantity, length_unit, error) from None
         literal = expression.literal
@@ -52,9 +59,11 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
 
 
 def read_constant(where: str, value: object, quantity: Quantity, length_unit: str) -> float:
-    """A number, or what text such as '30 rpm' says in the units used inside; expressions are not taken.
+    """Return a number, or the number of text such as '30 rpm', in the units used inside.
 
-    Raises a MechanismError that says what would be valid.
+    Raises:
+        MechanismError: The value is not a number, has a wrong unit or is an expression.
+
     """
     if isinstance(value, str):
         number = read_number(where, value, quantity, length_unit)
@@ -70,7 +79,7 @@ def read_constant(where: str, value: object, quantity: Quantity, length_unit: st
 def expression_error(
     where: str, text: str, quantity: Quantity | None, length_unit: str, error: MechanismError
 ) -> MechanismError:
-    """`error` about an expression, with its place; of words alone it tells first what must stand there."""
+    """Add the key to an error about an expression; if the text is only words, state the needed quantity too."""
     if quantity is None or not _WORDS.fullmatch(text):
         return MechanismError(f"{where} = {error}")
     needed, example = Dimension.of(quantity), _example(quantity, length_unit)

@@ -16,16 +16,19 @@ from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
 
 NUMBER = Quantity("number")
-_MOST_TOLD = 8  # names of a circle that a message lists
+_MOST_LISTED = 8  # names of a circle in a message
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A number with a name.
 
-    value: the number in the units used inside; before a mechanism resolves it also text with a unit or an expression
-    of other parameters ("40 mm", "2*a"). quantity: what it measures; if nothing is said, what its unit says, else the
-    place where its name stands alone, else a pure number. description: one line for people.
+    Args:
+        value: The number in the units used inside; before a mechanism resolves it also text with a unit or an
+            expression of other parameters ("40 mm", "2*a").
+        quantity: What it measures. Default: from its unit, else from the key whose value is its name, else a number.
+        description: One line for people. Default: none.
+
     """
 
     value: float
@@ -39,12 +42,12 @@ class Parameter:
 
     @property
     def expression(self) -> Expression | None:
-        """How it follows from other parameters; None if it is a number of its own."""
+        """The expression that computes it; None if it is independent."""
         return self.value.expression if isinstance(self.value, Computed) else None
 
 
 class UnresolvedParameter(NamedTuple):
-    """A parameter as it is said: not yet computed."""
+    """A parameter whose expression is not yet computed."""
 
     value: float | Expression
     quantity: Quantity | None
@@ -52,10 +55,10 @@ class UnresolvedParameter(NamedTuple):
 
 
 def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> UnresolvedParameter:
-    """What is said of a parameter; a MechanismError tells what cannot be meant."""
+    """Return a parameter before it is computed, or raise a MechanismError for an invalid name or value."""
     check_name("[parameters]", name)
     if name in WORDS:
-        raise MechanismError(f"[parameters] {name}: expressions mean something else by this name: {listed(WORDS)}")
+        raise MechanismError(f"[parameters] {name}: this name is reserved in expressions; reserved: {listed(WORDS)}")
     if not isinstance(parameter, Parameter):
         parameter = Parameter(parameter)  # type: ignore[arg-type]  # text until it is resolved
     check_line(f"[parameters] {name} description", parameter.description)
@@ -117,7 +120,7 @@ def resolve_parameters(
 def _computed(
     name: str, expression: Expression, values: Mapping[str, float], dimensions: Mapping[str, Dimension]
 ) -> tuple[Computed, Dimension]:
-    """Number and dimension of a parameter's expression, which must fit what is said of the parameter."""
+    """Return number and dimension of a parameter's expression, which must fit the declared quantity."""
     where = f"[parameters] {name} ="
     try:
         found = expression.dimension(dimensions)
@@ -131,7 +134,7 @@ def _computed(
 
 
 def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
-    """What resolved parameters measure; a pure number may be anything that has no unit in the file."""
+    """Return the dimensions of resolved parameters; those of pure numbers are unknown unless computed."""
     found: dict[str, Dimension] = {}
     expressions = {name: p.expression for name, p in parameters.items() if p.expression is not None}
     for name in _in_order(parameters, expressions):
@@ -144,7 +147,7 @@ def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
 
 
 def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
-    """Values of all parameters, in any arithmetic: those in `values` as given, what follows from them computed."""
+    """Return the values of all parameters, in any arithmetic: those in `values`, and those computed from them."""
     expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in values}
     found: dict[str, Value] = {}
     for name in _in_order(parameters, expressions):
@@ -156,7 +159,7 @@ def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, V
 
 
 def _in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
-    """The names, each after those that its expression needs."""
+    """Return the names sorted so that each comes after those in its expression."""
     names = dict.fromkeys(names)
     for name, expression in expressions.items():
         try:
@@ -168,5 +171,5 @@ def _in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> li
         return list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         circle = error.args[1][::-1]
-        shown = circle if len(circle) <= _MOST_TOLD else [*circle[: _MOST_TOLD - 1], "...", circle[-1]]
+        shown = circle if len(circle) <= _MOST_LISTED else [*circle[: _MOST_LISTED - 1], "...", circle[-1]]
         raise MechanismError(f"[parameters] {circle[0]} needs itself: {' -> '.join(shown)}") from None

@@ -1,4 +1,4 @@
-"""Numbers in the place of what was written: texts with a unit, and expressions of parameters."""
+"""Conversion of texts with a unit and of expressions of parameters into numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_PARAMETERS = 10_000
 
 
 class Resolved(NamedTuple):
-    """Members that hold numbers alone, parameters with their values, and the expressions by their places."""
+    """Members with numbers only, parameters with their values, and the expressions by their paths."""
 
     members: Members
     parameters: dict[str, Parameter]
@@ -26,10 +26,16 @@ class Resolved(NamedTuple):
 
 
 def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Resolved:
-    """Put numbers in the place of texts with units and of expressions, and remember the expressions.
+    """Replace texts with units and expressions by numbers, and list the expressions.
 
-    given: parameters as the engineer wrote them; unit: of length. Raises a MechanismError that names the place of what
-    is no number, of a name that is no parameter and of a quantity that does not belong there.
+    Args:
+        members: Bodies, joints, drivers and run as written.
+        given: Parameters as written.
+        unit: Unit of length.
+
+    Raises:
+        MechanismError: A value is not a number, a name is not a parameter, or a quantity does not fit its key.
+
     """
     if len(given) > MOST_PARAMETERS:
         raise MechanismError(f"[parameters] holds {len(given)} parameters; {MOST_PARAMETERS} at most")

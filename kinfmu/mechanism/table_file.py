@@ -15,11 +15,19 @@ LARGEST_TABLE = 4_000_000  # [bytes]
 
 
 def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, Any], ...]:
-    """The rows of a CSV file of two columns, x and u, as numbers, or as text where the header gives a unit.
+    """Return the rows of a CSV file of two columns, x and u, as numbers, or as text where the header gives a unit.
 
-    The first line may be a header; units in it stand in brackets: `angle [deg], lift [mm]`. Columns are parted by
-    commas, semicolons or tabs; empty lines and lines that begin with # are left out. Raises a MechanismError that names
-    file and line.
+    The first line may be a header with units in brackets: `angle [deg], lift [mm]`. Columns are separated by commas,
+    semicolons or tabs; empty lines and lines that begin with # are skipped.
+
+    Args:
+        where: The key in messages.
+        name: Path of the file.
+        folder: Where a relative path starts; None: files are refused.
+
+    Raises:
+        MechanismError: The file cannot be read, or a line is wrong; the message states file and line.
+
     """
     if not isinstance(name, str):
         raise MechanismError(f"{where} = {quoted(name)} must be the name of a CSV file")
@@ -63,7 +71,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _unit(title: str) -> str:
-    """'deg' of 'angle [deg]'."""
+    """Return 'deg' of 'angle [deg]'."""
     _, bracket, unit = title.removesuffix("]").rpartition("[")
     return unit.strip() if bracket and title.endswith("]") and "]" not in unit else ""
 

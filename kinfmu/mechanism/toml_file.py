@@ -1,4 +1,4 @@
-"""Mechanism files: TOML to Mechanism. Messages name the file, the table, the key and what would be valid."""
+"""Mechanism files: TOML to Mechanism. Messages state the file, the table, the key and what would be valid."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
 
 
 def read(path: str | Path) -> Mechanism:
-    """The mechanism that a TOML file describes; MechanismError names the file, the table and the key at fault."""
+    """Return the mechanism of a TOML file; a MechanismError states the file, the table and the key."""
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -68,8 +68,14 @@ def read(path: str | Path) -> Mechanism:
 def parse(text: str, where: str = "mechanism", folder: str | Path | None = None) -> Mechanism:
     """Return the mechanism that TOML text describes.
 
-    where: names the text in messages; folder: where files that it names are looked for; without one, as for the text
-    inside an FMU or a record, no file is opened. Raises a MechanismError that names the table and the key at fault.
+    Args:
+        text: The content of a mechanism file.
+        where: Name of the text in messages.
+        folder: Where relative paths of files start. Default: files are refused, as in text inside an FMU or a record.
+
+    Raises:
+        MechanismError: The text is not TOML or not a mechanism; the message states table and key.
+
     """
     if len(text) > LARGEST_FILE:
         raise MechanismError(f"{where}: too large for a mechanism (largest: {LARGEST_FILE} characters)")
@@ -92,7 +98,7 @@ def parse(text: str, where: str = "mechanism", folder: str | Path | None = None)
 
 
 def _deep_key(text: str) -> int | None:
-    """The place of the first key of more than DEEPEST_KEY parts, outside comments and texts."""
+    """Return the position of the first key of more than DEEPEST_KEY parts, outside comments and texts."""
     if not _MANY_DOTS.search(text):
         return None
     return next((token.start() for token in _TOKEN.finditer(text) if token.lastgroup), None)
@@ -133,7 +139,7 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
 
 
 def _checked_unit(unit: str) -> str:
-    """The unit itself if it is one of length; Mechanism repeats this check for mechanisms written in Python."""
+    """Return the unit if it is a unit of length; Mechanism repeats this check for mechanisms written in Python."""
     if unit not in METRES:
         near = suggestion(unit, METRES) if isinstance(unit, str) else ""
         raise MechanismError(f"[units] length = {quoted(unit)} is not a unit of length{near}; known: {listed(METRES)}")
@@ -148,7 +154,7 @@ class _Reader:
         self.folder = folder
 
     def number(self, where: str, value: object, quantity: Quantity) -> Any:
-        """A number, from text such as '60 deg' too, or the expression of parameters that the mechanism resolves."""
+        """Return a number, also from text such as '60 deg', or an expression that the mechanism resolves."""
         return read_number(where, value, quantity, self.length_unit)
 
     def body(self, name: str, table: Mapping[str, Any]) -> Body:
@@ -179,7 +185,7 @@ class _Reader:
     def member(
         self, where: str, name: str, table: Mapping[str, Any], classes: Iterable[Any], laws: Iterable[type[Law]]
     ) -> Any:
-        """A joint or driver; one that has a law finds the law's keys in its own table."""
+        """Return a joint or driver; the keys of its law, if it has one, are in the same table."""
         cls = class_of_type(where, table, "type", classes)
         keys = member_keys(cls)
         values: dict[str, Any] = {}
@@ -219,7 +225,7 @@ class _Reader:
         return values
 
     def measure(self, where: str, table: Any) -> Measure:
-        """A measure from a table such as { measure = "angle", of = "rocker" }."""
+        """Return a measure from a table such as { measure = "angle", of = "rocker" }."""
         if not isinstance(table, dict):
             example = '{ measure = "angle", of = "rocker" }'
             raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
@@ -230,7 +236,7 @@ class _Reader:
 
 
 def _parameter(name: str, value: Any) -> Parameter:
-    """A parameter as a number, as text, or as a table { value = ..., description = "..." }."""
+    """Return a parameter from a number, text, or a table { value = ..., description = "..." }."""
     if not isinstance(value, dict):
         return Parameter(value)
     where = f"[parameters.{name}]"

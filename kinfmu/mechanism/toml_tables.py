@@ -1,4 +1,4 @@
-"""Tables of a TOML document: what is unknown, missing or of another kind is told with its place and what is valid."""
+"""Tables of a TOML document; messages about unknown, missing or wrong values state the place and what is valid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def member_keys(cls: type) -> list[str]:
 
 
 def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:
-    """The class whose `type` the table names under `key`."""
+    """Return the class whose `type` is the value of `key`."""
     known = {cls.type: cls for cls in classes}
     if key not in table:
         raise MechanismError(f"{where} needs the key '{key}', one of {listed(known)}")
@@ -39,7 +39,7 @@ def check_keys(where: str, table: Mapping[str, Any], known: Iterable[str]) -> No
 
 
 def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The table [name], empty if it is not there."""
+    """Return the table [name], empty if it is missing."""
     table = document.get(name, {})
     if isinstance(table, list) and table and all(isinstance(one, dict) for one in table):
         raise MechanismError(f"[[{name}]] must be tables with names of their own, such as [{name}.A]")
@@ -49,14 +49,14 @@ def table_of(document: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def named_values(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, Any]]:
-    """What stands in the table [name], by names that can be names."""
+    """Yield the keys and values of the table [name]; the keys are checked as names."""
     for key, value in table_of(document, name).items():
         check_name(f"[{name}]", key)
         yield key, value
 
 
 def named_tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, dict[str, Any]]]:
-    """The tables [name.KEY]."""
+    """Yield the tables [name.KEY]."""
     for key, table in named_values(document, name):
         if not isinstance(table, dict):
             raise MechanismError(f"[{name}] {key} = {quoted(table)} must be a table [{name}.{key}]")
@@ -64,7 +64,7 @@ def named_tables(document: Mapping[str, Any], name: str) -> Iterable[tuple[str, 
 
 
 def subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """The table under a key, points or a start pose, empty if it is not there."""
+    """Return the table under a key, points or a start pose, empty if it is missing."""
     value = table.get(key, {})
     if not isinstance(value, dict):
         example = "{ P = [1, 0] }" if key == "points" else "{ x = 0, y = 0, phi = 0 }"
@@ -73,7 +73,7 @@ def subtable(where: str, table: Mapping[str, Any], key: str) -> dict[str, Any]:
 
 
 def text_of(where: str, value: object, valid: str = "text") -> str:
-    """The value, if it is text; valid: what it must be, as the message says it."""
+    """Return the value, which must be text; `valid` describes it in the message."""
     if not isinstance(value, str):
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
     return value

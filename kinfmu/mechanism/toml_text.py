@@ -1,4 +1,4 @@
-"""A mechanism as TOML, as `toml_file` reads it."""
+"""A mechanism as TOML text, which `toml_file` reads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kinfmu.units import unit_of
 
 
 def text(mechanism: Mechanism) -> str:
-    """The mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
+    """Return the mechanism as TOML; `parse(text(m)) == m`, numbers to the last bit."""
     lines = [f"name = {_toml(mechanism.name)}"]
     if mechanism.title:
         lines.append(f"title = {_toml(mechanism.title)}")
@@ -47,7 +47,7 @@ def text(mechanism: Mechanism) -> str:
 
 
 def _written(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
-    """The line of a parameter: its expression, or its number with the unit that tells what it measures."""
+    """Return the line of a parameter: its expression, or its number with its unit."""
     value: object = parameter.value
     if parameter.expression is None and parameter.quantity and parameter.kind != "number":
         value = f"{float(parameter.value)!r} {unit_of(parameter.quantity, mechanism.length_unit)}"
@@ -61,8 +61,8 @@ def _toml(value: object) -> str:
         value = value.expression.text
     if isinstance(value, Measure):
         keys = {key: getattr(value, key) for key in member_keys(type(value))}
-        said = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
-        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in said.items()) + " }"
+        table = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in table.items()) + " }"
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'

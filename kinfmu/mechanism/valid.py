@@ -1,4 +1,4 @@
-"""What a name, a number and a line of text in a mechanism may be, and values as messages show them."""
+"""Checks of names, numbers and lines of text, and values as messages show them."""
 
 from __future__ import annotations
 
@@ -17,48 +17,48 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}\Z")
 
 
 def check_name(where: str, name: str) -> None:
-    """Raise a MechanismError unless `name` can be a name."""
+    """Raise a MechanismError unless `name` is a valid name."""
     if not _NAME.match(name):
         rule = "must be letters, digits and underscores, no digit first, at most 100 in all"
         raise MechanismError(f"{where} {quoted(name)} {rule}")
 
 
 def check_number(where: str, value: Any, written: object = None) -> None:
-    """Raise a MechanismError unless `value` is a finite number of a size that can be meant; `written`: as given."""
+    """Raise a MechanismError unless `value` is finite and at most LARGEST_NUMBER; `written`: as messages show it."""
     if is_number(value) and abs(value) <= LARGEST_NUMBER:
         return
-    told = quoted(value if written is None else written)
+    shown = quoted(value if written is None else written)
     if not is_number(value):
-        raise MechanismError(f"{where} = {told} must be a number")
+        raise MechanismError(f"{where} = {shown} must be a number")
     if value != value or value in (math.inf, -math.inf):
-        raise MechanismError(f"{where} = {told} must be a finite number")
-    raise MechanismError(f"{where} = {told} is too large; numbers go up to {LARGEST_NUMBER:g}")
+        raise MechanismError(f"{where} = {shown} must be a finite number")
+    raise MechanismError(f"{where} = {shown} is too large; numbers go up to {LARGEST_NUMBER:g}")
 
 
 def is_number(value: object) -> bool:
-    """True for real numbers; truth values are none."""
+    """Return True for real numbers, False for truth values."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def check_line(where: str, text: str) -> None:
-    """Raise a MechanismError unless `text` is one line that terminals, TOML and XML take."""
+    """Raise a MechanismError unless `text` is one line that terminals, TOML and XML accept."""
     if not is_line(text):
         raise MechanismError(f"{where} = {quoted(text)} must be one line of text without control characters")
 
 
 def is_line(text: str) -> bool:
-    """Return True for one line of text that terminals, TOML and XML take."""
+    """Return True for one line of text that terminals, TOML and XML accept."""
     return all(map(_is_text, text))
 
 
 def _is_text(character: str) -> bool:
-    """False for control characters, line breaks, halves of a character (surrogates) and what is no character at all."""
+    """Return False for control characters, line breaks, surrogates and noncharacters."""
     is_none = ord(character) & 0xFFFE == 0xFFFE
     return not is_none and unicodedata.category(character) not in ("Cc", "Cs", "Zl", "Zp")
 
 
 LONGEST = 120
-_LARGEST_WHOLE = 10**40  # whole numbers beyond are told by their size; Python refuses to print very long ones
+_LARGEST_WHOLE = 10**40  # whole numbers beyond are shown by their size; Python refuses to print very long ones
 
 
 class _Quoter(reprlib.Repr):
@@ -83,8 +83,8 @@ class _Quoter(reprlib.Repr):
 
 def quoted(value: object) -> str:
     """'text' in quotes with its line breaks escaped, numbers and lists as they are; LONGEST characters at most."""
-    told = _QUOTER.repr(float(value) if isinstance(value, float) else value)  # numpy's floats print their type
-    return told if len(told) <= LONGEST else told[: LONGEST - 3] + "..."
+    shown = _QUOTER.repr(float(value) if isinstance(value, float) else value)  # numpy's floats print their type
+    return shown if len(shown) <= LONGEST else shown[: LONGEST - 3] + "..."
 
 
 _QUOTER = _Quoter()

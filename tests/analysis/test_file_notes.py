@@ -78,7 +78,7 @@ stop = 2
 
 
 def test_a_cam_that_turns_on_where_its_lift_ends_is_told() -> None:
-    note = "[joints.lift] law: its sequence does not repeat; say repeat = true; [run] turns cam by 720 deg"
+    note = "[joints.lift] law: its sequence does not repeat; set repeat = true; [run] turns cam by 720 deg"
     assert list(file_notes(parse(CAM))) == [note]
     assert note in check(parse(CAM)).notes
     assert list(file_notes(parse(CAM.replace("stop = 2", "stop = 1")))) == []

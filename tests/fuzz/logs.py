@@ -278,7 +278,7 @@ def _two_at_once(draw: random.Random, folder: Path, _fmu: Path) -> Iterator[str]
         yield "the record is not the run"
 
 
-BUSY = "a run that goes on writes to it; choose another name, or wait until it has ended"
+BUSY = "a run in progress writes to it; choose another name, or wait until it has ended"
 
 
 def _command(pipe: Connection, arguments: list[str], folder: Path) -> None:

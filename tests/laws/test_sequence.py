@@ -83,7 +83,7 @@ TURN = 2.0 * math.pi
 @pytest.mark.parametrize(
     ("law", "why"),
     [
-        (MotionSequence(UP_AND_DOWN), "its sequence does not repeat; say repeat = true"),
+        (MotionSequence(UP_AND_DOWN), "its sequence does not repeat; set repeat = true"),
         (
             MotionSequence(UP_AND_DOWN, repeat=True),
             "the durations of its sequence add up to 214.859173 deg, not to a turn of 360 deg",
@@ -105,7 +105,7 @@ TURN = 2.0 * math.pi
             Spline(tuple((float(k), k % 4.0) for k in range(5)), "periodic"),
             "its table spans 229.183118 deg, not a turn of 360 deg or a whole part of it",
         ),
-        (Spline(tuple((float(k), k % 4.0) for k in range(5))), "its table does not repeat; say ends = 'periodic'"),
+        (Spline(tuple((float(k), k % 4.0) for k in range(5))), "its table does not repeat; set ends = 'periodic'"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

@@ -16,7 +16,7 @@ from kinfmu.run import Run
 from tests.log.runs import without_samples
 from tests.log.test_mcap import assert_same
 
-REFUSED = r"run\.mcap: cannot be written \(a run that goes on writes to it; choose another name, or wait until it has"
+REFUSED = r"run\.mcap: cannot be written \(a run in progress writes to it; choose another name, or wait until it has"
 pytestmark = pytest.mark.skipif(
     whole_file.fcntl is None, reason="without locks Windows refuses to replace an open file"
 )

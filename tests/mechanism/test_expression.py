@@ -141,31 +141,31 @@ def test_an_expression_is_a_value() -> None:
 
 ALL = "sin, cos, tan, sqrt, asin, acos, atan2"
 MESSAGES = {
-    "": "'', character 1: the end where a number, a name or '(' must stand",
-    "2 * (a + ": "'2 * (a +', character 9: the end where a number, a name or '(' must stand",
-    "2 * (a": "'2 * (a', character 7: the end where one of + - * / ** ) must stand",
-    "a b": "'a b', character 3: 'b' where one of + - * / ** must stand",
-    "a)": "'a)', character 2: ')' where one of + - * / ** must stand",
-    "a + * b": "'a + * b', character 5: '*' where a number, a name or '(' must stand",
-    "a & b": "'a & b', character 3: '&' where one of + - * / ** must stand",
-    "a\nb": r"'a\nb', character 2: '\n' where one of + - * / ** must stand",
+    "": "'', character 1: expected a number, a name or '(', found the end",
+    "2 * (a + ": "'2 * (a +', character 9: expected a number, a name or '(', found the end",
+    "2 * (a": "'2 * (a', character 7: expected one of + - * / ** ), found the end",
+    "a b": "'a b', character 3: expected one of + - * / **, found 'b'",
+    "a)": "'a)', character 2: expected one of + - * / **, found ')'",
+    "a + * b": "'a + * b', character 5: expected a number, a name or '(', found '*'",
+    "a & b": "'a & b', character 3: expected one of + - * / **, found '&'",
+    "a\nb": r"'a\nb', character 2: expected one of + - * / **, found '\n'",
     "a^2": "'a^2', character 2: powers are written with **",
-    "a**0.5": "'a**0.5', character 4: '0.5' where a whole number as exponent must stand",
-    "a**b": "'a**b', character 4: 'b' where a whole number as exponent must stand",
-    "a**100": f"'a**100', character 4: '100' where an exponent up to {LARGEST_POWER} must stand",
-    "a**2**3": "'a**2**3', character 5: '**' where parentheses around a power of a power must stand",
+    "a**0.5": "'a**0.5', character 4: expected a whole number as exponent, found '0.5'",
+    "a**b": "'a**b', character 4: expected a whole number as exponent, found 'b'",
+    "a**100": f"'a**100', character 4: expected an exponent up to {LARGEST_POWER}, found '100'",
+    "a**2**3": "'a**2**3', character 5: expected parentheses around a power of a power, found '**'",
     "a + lng_name_2": (
         "'a + lng_name_2', character 5: no parameter 'lng_name_2'; did you mean 'long_name_2'?; "
         "parameters: a, b, long_name_2"
     ),
     "sine(a)": f"'sine(a)', character 1: no function 'sine'; did you mean 'sin'?; functions: {ALL}",
-    "sin a": "'sin a', character 5: 'a' where '(' after sin must stand",
-    "sin(a, b)": "'sin(a, b)', character 6: ',' where one of + - * / ** ) must stand",
+    "sin a": "'sin a', character 5: expected '(' after sin, found 'a'",
+    "sin(a, b)": "'sin(a, b)', character 6: expected one of + - * / ** ), found ','",
     "a/(b + 0.75)": "'a/(b + 0.75)', character 2: division by zero",
     "(a - 2)**-1": "'(a - 2)**-1', character 8: division by zero",
-    "sqrt(b)": "'sqrt(b)', character 1: sqrt of -0.75, which has none",
-    "acos(a)": "'acos(a)', character 1: acos of 2.0, which has none",
-    "atan2(a)": "'atan2(a)', character 8: ')' where one of + - * / ** , must stand",
+    "sqrt(b)": "'sqrt(b)', character 1: sqrt of -0.75 is undefined",
+    "acos(a)": "'acos(a)', character 1: acos of 2.0 is undefined",
+    "atan2(a)": "'atan2(a)', character 8: expected one of + - * / ** ,, found ')'",
     "1e300*1e300": "'1e300*1e300', character 6: the number is too large",
     "1e999": "'1e999', character 1: the number is too large",
     "2 parsec": (
@@ -180,7 +180,7 @@ MESSAGES = {
     ),
     "nan": "'nan', character 1: no parameter 'nan'; did you mean 'tan'?; parameters: a, b, long_name_2",
     "__import__('os')": f"'__import__('os')', character 1: no function '__import__'; functions: {ALL}",
-    "a.real": "'a.real', character 2: '.' where one of + - * / ** must stand",
+    "a.real": "'a.real', character 2: expected one of + - * / **, found '.'",
 }
 
 
@@ -246,14 +246,17 @@ def test_what_an_expression_measures_follows_from_its_parameters(text: str, quan
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("r + phi", "character 3: '+': a length and an angle do not add up"),
-        ("r*r - r", "character 5: '-': length^2 and a length do not add up"),
-        ("w + phi", "character 3: '+': an angular speed and an angle do not add up"),
+        ("r + phi", "character 3: '+': a length and an angle cannot be added"),
+        ("r*r - r", "character 5: '-': length^2 and a length cannot be added"),
+        ("w + phi", "character 3: '+': an angular speed and an angle cannot be added"),
         ("sin(r)", "character 1: 'sin': an angle is needed, not a length"),
         ("asin(r)", "character 1: 'asin': a number is needed, not a length"),
-        ("atan2(r, phi)", "character 1: 'atan2': two of a kind are needed, not a length and an angle"),
-        ("5 mm + 3 s", "character 6: '+': a length and a time do not add up"),
-        ("sqrt(r) + r", "character 9: '+': length^1/2 and a length do not add up"),
+        (
+            "atan2(r, phi)",
+            "character 1: 'atan2': two quantities of the same kind are needed, not a length and an angle",
+        ),
+        ("5 mm + 3 s", "character 6: '+': a length and a time cannot be added"),
+        ("sqrt(r) + r", "character 9: '+': length^1/2 and a length cannot be added"),
     ],
 )
 def test_incompatible_quantities_are_reported(text: str, what: str) -> None:

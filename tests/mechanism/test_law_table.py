@@ -177,7 +177,7 @@ WRONG = {
     ),
     "a point twice": (
         f"{SPLINE}points = [[0, 0], [1, 1], [1, 1], [3, 0]]",
-        "points: x = 1.0 of point 3 is there twice; x must ascend",
+        "points: x = 1.0 of point 3 appears twice; x must ascend",
     ),
     "a point that is not finite": (
         f"{SPLINE}points = [[0, 0], [1, nan], [2, 1], [3, 0]]",
@@ -229,7 +229,7 @@ WRONG = {
     ),
     "a misspelt key of a segment": (
         f'{SEQUENCE}segments = [{{ law = "dwell", duraton = 1 }}]',
-        "segments, segment 1: 'duraton' is no key; did you mean 'duration'?; keys: law, rise, duration",
+        "segments, segment 1: 'duraton' is not a key; did you mean 'duration'?; keys: law, rise, duration",
     ),
     "a segment of no duration": (
         f'{SEQUENCE}segments = [{SEGMENT}, {{ law = "dwell", duration = -1 }}]',
@@ -311,7 +311,7 @@ def test_laws_made_in_python_are_checked_by_the_mechanism() -> None:
     assert complaint(Cycloidal(1.0, -1.0)) == "[drivers.ram] duration = -1.0 must be positive"
     assert complaint(Cycloidal(math.nan, 1.0)) == "[drivers.ram] rise = nan must be a finite number"
     assert complaint(Spline(((0, 0), (0, 1), (2, 3), (4, 5)))).endswith(
-        "x = 0.0 of point 2 is there twice; x must ascend"
+        "x = 0.0 of point 2 appears twice; x must ascend"
     )
     with pytest.raises(MechanismError, match=r"^points of a spline: \(1, 2, 3\) must be two numbers \[x, u\]$"):
         Spline(((1, 2, 3),))  # type: ignore[arg-type]

@@ -60,9 +60,9 @@ def test_lists_of_members_become_tuples() -> None:
 
 def test_members_with_the_same_name_are_refused() -> None:
     pin = Revolute("O", ("ground.O", "bar.P"))
-    assert message_of(pin, pin) == "[joints] 'O' is there twice"
-    assert message_of(bodies=(BAR, BAR)) == "[bodies] 'bar' is there twice"
-    assert message_of(drivers=(AngleDriver("m", "bar"), AngleDriver("m", "bar"))) == "[drivers] 'm' is there twice"
+    assert message_of(pin, pin) == "[joints] 'O' is defined twice"
+    assert message_of(bodies=(BAR, BAR)) == "[bodies] 'bar' is defined twice"
+    assert message_of(drivers=(AngleDriver("m", "bar"), AngleDriver("m", "bar"))) == "[drivers] 'm' is defined twice"
 
 
 def test_points_of_a_joint_must_be_a_pair_of_names() -> None:

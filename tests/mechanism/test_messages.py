@@ -235,8 +235,8 @@ CHANGES = {
     "a length that is text without a number": (
         "length = 1\n",
         'length = "one m" ',
-        "[joints.AB] length must be a length, such as '25 mm': 'one m', character 5: 'm' where one of + - * / ** must "
-        "stand",
+        "[joints.AB] length must be a length, such as '25 mm': 'one m', character 5: expected one of + - * / **, "
+        "found 'm'",
     ),
     "a speed with the unit of an angle": (
         '"1 deg/s"',
@@ -286,7 +286,7 @@ CHANGES = {
     "a point of interest with the name of a body": (
         'A = "coupler.A"',
         'coupler = "coupler.A"',
-        "[points] coupler: a body has this name already, so 'coupler.x' would mean two things",
+        "[points] coupler: a body has this name already, so 'coupler.x' would be ambiguous",
     ),
     "a point of interest that is a number": (
         'A = "coupler.A"',
@@ -338,7 +338,7 @@ def test_coordinates_of_the_outputs_are_checked() -> None:
     assert outputs_message("[5]") == "[outputs] coordinates = 5 must be text such as 'crank.phi'"
     assert outputs_message('["crank.x", "crank.x"]') == "[outputs] coordinates names a coordinate twice"
     assert outputs_message('["crank.fi"]').startswith(
-        "[outputs] coordinates: 'crank.fi' is no coordinate of this mechanism; did you mean 'crank.phi'?; "
+        "[outputs] coordinates: 'crank.fi' is not a coordinate of this mechanism; did you mean 'crank.phi'?; "
         "coordinates: crank.x, crank.y, crank.phi, coupler.x"
     )
 

@@ -284,7 +284,7 @@ WORDS = "sin, cos, tan, sqrt, asin, acos, atan2, pi"
         ({"a": "b", "b": "c + 1", "c": "2*a"}, "[parameters] a needs itself: a -> b -> c -> a"),
         ({"b": "b"}, "[parameters] b needs itself: b -> b"),
         ({"b": "aa"}, "[parameters] b = 'aa', character 1: no parameter 'aa'; did you mean 'a'?; parameters: a, b"),
-        ({"b": "a +"}, "[parameters] b = 'a +', character 4: the end where a number, a name or '(' must stand"),
+        ({"b": "a +"}, "[parameters] b = 'a +', character 4: expected a number, a name or '(', found the end"),
         ({"b": "1/(a - 1)"}, "[parameters] b = '1/(a - 1)', character 2: division by zero"),
         ({"b": "a*1e31"}, "[parameters] b = 'a*1e31' = 1e+31 is too large; numbers go up to 1e+30"),
         ({"b": math.nan}, "[parameters] b = nan must be a finite number"),
@@ -292,17 +292,17 @@ WORDS = "sin, cos, tan, sqrt, asin, acos, atan2, pi"
         ({"b": True}, "[parameters] b = true must be a number or text such as '2*a'"),
         (
             {"sin": 1.0},
-            f"[parameters] sin: expressions mean something else by this name: {WORDS}",
+            f"[parameters] sin: this name is reserved in expressions; reserved: {WORDS}",
         ),
         (
             {"pi": 3.0},
-            f"[parameters] pi: expressions mean something else by this name: {WORDS}",
+            f"[parameters] pi: this name is reserved in expressions; reserved: {WORDS}",
         ),
         (
             {"2a": 1.0},
             "[parameters] '2a' must be letters, digits and underscores, no digit first, at most 100 in all",
         ),
-        ({"b": "1 s", "c": "a + b"}, "[parameters] c = 'a + b', character 3: '+': a length and a time do not add up"),
+        ({"b": "1 s", "c": "a + b"}, "[parameters] c = 'a + b', character 3: '+': a length and a time cannot be added"),
         ({"a": "30 deg"}, "[bodies.bar] points.P = 'a' is an angle and must be a length"),
         ({"a": "1 deg/kg"}, "[parameters] a = '1 deg/kg', character 7: no parameter 'kg'; parameters: a"),
         (
@@ -352,7 +352,7 @@ def test_the_message_of_an_unknown_name_names_its_place() -> None:
         ("y", 1, "no parameter 'y'; parameters: a"),
         ("-y", 2, "no parameter 'y'; parameters: a"),
         ("y-axis", 1, "no parameter 'y'; parameters: a"),
-        ("Y axis", 3, "'axis' where one of + - * / ** must stand"),
+        ("Y axis", 3, "expected one of + - * / **, found 'axis'"),
     ],
 )
 def test_a_word_in_place_of_a_number_is_refused_with_the_quantity_needed(axis: str, character: int, what: str) -> None:

@@ -96,11 +96,11 @@ CHANGES = {
     "an expression that breaks off": (
         POINT,
         '["2*(crank +", 0]',
-        "points.P = '2*(crank +', character 11: the end",
+        "points.P = '2*(crank +', character 11: expected a number",
     ),
     "an expression that is Python": (POINT, "[\"__import__('os')\", 0]", "character 1: no function '__import__'"),
     "a division by zero": (POINT, '["1/(crank - 1)", 0]', "'1/(crank - 1)', character 2: division by zero"),
-    "a root of a negative number": (POINT, '["sqrt(-crank)", 0]', "character 1: sqrt of -1.0, which has none"),
+    "a root of a negative number": (POINT, '["sqrt(-crank)", 0]', "character 1: sqrt of -1.0 is undefined"),
     "an expression of deep parentheses": (POINT, f'["{"(" * 500}", 0]', "parentheses more than 40 deep"),
     "an expression without an end": (POINT, f'["{"1 + " * 100_000}1", 0]', "is too long for an expression"),
     "two drivers of one freedom": (
