@@ -11,6 +11,7 @@ from kinfmu.errors import FmuError
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
 from kinfmu.units import Quantity, derivative_name, display_units, quantity_of, unit_of
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 Drive = Literal["time", "inputs"]
 DRIVES: tuple[Drive, ...] = ("time", "inputs")
 
-DEFAULT_TOLERANCE = 1e-9  # residual relative to the mechanism's size above which a sample is not ok
 SMALLEST_TOLERANCE = 1e-15  # round-off: below it no sample would be ok
 _COORDINATE_WORDS = {
     "x": ("x", "x velocity", "x acceleration"),
@@ -186,7 +186,7 @@ _TOLERANCE = Variable(
     "Residual, relative to the mechanism's size, above which a sample is not ok",
     initial="exact",
     unit="1",
-    start=DEFAULT_TOLERANCE,
+    start=TOLERANCE,
     minimum=SMALLEST_TOLERANCE,
     maximum=1.0,
 )

@@ -15,6 +15,7 @@ from kinfmu.codegen.c.model import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
 from kinfmu.simd import sources
+from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
 
 FloatArray = NDArray[np.float64]
@@ -113,7 +114,7 @@ class Library:
         driven: tuple[FloatArray, FloatArray, FloatArray],
         tables: Sequence[FloatArray | None],
         parameters: Sequence[float] = (),
-        tolerance: float = 1e-9,
+        tolerance: float = TOLERANCE,
         reuse: LibraryResult | None = None,
     ) -> LibraryResult:
         """Fill tables of values, rates and accelerations; NaN for samples that cannot be reached.
@@ -172,7 +173,7 @@ class Library:
         driven: tuple[FloatArray, FloatArray, FloatArray],
         outcomes: NDArray[np.int32],
         parameters: Sequence[float] = (),
-        tolerance: float = 1e-9,
+        tolerance: float = TOLERANCE,
     ) -> tuple[FloatArray, FloatArray]:
         """Return margins (n,) and estimated errors (n, 3) of swept samples with these outcomes; NaN if not good."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
