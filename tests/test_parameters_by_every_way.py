@@ -1,4 +1,4 @@
-"""One rule for parameters: solve, check, simulate, build and FMUs follow the written pose to them."""
+"""Parameters by solve, check, simulate, build and FMUs: the same continuation from the written pose."""
 
 from __future__ import annotations
 
@@ -11,36 +11,20 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute
+from kinfmu import Mechanism
 from kinfmu.analysis import check
 from kinfmu.errors import FmuError, KinfmuError
 from kinfmu.sweep.continued import continued
+from tests.fmu.test_parameters import LENGTHS
+from tests.fmu.test_parameters import linkage as settable
 
-LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
 SPREAD = 0.6  # of the logarithm of a length
 TIMES = np.array([0.0, 0.25])
 
 
 def linkage(coupler: float | str = 3.5) -> Mechanism:
     """A four-bar with rough start poses, whose lengths are parameters."""
-    return Mechanism(
-        "settable",
-        [
-            Body("ground", {"O": (0, 0), "C": ("ground", 0)}),
-            Body("crank", {"O": (0, 0), "P": ("crank", 0)}, (0, 0, 1.0)),
-            Body("coupler", {"P": (0, 0), "Q": ("coupler", 0)}, (0.5, 0.8, 0.6)),
-            Body("rocker", {"C": (0, 0), "Q": ("rocker", 0)}, (4, 0, 1.8)),
-        ],
-        [
-            Revolute("O", ("ground.O", "crank.O")),
-            Revolute("P", ("crank.P", "coupler.P")),
-            Revolute("Q", ("coupler.Q", "rocker.Q")),
-            Revolute("C", ("ground.C", "rocker.C")),
-        ],
-        [AngleDriver("crank", "crank", ConstantSpeed(1.0, "1 rad/s"))],
-        parameters={**LENGTHS, "coupler": coupler},
-        run=kinfmu.RunSettings(0.0, 0.25, 0.25),
-    )
+    return replace(settable({**LENGTHS, "coupler": coupler}), run=kinfmu.RunSettings(0.0, 0.25, 0.25))
 
 
 def drawn(count: int, *, seed: int) -> list[dict[str, float]]:

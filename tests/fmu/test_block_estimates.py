@@ -45,7 +45,7 @@ def counts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.fixture
 def by_fmu(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Run]:
-    """`simulate`, with every margin and error asked of the FMU."""
+    """Return `simulate` with every margin and error read from the FMU."""
 
     def asked(*args: Any, **kwargs: Any) -> Run:
         with monkeypatch.context() as patch:
@@ -62,7 +62,7 @@ def _assert_same(found: Run, expected: Run) -> None:
 
 
 @pytest.mark.parametrize(("name", "step"), STEPS.items())
-def test_estimates_of_blocks_are_those_of_the_fmu(
+def test_estimates_of_blocks_equal_those_of_the_fmu(
     name: str, step: float, built: Callable[..., Path], by_fmu: Callable[..., Run], counts: list[int]
 ) -> None:
     run = simulate(built(name), step=step)
@@ -70,7 +70,7 @@ def test_estimates_of_blocks_are_those_of_the_fmu(
     _assert_same(run, by_fmu(built(name), step=step))
 
 
-def test_samples_near_singular_poses_are_asked_of_the_fmu(
+def test_estimates_near_singular_poses_are_read_from_the_fmu(
     fourbar: Path, by_fmu: Callable[..., Run], counts: list[int]
 ) -> None:
     run = simulate(fourbar, start=175.0, stop=185.0, step=0.05)
@@ -80,7 +80,7 @@ def test_samples_near_singular_poses_are_asked_of_the_fmu(
 
 
 @pytest.mark.parametrize("name", ["cam_roller", "jansen_leg", "stephenson_six_bar"])
-def test_where_functions_take_no_arrays_the_fmu_is_asked(
+def test_estimates_are_read_from_the_fmu_if_functions_take_no_arrays(
     name: str, built: Callable[..., Path], by_fmu: Callable[..., Run], counts: list[int]
 ) -> None:
     run = simulate(built(name), step=0.2)
@@ -88,7 +88,7 @@ def test_where_functions_take_no_arrays_the_fmu_is_asked(
     _assert_same(run, by_fmu(built(name), step=0.2))
 
 
-def test_parameters_that_are_set_count(tmp_path: Path, by_fmu: Callable[..., Run], counts: list[int]) -> None:
+def test_estimates_use_the_parameters_as_set(tmp_path: Path, by_fmu: Callable[..., Run], counts: list[int]) -> None:
     written = (GALLERY / "crank_rocker" / "mechanism.toml").read_text().replace("Q = [50, 0]", 'Q = ["bar", 0]')
     linkage = parse(written.replace("[bodies.ground]", "[parameters]\nbar = 50\n\n[bodies.ground]"))
     fmu = build(linkage, tmp_path / "bars.fmu", flavour="python", drive="time")
@@ -179,7 +179,7 @@ def test_pieces_for_a_sink_hold_the_estimates(
     _assert_same(run, by_fmu(fourbar, step=1.0))
 
 
-def test_samples_that_arrays_cannot_serve_are_computed_by_themselves(fourbar: Path, by_fmu: Callable[..., Run]) -> None:
+def test_samples_that_overflow_in_arrays_are_computed_alone(fourbar: Path, by_fmu: Callable[..., Run]) -> None:
     """A speed so large that squares overflow: errors are unknown from there on, and known before."""
     inputs: Mapping[str, Sequence[float]] = {
         "time": [0.0, 1.0, 1.0 + 1e-9, 2.0],

@@ -1,4 +1,4 @@
-"""Building: reproducible, self-contained, and clear about what it cannot do."""
+"""Building python FMUs: reproducible, self-contained, with clear refusals."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_archive_holds_mechanism_documentation_binaries_and_only_modules_named_a
     assert all(name.startswith((f"resources/{package}/", f"resources/{package}_slave.py")) for name in modules)
 
 
-def test_the_documents_inside_tell_what_it_needs_and_under_what_licences_it_is(fourbar: Path) -> None:
+def test_documents_inside_list_requirements_and_licences(fourbar: Path) -> None:
     with zipfile.ZipFile(fourbar) as zipped:
         needs = zipped.read("documentation/externalDependencies.txt").decode()
         licence = zipped.read("documentation/licenses/license.txt").decode()
@@ -113,7 +113,7 @@ def test_outputs_can_be_chosen(tmp_path: Path) -> None:
         ({"path": "fourbar.zip"}, r"fourbar\.zip: is no folder, and the file of an FMU ends in \.fmu"),
     ],
 )
-def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, str], words: str) -> None:
+def test_invalid_choices_are_refused_in_one_line(arguments: dict[str, str], words: str) -> None:
     with pytest.raises(RequestError, match=words):
         build(mechanism("fourbar"), **arguments)  # type: ignore[arg-type]
 

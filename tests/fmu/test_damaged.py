@@ -1,4 +1,4 @@
-"""FMUs that are damaged or made to do harm, and tables of inputs that lie: one line, nothing written outside."""
+"""Damaged and malicious FMUs, and faulty tables of inputs: a message of one line, and no file outside the folder."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_a_file_without_a_name_is_one_line(whole: bytes, tmp_path: Path) -> None
     assert refusal(bytes(content), tmp_path) == "is no FMU (damaged: a file without a name)"
 
 
-def test_a_size_that_lies_unpacks_no_more_than_it_says(whole: bytes, tmp_path: Path) -> None:
+def test_a_file_larger_than_declared_is_not_unpacked_further(whole: bytes, tmp_path: Path) -> None:
     bomb = bytearray(with_file(whole, "resources/zeros", bytes(2**20)))
     at = bomb.rindex(b"PK\x01\x02")
     struct.pack_into("<I", bomb, at + 24, 1000)
@@ -231,7 +231,7 @@ INPUTS = {
 
 
 @pytest.mark.parametrize("case", INPUTS)
-def test_a_table_of_inputs_that_lies_is_one_line(whole: bytes, tmp_path: Path, case: str) -> None:
+def test_a_faulty_table_of_inputs_is_refused_in_one_line(whole: bytes, tmp_path: Path, case: str) -> None:
     (tmp_path / "a.fmu").write_bytes(whole)
     content, words = INPUTS[case]
     (tmp_path / "in.csv").write_text(content, encoding="utf-8")

@@ -40,7 +40,7 @@ def _scalars(root: ET.Element) -> list[ET.Element]:
     return list(root.iterfind("ModelVariables/ScalarVariable"))
 
 
-def test_fmpy_finds_nothing_to_complain_of(fmu: Path) -> None:
+def test_fmpy_validates_the_fmu_without_problems(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
@@ -136,7 +136,7 @@ def test_root_has_no_date_or_a_legal_one_and_a_c_identifier(root: ET.Element) ->
     assert float(experiment.get("stopTime", "nan")) > float(experiment.get("startTime", "nan"))
 
 
-def test_mechanism_in_millimetres_declares_millimetres_all_the_way() -> None:
+def test_mechanism_in_millimetres_declares_millimetres_everywhere() -> None:
     import dataclasses
 
     plan = compile_plan(dataclasses.replace(mechanism("fourbar"), length_unit="mm"))

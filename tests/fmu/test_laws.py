@@ -40,7 +40,7 @@ LAWS = {
 
 
 def arms(*laws: Law) -> Mechanism:
-    """An arm a law, each on a pivot of its own."""
+    """Return a mechanism with one arm per law."""
     count = len(laws)
     return Mechanism(
         "arms",

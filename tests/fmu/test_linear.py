@@ -1,4 +1,4 @@
-"""What outputs are linear in, structurally: what model descriptions call a dependency of kind `fixed`."""
+"""Inputs in which outputs are linear by structure: dependencies of kind `fixed` in model descriptions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _linear(mechanism: kinfmu.Mechanism) -> dict[str, tuple[str, ...]]:
         ("excavator", {}),
     ],
 )
-def test_gallery_mechanism_is_linear_in_what_turns_with_its_drivers(name: str, linear: dict[str, object]) -> None:
+def test_outputs_of_gallery_mechanisms_are_linear_in_these_drivers(name: str, linear: dict[str, object]) -> None:
     assert _linear(kinfmu.load(name)) == linear
 
 
@@ -34,7 +34,7 @@ def test_factor_may_hold_a_parameter() -> None:
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_what_is_called_linear_is_a_straight_line_over_the_run(name: str) -> None:
+def test_linear_outputs_are_straight_lines_over_the_run(name: str) -> None:
     run = kinfmu.solve(kinfmu.load(name))
     for output, inputs in _linear(kinfmu.load(name)).items():
         columns = [run.inputs[:, run.input_names.index(one)] for one in inputs]

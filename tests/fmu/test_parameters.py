@@ -27,7 +27,7 @@ LENGTHS = {"ground": 4.0, "crank": 1.0, "coupler": 3.5, "rocker": 3.0}
 OTHERS = {"ground": 4.2, "crank": 1.3, "coupler": 3.1, "rocker": 3.3}
 
 
-def linkage(lengths: Mapping[str, float] = LENGTHS) -> Mechanism:
+def linkage(lengths: Mapping[str, float | str] = LENGTHS) -> Mechanism:
     """A four-bar whose lengths are parameters."""
     return Mechanism(
         "settable",

@@ -18,7 +18,7 @@ Start = Callable[..., Host]
 
 
 @pytest.mark.parametrize("t", [math.nan, math.inf])
-def test_a_start_time_that_is_no_number_is_refused(start: Start, t: float) -> None:
+def test_a_start_time_that_is_not_finite_is_refused(start: Start, t: float) -> None:
     host = start("fourbar", "time", initialize=False)
     host.initialize(t)
     assert host.step(0.0, 0.1) == DISCARD
@@ -42,7 +42,7 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
     return bytes(changed)
 
 
-def test_damaged_states_are_refused_and_the_slave_goes_on(start: Start) -> None:
+def test_damaged_states_are_refused_and_the_slave_continues(start: Start) -> None:
     rng = random.Random(6)  # noqa: S311  damage by chance
     host = start()
     for k in range(5):
@@ -100,7 +100,7 @@ def _call(host: Host, rng: random.Random, states: list[Any]) -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("name", "drive"), [("fourbar", "inputs"), ("crank_rocker", "time"), ("five_bar", "inputs")])
-def test_no_call_by_chance_is_fatal_and_no_output_infinite(start: Start, name: str, drive: str, seed: int) -> None:
+def test_random_calls_are_never_fatal_and_outputs_stay_finite(start: Start, name: str, drive: str, seed: int) -> None:
     rng = random.Random(seed)  # noqa: S311  calls by chance
     host = start(name, drive)
     states: list[Any] = []
@@ -114,7 +114,7 @@ FORGED = [{"token": None}, {"inputs": [[]]}, {"inputs": []}, {"history": 7}, {"c
 
 
 @pytest.mark.parametrize("content", [[], {}, None, 7, *FORGED])
-def test_states_that_no_slave_has_written_are_refused(start: Start, content: Any) -> None:
+def test_forged_states_are_refused(start: Start, content: Any) -> None:
     host = start()
     slave_class = _slave_class(host)
     before = host.outputs()
@@ -134,13 +134,13 @@ def _slave_class(host: Host) -> Any:
     return next(one for one in classes if one.layout.token == host.about.token)
 
 
-def test_messages_are_no_formats(start: Start) -> None:
+def test_percent_signs_and_hashes_in_messages_are_doubled(start: Start) -> None:
     slave = _slave_class(start())(instance_name="x", resources=".")
     slave.log("100% of %n %s, #r1#")
     assert [message.msg for message in slave._get_log_queue()] == ["100%% of %%n %%s, ##r1##"]
 
 
-def test_a_host_of_kinfmu_shows_messages_as_they_were_meant(start: Start) -> None:
+def test_the_callbacks_of_kinfmu_undo_the_doubling(start: Start) -> None:
     from kinfmu.fmu.slaves import fmi2_callbacks
 
     heard: list[tuple[int, str]] = []
@@ -172,7 +172,7 @@ def _counted(monkeypatch: pytest.MonkeyPatch, host: Host) -> dict[str, int]:
     return calls
 
 
-def test_unchanged_input_costs_no_solve_and_later_stages_wait_until_read(
+def test_unchanged_input_is_not_solved_again_and_stages_are_computed_when_read(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host = start()
@@ -191,7 +191,7 @@ def test_unchanged_input_costs_no_solve_and_later_stages_wait_until_read(
     assert calls == {"solve": 1, "outputs": 1, "rates": 1, "accelerations": 1}
 
 
-def test_restored_state_brings_back_parameters_refusals_and_time(start: Start) -> None:
+def test_restored_state_includes_parameters_refusals_and_time(start: Start) -> None:
     host = start("fourbar", "time")
     host.set({"crank.speed": 0.3})
     assert host.step(0.0, 2.0) == OK
@@ -217,7 +217,7 @@ def test_state_of_another_fmu_is_refused(start: Start) -> None:
     assert host.step(0.0, 0.1) == DISCARD
 
 
-def test_value_reference_that_does_not_exist_is_an_error_message_not_the_end(start: Start) -> None:
+def test_unknown_value_reference_is_an_error_message(start: Start) -> None:
     host = start()
     (value,) = host.fmu.getReal([9999])
     assert math.isnan(value)
@@ -225,7 +225,7 @@ def test_value_reference_that_does_not_exist_is_an_error_message_not_the_end(sta
     assert host.step(0.0, 0.1) == OK
 
 
-def test_many_slaves_one_after_another_live_in_one_process(start: Start) -> None:
+def test_one_process_can_have_many_slaves_in_turn(start: Start) -> None:
     for k in range(8):
         host = start()
         host.set({"crank_angle": 0.1 * k})

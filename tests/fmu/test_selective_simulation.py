@@ -1,4 +1,4 @@
-"""`simulate` asks an FMU for what is to be kept, and for nothing else."""
+"""`simulate` reads only the chosen channels and samples from an FMU."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
     return calls
 
 
-def test_an_fmu_is_asked_for_the_channels_and_no_others(fourbar: Path, asked: list[set[str]]) -> None:
+def test_only_the_chosen_channels_are_read(fourbar: Path, asked: list[set[str]]) -> None:
     whole = simulate(fourbar, stop=3.0)
     asked.clear()
     run = simulate(fourbar, stop=3.0, channels=["q", "residual"])
@@ -49,7 +49,7 @@ def test_an_fmu_is_asked_for_the_channels_and_no_others(fourbar: Path, asked: li
     assert [column.name for column in run.columns()] == ["time", *run.names, "solver.status", "solver.residual"]
 
 
-def test_samples_that_are_not_kept_are_not_asked_for(fourbar: Path, asked: list[set[str]]) -> None:
+def test_samples_that_are_not_recorded_are_not_read(fourbar: Path, asked: list[set[str]]) -> None:
     whole = simulate(fourbar, stop=10.0, step=0.5)
     asked.clear()
     run = simulate(fourbar, stop=10.0, step=0.5, rate=0.25)
@@ -58,7 +58,7 @@ def test_samples_that_are_not_kept_are_not_asked_for(fourbar: Path, asked: list[
     np.testing.assert_allclose(run.values, whole.values[[0, 8, 16, 20]], rtol=0.0, atol=1e-14)
 
 
-def test_none_asks_for_nothing(fourbar: Path, asked: list[set[str]]) -> None:
+def test_no_channels_reads_no_variables(fourbar: Path, asked: list[set[str]]) -> None:
     run = simulate(fourbar, stop=5.0, channels=["none"])
     assert asked == []
     assert len(run) == 6
@@ -66,7 +66,7 @@ def test_none_asks_for_nothing(fourbar: Path, asked: list[set[str]]) -> None:
 
 
 @pytest.mark.parametrize("inputs", [None, {"time": [0.0, 4.0], "crank_angle": [5.0, 7.0]}])
-def test_a_sample_without_numbers_is_kept_whatever_the_rate(
+def test_a_sample_without_numbers_is_recorded_at_any_rate(
     pendulum: Path, inputs: dict[str, list[float]] | None
 ) -> None:
     run = simulate(pendulum, stop=4.0, step=0.25, rate=0.5, inputs=inputs)
@@ -76,7 +76,7 @@ def test_a_sample_without_numbers_is_kept_whatever_the_rate(
     assert run.events[-1].level == "error"
 
 
-def test_wrong_channels_and_rates_are_told(fourbar: Path) -> None:
+def test_invalid_channels_and_rates_are_refused(fourbar: Path) -> None:
     with pytest.raises(RequestError, match=r"channel 'qddd' is not known; did you mean 'qdd'\?"):
         simulate(fourbar, channels=["qddd"])
     with pytest.raises(RequestError, match="rate = 0 samples a second must be positive and finite"):

@@ -139,7 +139,7 @@ def test_other_platforms_without_zig_are_refused_with_what_brings_it(
         ({"flavour": "python", "platforms": "all"}, "the python flavour is FMI 2.0 on pythonfmu's platforms"),
     ],
 )
-def test_what_cannot_be_built_is_said_in_one_line(arguments: dict[str, object], words: str) -> None:
+def test_invalid_choices_are_refused_in_one_line(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(RequestError, match=words):
         kinfmu.build(kinfmu.load("fourbar"), **arguments)  # type: ignore[arg-type]
 

@@ -37,7 +37,7 @@ def root(data: bytes) -> ET.Element:
     return ET.fromstring(data)  # noqa: S314  # our own
 
 
-def test_fmpy_finds_nothing_to_complain_of(fmu: Path) -> None:
+def test_fmpy_validates_the_fmu_without_problems(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
@@ -59,7 +59,7 @@ def test_description_reads_back_as_the_interface_it_was_written_from(data: bytes
     assert bool(read.sources) == (fmi == 2)
 
 
-def test_both_kinds_are_there_without_an_execution_tool_and_with_all_they_can(root: ET.Element, fmi: int) -> None:
+def test_both_kinds_of_simulation_declare_their_capabilities(root: ET.Element, fmi: int) -> None:
     can = ["canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"]
     if fmi == 3:
         can = ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"]
@@ -184,7 +184,7 @@ def test_no_variable_looks_like_the_derivative_of_a_state(root: ET.Element) -> N
     assert [e.tag for e in root.iterfind("ModelStructure//*") if "Derivative" in e.tag] == []
 
 
-def test_initial_unknowns_are_those_that_importers_work_out_from_the_variables(root: ET.Element, fmi: int) -> None:
+def test_initial_unknowns_equal_those_that_importers_derive_from_the_variables(root: ET.Element, fmi: int) -> None:
     """OMSimulator compares the list with its own and refuses an FMU where they differ."""
     elements = list(root.iterfind("ModelVariables/*"))
     expected = {

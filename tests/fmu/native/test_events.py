@@ -1,4 +1,4 @@
-"""Events of model exchange: discrete variables stay between them, and jumps of what drives over time are announced."""
+"""Events of model exchange: discrete variables change at events only, and jumps of laws are announced."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def begin(start: Start, mechanism: Mechanism | str, drive: str = "time") -> tupl
 
 
 @pytest.mark.parametrize("name", JUMPS)
-def test_every_jump_of_a_law_is_announced_and_there_its_right_hand_side_counts(start: Start, name: str) -> None:
+def test_every_jump_of_a_law_is_announced_and_has_its_right_hand_value(start: Start, name: str) -> None:
     law, expected = JUMPS[name]
     host, event = begin(start, named(name, law))
     found = []
@@ -132,7 +132,7 @@ def test_iterations_are_those_at_the_last_event(start: Start) -> None:
     assert host.count("solver.iterations") > before
 
 
-def test_what_cannot_be_reached_shows_at_the_event_and_as_discard_before(start: Start) -> None:
+def test_an_unreachable_pose_is_discard_before_the_event_and_in_the_status_after_it(start: Start) -> None:
     host, _ = begin(start, "double_pendulum", "inputs")
     host.set({"crank_angle": 6.5})
     assert host.status() == Status.OK

@@ -1,4 +1,4 @@
-"""Native FMUs: calls that no host should make are refused with a message, and change nothing."""
+"""Native FMUs: invalid calls return Error with a message, and change nothing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def call(host: Host, name: str, *arguments: Any) -> int:
 
 
 @pytest.mark.parametrize(("value", "h"), [(1e90, 1e30), (1e60, 1e50), (1.0, 1e101)])
-def test_inputs_that_run_away_by_their_derivatives_are_discard(start: Start, fmi: int, value: float, h: float) -> None:
+def test_inputs_that_overflow_by_their_derivatives_are_discard(start: Start, fmi: int, value: float, h: float) -> None:
     if fmi == 3:
         pytest.skip("FMI 3.0 has no input derivatives")
     host = start()
@@ -37,7 +37,7 @@ def test_inputs_that_run_away_by_their_derivatives_are_discard(start: Start, fmi
     assert host.status() == 0
 
 
-def test_every_changed_byte_of_a_state_is_found(start: Start) -> None:
+def test_every_changed_byte_of_a_state_is_detected(start: Start) -> None:
     host = start()
     for k in range(40):
         host.set({"crank_angle": 0.1 * k})
@@ -113,7 +113,7 @@ def test_arrays_that_are_null_are_an_error(start: Start, fmi: int) -> None:
 
 
 @pytest.mark.parametrize("order", [0, -1, 3, 2**31 - 1, -(2**31)])
-def test_orders_of_derivatives_that_are_not_there_are_an_error(start: Start, fmi: int, order: int) -> None:
+def test_invalid_orders_of_derivatives_are_an_error(start: Start, fmi: int, order: int) -> None:
     host = start()
     references = (ctypes.c_uint * 1)(host.references["coupler.x"])
     orders, values = (ctypes.c_int * 1)(order), (ctypes.c_double * 1)()
@@ -124,7 +124,7 @@ def test_orders_of_derivatives_that_are_not_there_are_an_error(start: Start, fmi
     assert f"derivative of order {order}" in host.messages[-1][1]
 
 
-def test_text_of_the_host_is_never_a_format(start: Start, fmi: int) -> None:
+def test_text_of_the_host_is_never_used_as_a_format(start: Start, fmi: int) -> None:
     from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
     from fmpy.fmi3 import fmi3LogMessageCallback
 

@@ -106,7 +106,7 @@ def test_position_and_rates_at_the_end_of_a_step_are_those_of_the_polynomial(sta
     assert host.get("solver.error_qd", "solver.error_qdd") == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
-def test_drivers_without_derivatives_are_estimated_beside_those_that_have_them(start: Callable[..., Host]) -> None:
+def test_drivers_without_derivatives_are_estimated_also_if_others_have_them(start: Callable[..., Host]) -> None:
     host = start("five_bar")
     (left, right) = host.get("left_angle", "right_angle")
     for k in range(6):
@@ -147,7 +147,7 @@ def test_derivatives_hold_for_one_step_and_are_forgotten_by_reset(start: Callabl
     assert host.get("crank.omega") == [0.0]
 
 
-def test_extrapolated_end_is_no_sample_for_later_estimates(start: Callable[..., Host]) -> None:
+def test_extrapolated_values_are_not_samples_of_later_estimates(start: Callable[..., Host]) -> None:
     """A master that extrapolates badly for a while, and then gives values alone."""
     host, plain = start(), start()
     for k in range(12):

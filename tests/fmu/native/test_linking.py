@@ -55,7 +55,7 @@ def _objects(folder: Path, prefix: str) -> list[Path]:
 
 
 @pytest.mark.skipif(CC is None or NM is None, reason="a compiler or nm is not there")
-def test_fmus_of_both_versions_live_in_one_program_under_their_own_names(tmp_path: Path) -> None:
+def test_fmus_of_both_versions_are_linked_into_one_program(tmp_path: Path) -> None:
     objects = {prefix: _objects(tmp_path / prefix, prefix) for prefix in LINKED}
     for prefix, files in objects.items():
         listed = subprocess.run([str(NM), "-g", "--defined-only", *files], capture_output=True, text=True, check=True)

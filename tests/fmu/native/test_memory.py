@@ -1,4 +1,4 @@
-"""No access out of bounds, nothing undefined, nothing uninitialized, nothing leaked: a C host under the sanitizers."""
+"""A C host under the sanitizers: no access out of bounds, no undefined behaviour, no uninitialized memory, no leaks."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
 
 @pytest.mark.skipif(CC is None, reason="neither gcc nor clang is there")
 @pytest.mark.parametrize("name", ["fourbar", "five_bar", "settable"])
-def test_address_and_undefined_behaviour_sanitizers_find_nothing(name: str, fmi: int, tmp_path: Path) -> None:
+def test_address_and_undefined_behaviour_sanitizers_report_no_errors(name: str, fmi: int, tmp_path: Path) -> None:
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags)], capture_output=True, text=True)
@@ -59,7 +59,7 @@ def test_address_and_undefined_behaviour_sanitizers_find_nothing(name: str, fmi:
 
 
 @pytest.mark.skipif(CC is None or shutil.which("valgrind") is None, reason="valgrind or a compiler is not there")
-def test_valgrind_finds_nothing(fmi: int, tmp_path: Path) -> None:
+def test_valgrind_reports_no_errors(fmi: int, tmp_path: Path) -> None:
     command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "-q", _program(linkage(), fmi, tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

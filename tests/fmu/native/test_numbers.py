@@ -1,4 +1,4 @@
-"""A native FMU says what the Python engine says, over the whole gallery, in fmpy's own loops and in ours."""
+"""Native FMUs equal the Python engine, for the whole gallery, in fmpy's loops and in kinfmu's."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NAMES = gallery.names()
 
 
 @pytest.mark.parametrize(("name", "fmi"), [(name, 2 + k % 2) for k, name in enumerate(NAMES)])
-def test_run_of_a_gallery_mechanism_is_that_of_the_python_engine(built_native: Build, name: str, fmi: int) -> None:
+def test_run_of_a_gallery_mechanism_equals_that_of_the_python_engine(built_native: Build, name: str, fmi: int) -> None:
     wanted = kinfmu.solve(kinfmu.load(name))
     run = kinfmu.simulate(built_native(name, fmi, "time"))
     assert run.outputs == wanted.outputs

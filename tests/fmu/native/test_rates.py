@@ -80,7 +80,7 @@ def motion(order: int, t: float) -> float:
 # Where rates come from
 
 
-def test_constant_zero_is_wired_where_the_parameter_says_so(start: Start) -> None:
+def test_constant_zero_is_wired_with_rates_wired(start: Start) -> None:
     host = start(rates=Rates.WIRED)
     assert mode(host) == Rates.WIRED
     for k in range(5):
@@ -92,7 +92,7 @@ def test_constant_zero_is_wired_where_the_parameter_says_so(start: Start) -> Non
     assert host.get("crank.omega", "driven.crank_acceleration") == [2.0, 0.0]
 
 
-def test_estimated_rates_leave_the_inputs_of_rates_alone(start: Start) -> None:
+def test_estimated_rates_ignore_the_inputs_of_rates(start: Start) -> None:
     host, plain = start(rates=Rates.ESTIMATED, before={"crank_speed": 3.0}), start()
     for k in range(6):
         for one in (host, plain):
@@ -122,7 +122,7 @@ def test_the_choice_is_part_of_the_state(start: Start) -> None:
 
 
 @pytest.mark.parametrize("value", [-1, 3, 1000])
-def test_values_that_are_no_choice_are_refused(start: Start, value: int) -> None:
+def test_invalid_values_are_refused(start: Start, value: int) -> None:
     host = start(rates=Rates.ESTIMATED)
     try:
         host.set({"rates": value})
@@ -142,9 +142,7 @@ def test_the_choice_is_fixed_once_initialized(start: Start) -> None:
     assert mode(host) == Rates.AUTO
 
 
-def test_model_exchange_takes_the_inputs_whatever_the_parameter_says(
-    paths: Callable[[str, str], Path], tmp_path: Path
-) -> None:
+def test_model_exchange_always_takes_the_inputs(paths: Callable[[str, str], Path], tmp_path: Path) -> None:
     for fmi in (2, 3):
         host = Host(paths(f"native {fmi}", "fourbar"), tmp_path / str(fmi), model_exchange=True)
         host.set({"rates": Rates.ESTIMATED, "crank_speed": 3.0})
@@ -199,7 +197,7 @@ def test_estimates_are_of_order_2_for_speeds_and_1_for_accelerations_on_any_grid
     assert orders == pytest.approx([2.0, 1.0], abs=0.1)
 
 
-def test_the_first_samples_have_lower_orders_and_say_that_their_errors_are_unknown(start: Start) -> None:
+def test_the_first_samples_have_lower_orders_and_unknown_errors(start: Start) -> None:
     host = start()
     wanted = ([0.0, 0.0], [0.6, 0.0])  # at rest, then the slope
     unknown = ([True, True], [True, True], [False, True], [False, False])
@@ -232,7 +230,7 @@ def test_steps_that_are_taken_back_leave_no_trace_in_estimates(start: Start, rep
 # solver.ok
 
 
-def test_ok_is_the_twin_of_the_status(start: Start) -> None:
+def test_ok_is_true_for_a_status_of_0_to_2(start: Start) -> None:
     host = start("double_pendulum")
     for angle, wanted in ((5.3, True), (6.2, True), (6.5, False), (2.0, False), (6.2, True), (2 * math.pi, True)):
         host.set({"crank_angle": angle})

@@ -42,7 +42,7 @@ def test_freed_state_is_null(start: Start) -> None:
     assert not state.value
 
 
-def test_bytes_that_are_no_state_of_this_fmu_are_refused(start: Start) -> None:
+def test_bytes_that_are_not_a_state_of_this_fmu_are_refused(start: Start) -> None:
     host, other = start("fourbar"), start("double_pendulum")
     before = host.outputs()
     foreign = other.serialize(other.state())
@@ -97,7 +97,7 @@ def test_directional_derivatives_of_the_parallelogram_are_those_of_its_formulas(
     assert host.slopes(COUPLER, ["crank_angle", "crank_speed"], [2.0, -3.0]) == pytest.approx(mixed, abs=1e-10)
 
 
-def test_every_real_output_has_directional_derivatives_and_asking_changes_nothing(start: Start) -> None:
+def test_every_real_output_has_directional_derivatives_which_do_not_change_the_state(start: Start) -> None:
     host, untouched = start(), start()
     for one in (host, untouched):
         _drive(one, range(1, 6))
@@ -212,7 +212,7 @@ def test_an_accepted_step_past_the_stop_time_of_model_exchange_is_an_error(start
 
 
 @pytest.mark.parametrize("model_exchange", [False, True])
-def test_an_initial_pose_out_of_reach_is_an_error_with_the_reason(start: Start, model_exchange: bool) -> None:
+def test_an_unreachable_initial_pose_is_an_error_with_the_reason(start: Start, model_exchange: bool) -> None:
     host = start("double_pendulum", "time", initialize=False, model_exchange=model_exchange)
     host.enter(2.5)
     assert answer(host.fmu.exitInitializationMode) == ERROR
@@ -423,7 +423,7 @@ def test_paths_may_have_blanks_and_letters_of_any_script(built_native: Build, fm
     host.free()
 
 
-def test_every_function_of_the_standard_is_there_and_none_crashes_without_an_instance(library: Any, fmi: int) -> None:
+def test_every_function_of_the_standard_is_exported_and_needs_an_instance(library: Any, fmi: int) -> None:
     dll, _ = library
     text = headers("2.0" if fmi == 2 else "3.0")[HEADERS["2.0" if fmi == 2 else "3.0"][-1]]
     names = re.findall(rf"FMI{fmi}_Export fmi{fmi}\w+\s+(fmi{fmi}\w+);", text)
