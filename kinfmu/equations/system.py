@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinfmu.drivers import Driver
 from kinfmu.equations.taylor import Taylor
 from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, Placement, Pose
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.units import METRES
@@ -127,7 +127,7 @@ class System:
         """Rows of one joint or driver in whatever arithmetic the coordinates of its bodies are in."""
         poses = {GROUND_NAME: GROUND}
         for k, name in enumerate(member.bodies):
-            poses[name] = Pose.of(*coordinates[3 * k : 3 * k + 3])
+            poses[name] = BodyFrame.of(*coordinates[3 * k : 3 * k + 3])
         at, owner = Placement(poses, self._points), member.owner
         return owner.residual(at) if isinstance(owner, Joint) else (owner.residual(at, target),)
 
@@ -179,7 +179,7 @@ def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
     """Poses of the bodies from all coordinates q, in any arithmetic."""
     poses = {GROUND_NAME: GROUND}
     for k, body in enumerate(mechanism.moving_bodies):
-        poses[body.name] = Pose.of(*q[3 * k : 3 * k + 3])
+        poses[body.name] = BodyFrame.of(*q[3 * k : 3 * k + 3])
     return Placement(poses, mechanism.body_points)
 
 

@@ -23,8 +23,8 @@ BodyPair = Annotated[tuple[str, str], Reference("body")]
 Axis = Annotated[str, Reference("choice", ("x", "y"))]
 
 
-class Pose(NamedTuple):
-    """Pose of a body: frame origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
+class BodyFrame(NamedTuple):
+    """The frame of a body in the world: origin (x, y) [length], angle phi [rad], and c = cos phi, s = sin phi."""
 
     x: Value
     y: Value
@@ -33,23 +33,23 @@ class Pose(NamedTuple):
     s: Value
 
     @classmethod
-    def of(cls, x: Value, y: Value, phi: Value) -> Pose:
+    def of(cls, x: Value, y: Value, phi: Value) -> BodyFrame:
         return cls(x, y, phi, cos(phi), sin(phi))
 
 
-GROUND = Pose(0.0, 0.0, 0.0, 1.0, 0.0)
+GROUND = BodyFrame(0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 class Placement:
     """The bodies in one pose of the mechanism, in any arithmetic.
 
     Args:
-        poses: Pose by body name.
+        poses: BodyFrame by body name.
         points: Body-fixed coordinates (s_x, s_y) by 'body.point'.
 
     """
 
-    def __init__(self, poses: Mapping[str, Pose], points: Mapping[str, tuple[float, float]]) -> None:
+    def __init__(self, poses: Mapping[str, BodyFrame], points: Mapping[str, tuple[float, float]]) -> None:
         self.poses = poses
         self.points = points
 

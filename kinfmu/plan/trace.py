@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from kinfmu.drivers import Driver
 from kinfmu.equations.graph import Graph, Node
 from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, Placement, Pose
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
@@ -60,5 +60,5 @@ class Tracer:
                 poses[body] = GROUND
             else:
                 names = (f"{body}.{coordinate}" for coordinate in ("x", "y", "phi"))
-                poses[body] = Pose.of(*(known.get(name, self.symbols[name]) for name in names))
+                poses[body] = BodyFrame.of(*(known.get(name, self.symbols[name]) for name in names))
         return Placement(poses, self._points)

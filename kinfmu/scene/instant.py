@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.drivers import Driver
 from kinfmu.joints import Revolute
 from kinfmu.joints.joint import Joint
-from kinfmu.measures.placement import Placement, Pose, body_of
+from kinfmu.measures.placement import BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
@@ -80,6 +80,6 @@ class Instant:
 
     def value(self, driver: str) -> float:
         """What a driver measures as drawn [rad or length]."""
-        poses = {name: Pose.of(*pose[0].tolist()) for name, pose in self.poses.items()}
+        poses = {name: BodyFrame.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
         return float(found.measured().value(Placement(poses, self.body_points)))

@@ -13,7 +13,7 @@ import pytest
 import kinfmu
 from kinfmu import Distance, Mechanism, Revolute, Run, gallery
 from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, Placement, Pose
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 from tests.gallery.conftest import Member
 from tests.gallery.reference_file import row, samples
 from tests.gallery.references import REFERENCES
@@ -157,7 +157,7 @@ def _point(name: str, mechanism: Mechanism, run: Run) -> tuple[np.ndarray, np.nd
 
 def _placement(mechanism: Mechanism, run: Run, k: int) -> Placement:
     poses = {
-        body.name: Pose.of(*(float(run[f"{body.name}.{c}"][k]) for c in ("x", "y", "phi")))
+        body.name: BodyFrame.of(*(float(run[f"{body.name}.{c}"][k]) for c in ("x", "y", "phi")))
         for body in mechanism.moving_bodies
     }
     return Placement({"ground": GROUND, **poses}, mechanism.body_points)

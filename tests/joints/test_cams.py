@@ -218,10 +218,10 @@ def test_the_gap_of_a_roller_is_its_radial_distance_to_the_pitch_curve() -> None
 
 
 def placed(poses: dict[str, tuple[float, float, float]]) -> Any:
-    from kinfmu.measures.placement import Placement, Pose
+    from kinfmu.measures.placement import BodyFrame, Placement
 
     return Placement(
-        {name: Pose.of(*pose) for name, pose in poses.items()}, {"cam.O": (0.0, 0.0), "follower.R": (0.0, 0.0)}
+        {name: BodyFrame.of(*pose) for name, pose in poses.items()}, {"cam.O": (0.0, 0.0), "follower.R": (0.0, 0.0)}
     )
 
 

@@ -213,9 +213,9 @@ def test_a_tilted_guide_may_have_a_symbol_for_its_angle() -> None:
     assert mechanism.expressions == {("joints", "guide", "axis"): Expression("tilt")}
     graph = Graph()
     (guide,) = mechanism.at({"tilt": graph.symbol("tilt")}).joints
-    from kinfmu.measures.placement import GROUND, Placement, Pose
+    from kinfmu.measures.placement import GROUND, BodyFrame, Placement
 
-    at = Placement({"ground": GROUND, "bar": Pose.of(2.0, 3.0, 0.0)}, mechanism.body_points)
+    at = Placement({"ground": GROUND, "bar": BodyFrame.of(2.0, 3.0, 0.0)}, mechanism.body_points)
     (row,) = guide.residual(at)
     (value,) = evaluate([row], {"tilt": 0.5})
     assert value == pytest.approx(3.0 * math.cos(0.5) - 2.0 * math.sin(0.5), rel=1e-15)
