@@ -1,1 +1,1 @@
-"""Tests of kinfmu; the folders mirror its rooms."""
+"""Tests of kinfmu; the folders mirror its packages."""

@@ -48,6 +48,6 @@ def golden(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
             path.write_text(text, encoding="utf-8", newline="\n")
         assert path.is_file(), f"there is no {path.name} in tests/golden; pytest --update writes it"
         expected = path.read_text(encoding="utf-8")
-        assert text == expected, f"differs from tests/golden/{name}; if the change is meant: pytest --update"
+        assert text == expected, f"differs from tests/golden/{name}; if the change is intended: pytest --update"
 
     return compare

@@ -47,7 +47,7 @@ Rng = np.random.Generator
 
 
 class Number(NamedTuple):
-    """One estimate beside the true error."""
+    """One estimate with the true error."""
 
     family: str
     order: str
@@ -76,7 +76,7 @@ class Number(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """What a set of numbers says."""
+    """Coverage and overestimation of a set of estimates."""
 
     count: int
     coverage: float
@@ -85,7 +85,7 @@ class Statistics(NamedTuple):
 
 
 def statistics(numbers: Sequence[Number]) -> Statistics:
-    """Coverage and median overestimation."""
+    """Return coverage and median overestimation."""
     worst = max(number.underestimation for number in numbers)
     return Statistics(
         len(numbers),
@@ -96,7 +96,7 @@ def statistics(numbers: Sequence[Number]) -> Statistics:
 
 
 def compared(family: str, place: str, run: Run, size: float, exact: Sequence[Exact]) -> Iterator[Number]:
-    """The estimates of a run beside its errors; samples without numbers are left out."""
+    """Yield the estimates of a run with its errors; samples without numbers are left out."""
     for k, motion in enumerate(exact):
         if not run.good[k]:
             continue
@@ -373,7 +373,7 @@ def near_dead_centres(rng: Rng) -> Iterator[Number]:
 
 @family
 def near_change_points(rng: Rng) -> Iterator[Number]:
-    """Four-bars that stretch flat, or miss it by little: passed by bridges, or beside it on one branch."""
+    """Four-bars that stretch flat, or almost: crossed by bridges, or passed near by on one branch."""
     g, a = round(float(rng.uniform(2.0, 3.0)), 3), round(float(rng.uniform(0.6, 1.0)), 3)
     b = round(float(rng.uniform(1.2, 2.0)), 3)
     miss = float(f"{10.0 ** rng.uniform(-9.0, -1.5):.3g}") if rng.random() < 0.5 else 0.0

@@ -1,4 +1,4 @@
-"""Mechanisms that several rooms are tested on, built in Python."""
+"""Mechanisms for the tests of several packages, built in Python."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def slider_crank(crank: float = 1.0, rod: float = 3.0, offset: float = 0.0, star
 
 
 def with_arm(linkage: Mechanism) -> Mechanism:
-    """A four-bar with an arm beside it that has a driver of its own."""
+    """Return a four-bar with an arm next to it that has its own driver."""
     ground = Body("ground", {**linkage.bodies[0].points, "T": (9, 0)})
     return replace(
         linkage,
@@ -178,7 +178,7 @@ def with_arm(linkage: Mechanism) -> Mechanism:
 
 
 def beside(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
-    """A mechanism of pins and another one beside it in one file, whose names end in 2."""
+    """Return a mechanism of pins and another one next to it in one file, whose names end in 2."""
     ground, *bodies = other.bodies
     pins = {f"{name}2": (point.x + apart, point.y) for name, point in ground.points.items()}
     copies = [
@@ -207,7 +207,7 @@ def beside(one: Mechanism, other: Mechanism, apart: float = 9.0) -> Mechanism:
 
 
 def with_second(linkage: Mechanism) -> Mechanism:
-    """A four-bar and the same once more beside it, with a driver of its own: `second`, of `crank2`."""
+    """Return a four-bar and a copy next to it with its own driver: `second`, of `crank2`."""
     both = beside(linkage, linkage)
     return replace(both, drivers=(*linkage.drivers, replace(both.drivers[-1], name="second")))
 
@@ -296,7 +296,7 @@ def bar_linkage() -> Mechanism:
 
 
 def uneven_chain(count: int) -> Mechanism:
-    """`count` crank-rockers, each driven by the rocker before it, none as long as another: alike in formulas alone."""
+    """`count` crank-rockers, each driven by the rocker before it, of different lengths: equal in formulas only."""
     first = math.radians(60.0)
     bodies = [
         Body("ground", {f"O_{k}": (4.0 * k, 0) for k in range(count + 1)}),
@@ -320,7 +320,7 @@ def uneven_chain(count: int) -> Mechanism:
 def wheels(rods: dict[str, tuple[int, int, float]], *, start: float = 0.5, second: bool = False) -> Mechanism:
     """Equal wheels of radius 0.5, 2 apart, that rods couple: name -> (wheel, other wheel, direction of the pin [rad]).
 
-    second: beside them an arm with a driver of its own.
+    second: next to them an arm with its own driver.
     """
     count, angle = 1 + max(wheel for _, wheel, _ in rods.values()), start
     pins: list[dict[str, tuple[float, float]]] = [{f"O{k}": (0.0, 0.0)} for k in range(count)]

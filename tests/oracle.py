@@ -193,7 +193,7 @@ def solve(residual: Residual, guess: ArrayLike, u: Any, ud: Any = 1, udd: Any = 
     """The motion at regular poses, by Newton from a guess: q, then qd and qdd from the linear equations.
 
     residual(q, u) gives as many rows as q has coordinates, driver rows among them. guess: (m,) for all samples or
-    (n, m), near enough that Newton finds the branch that is meant. u, ud, udd: numbers or lists of n; with several
+    (n, m), near enough that Newton finds the branch wanted. u, ud, udd: numbers or lists of n; with several
     drivers an entry is a tuple of their values and residual gets u as a list.
     """
     samples = _samples(u, ud, udd)

@@ -8,7 +8,7 @@ from typing import Any
 import mpmath
 
 DIGITS = 50  # of every result of the oracle
-mp = mpmath.MPContext()  # a context of our own: nobody else's setting of digits reaches it
+mp = mpmath.MPContext()  # a context of its own: other settings of digits do not change it
 mp.dps = DIGITS + 30  # near a singular point each derivative costs up to four digits; 16 for a double next to one
 
 Real = Any  # an mpmath number

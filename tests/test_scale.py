@@ -80,18 +80,20 @@ def tips_off(run: Run, crank: float, at: tuple[float, float] = (0.0, 0.0)) -> li
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_a_mechanism_larger_by_a_power_of_two_moves_alike_to_the_bit(name: str) -> None:
+def test_a_mechanism_larger_by_a_power_of_two_moves_equally_to_the_bit(name: str) -> None:
     mechanism = kinfmu.load(name)
     times = np.linspace(mechanism.run.start, mechanism.run.stop, 9)
-    alike = kinfmu.solve(scaled(mechanism, 1.0), times)
+    original = kinfmu.solve(scaled(mechanism, 1.0), times)
     for factor in (2.0**-20, 2.0**20):
         run = kinfmu.solve(scaled(mechanism, factor), times)
         units = np.array([1.0 if output.endswith(".phi") else factor for output in run.outputs])
-        for ours, theirs in zip(_tables(run), _tables(alike), strict=True):
+        for ours, theirs in zip(_tables(run), _tables(original), strict=True):
             np.testing.assert_array_equal(ours / units, theirs)
         for table in ("status", "iterations", "residual", "error"):
-            np.testing.assert_array_equal(getattr(run, table), getattr(alike, table))
-        np.testing.assert_allclose(run.margin, alike.margin, rtol=0.1)  # over the largest that was drawn, two digits
+            np.testing.assert_array_equal(getattr(run, table), getattr(original, table))
+        np.testing.assert_allclose(
+            run.margin, original.margin, rtol=0.1
+        )  # relative to the largest of random poses, two digits
 
 
 def _tables(run: Run) -> tuple[np.ndarray, ...]:
@@ -102,15 +104,15 @@ def _tables(run: Run) -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_check_finds_the_same_at_every_size(name: str, factor: float) -> None:
     mechanism = kinfmu.load(name)
-    report, alike = kinfmu.check(scaled(mechanism, factor)), kinfmu.check(mechanism)
+    report, original = kinfmu.check(scaled(mechanism, factor)), kinfmu.check(mechanism)
     assert report.problem is None
-    assert report.mobility == alike.mobility
-    assert [row.row.name for row in report.redundant] == [row.row.name for row in alike.redundant]
-    assert [point.kind for point in report.singular] == [point.kind for point in alike.singular]
-    for drivers, ours, theirs in zip(mechanism.drivers, report.singular, alike.singular, strict=False):
+    assert report.mobility == original.mobility
+    assert [row.row.name for row in report.redundant] == [row.row.name for row in original.redundant]
+    assert [point.kind for point in report.singular] == [point.kind for point in original.singular]
+    for drivers, ours, theirs in zip(mechanism.drivers, report.singular, original.singular, strict=False):
         if drivers.measured().kind == "angle":
             assert ours.value == pytest.approx(theirs.value, abs=1e-10)
-    assert len(report.notes) == len(alike.notes)
+    assert len(report.notes) == len(original.notes)
 
 
 @pytest.mark.parametrize("scale", SCALES)
@@ -141,7 +143,7 @@ def test_fmus_of_all_sizes_are_right_to_round_off(scale: float, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("scale", [2.0**-20, 1e-6, 1.0, 1e6])
-def test_change_points_are_bridged_alike_at_all_sizes_where_the_unknown_is_a_length(scale: float) -> None:
+def test_change_points_are_bridged_equally_at_all_sizes_where_the_unknown_is_a_length(scale: float) -> None:
     angles = np.array([1.0, math.pi / 2 - 1e-3, math.pi / 2, math.pi / 2 + 0.04, 2.5, 3 * math.pi / 2, 6.0])
     folding = Mechanism(
         "folding",
@@ -220,7 +222,7 @@ def third_crank(ratio: float, wrong: float, *, is_body: bool, at: tuple[float, f
         (1e4, 1.0, (0.0, 0.0)),
     ],
 )
-def test_a_third_crank_wrong_by_1e_9_of_its_length_is_told_from_a_right_one(
+def test_a_third_crank_wrong_by_1e_9_of_its_length_is_distinguished_from_a_right_one(
     ratio: float, scale: float, at: tuple[float, float], is_body: bool
 ) -> None:
     def made(wrong: float) -> Mechanism:

@@ -16,12 +16,12 @@ from kinfmu.solver.python import Status
 from tests.mechanisms import fourbar, reference_fourbar
 
 LOCKED_AT_90_DEGREES = (4.0, 3.0, 2.5, 2.5)
-TOLD = ("residual", "margin", "error", "watch")  # how good a sample is
+DIAGNOSTICS = ("residual", "margin", "error", "watch")  # of each sample
 
 
 def assert_numbers_where_good(run: Run) -> None:
     """Rows of status 0 to 2 are numbers, those of 3 to 5 are not."""
-    for table in ("values", "rates", "accelerations", *TOLD):
+    for table in ("values", "rates", "accelerations", *DIAGNOSTICS):
         numbers = getattr(run, table).reshape(len(run), -1)
         assert not np.isnan(numbers[run.good]).any(), table
         assert np.isnan(numbers[~run.good]).all(), table
@@ -88,7 +88,7 @@ def test_logs_have_gaps_where_runs_have(locked: Run, tmp_path: Path) -> None:
     kinfmu.log.write_mcap(locked, tmp_path / "run.mcap")
     again = kinfmu.log.read(tmp_path / "run.mcap")
     assert_numbers_where_good(again)
-    for table in ("status", "values", "rates", "accelerations", *TOLD):
+    for table in ("status", "values", "rates", "accelerations", *DIAGNOSTICS):
         np.testing.assert_array_equal(getattr(again, table), getattr(locked, table), table)
 
 

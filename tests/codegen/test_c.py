@@ -34,12 +34,12 @@ class Compiled:
         files = emit(plan) | compiler.sources(compiler.MODEL)
         self.sizes = {name: int(n) for name, n in re.findall(r"#define KF_(\w+) (\d+)$", files["sizes.h"], re.M)}
         self.library = ctypes.CDLL(str(compiler.shared_library(files, (*STRICT, SAME_SINES))))
-        fields = [(name, self.room(size)) for name, size in (("x", "COORDINATES"), ("hold", "HOLD"), ("m", "BLOCKS"))]
+        fields = [(name, self.array(size)) for name, size in (("x", "COORDINATES"), ("hold", "HOLD"), ("m", "BLOCKS"))]
         fields += [(name, ctypes.c_double) for name in ("margin", "residual", "moved", "watch")]
         self.found_type = type("Found", (ctypes.Structure,), {"_fields_": [*fields, ("iterations", ctypes.c_int)]})
         self.model = numbers([0.0] * (self.sizes["PARAMETERS"] + self.sizes["DERIVED"] + 2))
 
-    def room(self, size: str) -> Any:
+    def array(self, size: str) -> Any:
         return ctypes.c_double * max(self.sizes[size], 1)
 
     def bind(self, values: Sequence[float]) -> str:
@@ -56,13 +56,13 @@ class Compiled:
         return found
 
     def rates(self, found: Any, ud: Sequence[float], udd: Sequence[float]) -> tuple[Any, Any]:
-        x1, x2 = self.room("COORDINATES")(), self.room("COORDINATES")()
+        x1, x2 = self.array("COORDINATES")(), self.array("COORDINATES")()
         self.library.kf_velocity(self.model, ctypes.byref(found), numbers(ud), None, None, x1)
         self.library.kf_acceleration(self.model, ctypes.byref(found), numbers(udd), x1, None, None, x2)
         return x1, x2
 
     def row(self, found: Any, x1: Any, x2: Any, v: float, a: float) -> list[float]:
-        rows = [self.room("OUTPUTS")() for _ in range(3)]
+        rows = [self.array("OUTPUTS")() for _ in range(3)]
         self.library.kf_outputs(self.model, ctypes.byref(found), rows[0])
         self.library.kf_output_rates(self.model, ctypes.byref(found), x1, ctypes.c_double(v), rows[1])
         weights = ctypes.c_double(v), ctypes.c_double(a)
@@ -91,8 +91,8 @@ def test_c_and_python_agree_to_the_bit(name: str) -> None:
     found = c.position(u, anchor.z)
     assert tuple(found.x[: len(z)]) == z
     assert tuple(found.m[: len(determinants)]) == determinants
-    told = (found.margin, found.residual, found.iterations, found.moved, found.watch)
-    assert told == (margin, residual, iterations, moved, watch)
+    diagnostics = (found.margin, found.residual, found.iterations, found.moved, found.watch)
+    assert diagnostics == (margin, residual, iterations, moved, watch)
     ud, udd = (tuple(a + 0.1 * k for k in range(len(u))) for a in (0.7, -0.3))
     zd = python.velocity(values, ud)
     zdd = python.acceleration(values, ud, udd, zd)
@@ -107,7 +107,7 @@ def test_c_and_python_agree_to_the_bit(name: str) -> None:
     row = np.array(python.motion(values, ud, udd, first, second))  # some sums are in another order
     np.testing.assert_allclose(c.row(found, x1, x2, ud[0], udd[0]), row, rtol=0, atol=1e-14 * np.abs(row).max())
     for block, jacobian in enumerate(python.jacobians(values)):
-        entries = c.room("LARGEST_BLOCK")()
+        entries = c.array("LARGEST_BLOCK")()
         c.library.kf_jacobian(c.model, ctypes.byref(found), block, entries)
         assert entries[: np.size(jacobian)] == list(np.ravel(jacobian))
 
@@ -122,7 +122,7 @@ def test_laws_of_c_and_python_agree() -> None:
         assert tuple(tuple(row) for row in rows) == python.drive(float(t), tuple(constants))
 
 
-def test_laws_take_the_parameters_that_are_bound() -> None:
+def test_laws_depend_on_the_bound_parameters() -> None:
     plan = compile_plan(geared())
     values = (3.5, 40.0, 2.0)  # the last is a pace: durations are 1 / pace
     python, c = load_module(plan).bound(values), Compiled(plan)
@@ -144,7 +144,7 @@ def test_parameters_are_bound_or_refused() -> None:
     assert model.PARAMETERS[0][0] == "ground"
 
 
-def test_a_parameter_that_only_a_condition_looks_at_is_bound_or_refused() -> None:
+def test_a_parameter_that_only_a_condition_reads_is_bound_or_refused() -> None:
     gears = Mechanism(
         "gears",
         [
@@ -176,7 +176,7 @@ def test_the_same_plan_gives_the_same_bytes_whatever_the_hash_seed() -> None:
     assert runs[0].stdout == runs[1].stdout
 
 
-def test_a_block_says_which_rows_it_solves() -> None:
+def test_a_block_names_the_rows_it_solves() -> None:
     text = emit(compile_plan(kinfmu.load("fourbar")))["model.c"]
     assert "/* coupler.phi, rocker.phi from Q.x, Q.y */" in text
 
@@ -194,21 +194,23 @@ def fresh(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     return search
 
 
-def test_without_a_compiler_one_line_says_what_would_bring_one(fresh: Callable[[str], None], tmp_path: Path) -> None:
+def test_without_a_compiler_one_line_has_the_command_that_installs_one(
+    fresh: Callable[[str], None], tmp_path: Path
+) -> None:
     fresh(str(tmp_path))
     with pytest.raises(CompilerError, match=r"no C compiler: cc, gcc and clang are not found; pip install 'kinfmu"):
         compiler.command()
     compiler.command.cache_clear()
 
 
-def test_what_a_compiler_complains_of_is_told() -> None:
+def test_errors_of_the_compiler_are_reported() -> None:
     with pytest.raises(CompilerError, match=r"cannot compile the generated C: .*error"):
         compiler.shared_library({"a.c": "int f(void) { return x; }\n"})
 
 
-def test_messages_have_the_room_in_python_that_c_gives_them() -> None:
-    (room,) = re.findall(r"#define KF_MESSAGE (\d+)", compiler.sources(("solver.h",))["solver.h"])
-    assert int(room) == library.MESSAGE
+def test_messages_are_equally_long_in_python_and_c() -> None:
+    (length,) = re.findall(r"#define KF_MESSAGE (\d+)", compiler.sources(("solver.h",))["solver.h"])
+    assert int(length) == library.MESSAGE
 
 
 def test_a_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -126,7 +126,7 @@ def test_a_native_fmu_is_never_built_of_a_damaged_library() -> None:
 
 
 def unusable(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A cache below a file: nobody can write there, root neither."""
+    """A cache below a file: not even root can write there."""
     cache.write_text("", "utf-8")
     monkeypatch.setenv("KINFMU_CACHE", str(cache / "below"))
     return (

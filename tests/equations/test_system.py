@@ -138,15 +138,15 @@ def test_a_bar_too_long_by_a_hundredth_is_open_by_a_hundredth() -> None:
 
 
 def test_the_scaled_jacobian_does_not_depend_on_the_unit_of_length() -> None:
-    """The pendulum told in millimetres has the same pure numbers, so the same margin."""
+    """The pendulum in millimetres has the same pure numbers, so the same margin."""
     lines = text(PENDULUM).splitlines()
-    told = "\n".join(line.replace('length = "m"', 'length = "mm"') for line in lines)
+    source = "\n".join(line.replace('length = "m"', 'length = "mm"') for line in lines)
     for lengths, longer in (("[-1.0, 0.0]", "[-1e3, 0.0]"), ("value = -1.0", "value = -1e3")):
-        told = told.replace(lengths, longer)
+        source = source.replace(lengths, longer)
     for lengths, longer in (("x = 0.5, y = -0.866", "x = 500, y = -866"), ("x = 1.5, y = -1.0", "x = 1500, y = -1e3")):
-        assert lengths in told
-        told = told.replace(lengths, longer)
-    in_metres, in_millimetres = System(PENDULUM), System(parse(told))
+        assert lengths in source
+        source = source.replace(lengths, longer)
+    in_metres, in_millimetres = System(PENDULUM), System(parse(source))
     q = pendulum_motion(5.5)[0]
     longer_q = q * np.array([1e3, 1e3, 1.0] * 2)
     np.testing.assert_allclose(

@@ -92,7 +92,7 @@ def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
         "for m in (kinfmu.load('fourbar'), six_bar(), bar_as_body(0.3)):\n"
         "    p = compile_plan(m); print(hashlib.sha256((p.text + emit(p)).encode()).hexdigest())\n"
     )
-    told = [
+    hashes = [
         subprocess.run(
             [sys.executable, "-c", script],
             check=True,
@@ -102,11 +102,11 @@ def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
         ).stdout
         for seed in ("1", "2")
     ]
-    assert told[0] == told[1]
-    assert told[0].count("\n") == 3
+    assert hashes[0] == hashes[1]
+    assert hashes[0].count("\n") == 3
 
 
-def test_too_few_and_too_many_drivers_are_told_apart() -> None:
+def test_too_few_and_too_many_drivers_have_different_messages() -> None:
     bodies, joints = fourbar(4, 1, 3.5, 3).bodies, fourbar(4, 1, 3.5, 3).joints
     with pytest.raises(MobilityError, match=r"mobility is 1 but there is no driver: 1 more driver is needed"):
         compile_plan(Mechanism("m", bodies, joints))
@@ -125,7 +125,7 @@ def test_two_drivers_on_one_freedom_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("coupler", "told"),
+    ("coupler", "message"),
     [
         (
             1.0,
@@ -134,7 +134,9 @@ def test_two_drivers_on_one_freedom_are_refused() -> None:
         (1.0 - 1e-8, r"does not close near its start pose .* does not close: gap 1e-08 m"),
     ],
 )
-def test_a_start_that_closes_at_a_single_pose_or_misses_it_is_told_so(coupler: float, told: str) -> None:
+def test_a_start_that_closes_at_a_single_pose_or_misses_it_is_refused_with_the_reason(
+    coupler: float, message: str
+) -> None:
     """Three bars stretched over the fourth: that they do not determine the motion would not be the reason."""
     mechanism = Mechanism(
         "stretched",
@@ -152,7 +154,7 @@ def test_a_start_that_closes_at_a_single_pose_or_misses_it_is_told_so(coupler: f
         ],
         [AngleDriver("crank", "crank", ConstantSpeed(0.0, 1.0))],
     )
-    with pytest.raises(AssemblyError, match=told):
+    with pytest.raises(AssemblyError, match=message):
         compile_plan(mechanism)
 
 

@@ -88,11 +88,11 @@ def test_coordinates_are_chosen_as_columns_are_in_the_order_named() -> None:
     assert coordinates(select(run, ["q"]), ["A.x"]) == ("A.x",)
 
 
-def test_what_is_no_coordinate_is_told_with_those_that_are() -> None:
+def test_the_message_of_an_unknown_coordinate_lists_those_there_are() -> None:
     run = fourbar(np.arange(3.0))
-    told = "; coordinates: crank.phi, coupler.x, .*, or q, points, all, with [*] for any letters$"
+    known = "; coordinates: crank.phi, coupler.x, .*, or q, points, all, with [*] for any letters$"
     for name in ("solver.residual", "error", "none", "ram.*", "time"):
-        with pytest.raises(RequestError, match=rf"^the run has no coordinate '{re.escape(name)}'{told}"):
+        with pytest.raises(RequestError, match=rf"^the run has no coordinate '{re.escape(name)}'{known}"):
             coordinates(run, ["coupler.x", name])
     with pytest.raises(RequestError, match=r"no coordinate 'cupler\.vx'; did you mean 'coupler\.vx'\?; coord"):
         coordinates(run, ["cupler.vx"])

@@ -1,4 +1,4 @@
-"""Run: named columns with units, fixed coordinates, and what is told about a name that is not there."""
+"""Run: named columns with units, fixed coordinates, and messages of unknown names."""
 
 from __future__ import annotations
 

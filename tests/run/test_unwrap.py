@@ -1,4 +1,4 @@
-"""Angles that were wrapped into one turn, followed the short way: by itself, in solve and in simulate."""
+"""Unwrapping of angles: the function, in solve and in simulate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_no_step_is_more_than_half_a_turn_and_no_digit_is_lost() -> None:
     assert unwrap(followed).tolist() == followed.tolist()
 
 
-def test_half_a_turn_is_taken_as_it_stands_and_a_little_more_the_other_way() -> None:
+def test_half_a_turn_is_unchanged_and_a_little_more_is_turned_back() -> None:
     for step in (np.pi, -np.pi, np.pi + 1e-12):
         assert unwrap(np.array([1.0, 1.0 + step]))[1] == 1.0 + step
     assert unwrap(np.radians([0.0, 181.0, 359.0, 10.0])) == pytest.approx(np.radians([0.0, -179.0, -1.0, 10.0]))
@@ -30,7 +30,7 @@ def test_half_a_turn_is_taken_as_it_stands_and_a_little_more_the_other_way() -> 
     assert len(unwrap(np.array([]))) == 0
 
 
-def test_solve_takes_wrapped_angles_as_they_stand_unless_told_to_follow_them() -> None:
+def test_solve_unwraps_angles_only_if_asked() -> None:
     u = np.radians([300.0, 350.0, 10.0, 60.0, 350.0])
     mechanism = kinfmu.load("fourbar")
     np.testing.assert_array_equal(kinfmu.solve(mechanism, crank_angle=u)["crank.phi"], u)

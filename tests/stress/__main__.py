@@ -18,7 +18,7 @@ from tests.stress.trial import judged, trial
 
 CHUNK = 10  # trials handed to a process at a time
 COUNTS = {"python": 10_000, "native": 300}  # mechanisms; a compiler takes its time with each
-TOLD = 5.0  # [s] between two lines about the progress
+PROGRESS_INTERVAL = 5.0  # [s] between two lines of progress
 
 
 def main() -> int:
@@ -53,17 +53,17 @@ def _one(seed: int, family: str | None, engine: Literal["python", "native"]) -> 
 
 
 def _many(seeds: range, family: str | None, engine: Literal["python", "native"], jobs: int) -> int:
-    begun = told = time.monotonic()
+    begun = printed = time.monotonic()
     report = Report()
     tasks = [(seed, family, engine) for seed in seeds]
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         try:
             for verdict in pool.imap_unordered(judged, tasks, CHUNK):
                 report.take(verdict)
-                if time.monotonic() - told > TOLD:
-                    told = time.monotonic()
+                if time.monotonic() - printed > PROGRESS_INTERVAL:
+                    printed = time.monotonic()
                     done = report.mechanisms.total()
-                    print(f"{done} of {len(tasks)}, {told - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
+                    print(f"{done} of {len(tasks)}, {printed - begun:.0f} s", end="\r", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would take the report
             print("interrupted: what was found so far\n")

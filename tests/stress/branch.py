@@ -22,7 +22,7 @@ INSIDE, OUTSIDE, EDGE = 0, 1, 2  # of the range; EDGE: so close to its end that 
 FINE = 1440  # places to the period of an angle, or to the reach of a length
 SHORT = 0.02  # [rad, lengths]; between places of a way of several drivers
 COARSE = 600  # places of a stretch that does not go round
-DEPTHS = np.concatenate([[0.0], 10.0 ** np.arange(-13.0, -1.0, 0.2)])  # beside a mark, where things change quickly
+DEPTHS = np.concatenate([[0.0], 10.0 ** np.arange(-13.0, -1.0, 0.2)])  # from a mark, near which values change quickly
 DIP = 0.05  # what must stay positive is looked at closely where it falls below
 FLAT = 1.001  # places that differ by less have nothing between them
 LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
@@ -102,7 +102,7 @@ class Interval:
         sketch = self.drawn.sketch
         return not (self.low_is_limit or self.high_is_limit) and sketch.kinds == ("angle",) and sketch.period > 0
 
-    def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:  # noqa: ARG002  as a Walk needs it
+    def expected(self, u: Floats, good: NDArray[np.bool_]) -> Expected:  # noqa: ARG002  BranchPath needs it
         """For samples (n, 1); which of them are good makes no difference here."""
         x = u[:, 0]
         start, period = self.drawn.start[0], TURN * self.drawn.sketch.period
@@ -252,8 +252,8 @@ def _end(drawn: Drawn, good: float, bad: float, dips: Mapping[float, float]) -> 
 
 
 @dataclass
-class Walk:
-    """A mechanism with several drivers, walked along straight ways."""
+class BranchPath:
+    """A mechanism with several drivers, followed along straight lines of driver values."""
 
     drawn: Drawn
     magnitudes: Magnitudes
@@ -317,8 +317,8 @@ class Walk:
         return float(least)
 
 
-def walk(drawn: Drawn) -> Walk:
-    """A mechanism with several drivers, with magnitudes from 500 places."""
+def branch_path(drawn: Drawn) -> BranchPath:
+    """Return the path of a mechanism with several drivers, with magnitudes from 500 places."""
     places = np.random.default_rng(1).uniform(0.0, 1.0, (500, len(drawn.start)))
     units = [1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds]
     low, high = (bound * np.array(units) for bound in drawn.sketch.reach)
@@ -334,9 +334,9 @@ def walk(drawn: Drawn) -> Walk:
     magnitudes = Magnitudes(
         *({name: max(table[name], other[name]) for name in table} for table, other in zip(*found, strict=True))
     )
-    return Walk(drawn, magnitudes, tuple(_marks(drawn, -TURN, 2.0 * TURN)) if drawn.sketch.marks else ())
+    return BranchPath(drawn, magnitudes, tuple(_marks(drawn, -TURN, 2.0 * TURN)) if drawn.sketch.marks else ())
 
 
-def branch_of(drawn: Drawn) -> Interval | Walk:
-    """The branch of a drawn mechanism."""
-    return interval(drawn) if len(drawn.start) == 1 else walk(drawn)
+def branch_of(drawn: Drawn) -> Interval | BranchPath:
+    """Return the branch of a drawn mechanism."""
+    return interval(drawn) if len(drawn.start) == 1 else branch_path(drawn)

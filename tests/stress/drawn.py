@@ -1,4 +1,4 @@
-"""Drawn: a random mechanism with its closed form, and how it stands in the world."""
+"""Drawn: a random mechanism with its closed form, and its place in the world."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Sketch:
     """A mechanism about the origin: its points by body, what moves it, and its closed form.
 
     Bodies that share a name of a point share a pin. poses: (numbers, driver values, closing) -> pose of each moving
-    body. kinds: of the drivers, 'angle' or 'length'. joints: beside the pins, drivers: at start values, both in a
+    body. kinds: of the drivers, 'angle' or 'length'. joints: other than the pins, drivers: at start values, both in a
     frame. marks: driver values where loops may be singular, of a turn if it is an angle. period: of the closed form,
     in turns, 0 if it does not go round; reach: values to draw the start from.
     """

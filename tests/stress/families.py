@@ -475,7 +475,7 @@ def coupled_wheels(rng: Draw) -> Sketch:
     """Equal wheels in a row, each coupled to the next by two rods whose pins are not in line with the wheel's centre.
 
     One rod of a pair is redundant, and carries the wheels where the other is in its dead centre: regular everywhere.
-    Rods are bodies or distances; some stand beside an arm with a driver of its own.
+    Rods are bodies or distances; some have an arm next to them with a driver of its own.
     """
     pitch, pairs, with_arm = drawn_length(rng, 0.5, 2.0), rng.randrange(1, 4), rng.random() < 0.3
     points: dict[str, dict[str, tuple[Exact, Exact]]] = {"ground": {}}
@@ -602,7 +602,7 @@ def robots(rng: Draw) -> Sketch:
 
 
 def two_machines(rng: Draw) -> Sketch:
-    """A linkage and a four-bar beside it, each with a driver of its own; at times an arm on the linkage with a third.
+    """A linkage and a four-bar next to it, each with its own driver; sometimes an arm on the linkage with a third.
 
     Each may have change points, which depend on its own driver alone.
     """
@@ -643,7 +643,7 @@ def two_machines(rng: Draw) -> Sketch:
 def machines_with_a_robot(rng: Draw) -> Sketch:
     """A four-bar, often with change points, and a robot whose bars depend on several drivers.
 
-    The robot is a five-bar beside the four-bar, or a driven arm and two bars from its end to that of the rocker.
+    The robot is a five-bar next to the four-bar, or a driven arm and two bars from its end to that of the rocker.
     """
     bars = changing(rng) if rng.random() < 0.7 else grashof(rng, rng.choice(KINDS))
     first, robot = fourbar(bars, _driven(rng), _side(rng)), five_bars(rng)

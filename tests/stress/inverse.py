@@ -16,9 +16,9 @@ from tests.stress.jets import LONG, Array, Jet, Numbers
 from tests.stress.loops import Closing
 
 FINE = 1440  # places to a turn
-SHORTEST = 24  # places of a stretch
-ROOM = 0.05  # of what must stay positive, along a stretch
-BEYOND, WITHIN = 0.3, 1e-9  # [rad] looked past a limit; kept before an end that is none
+SHORTEST = 24  # places of an interval
+LEAST_POSITIVE = 0.05  # least value along an interval of what must stay positive
+BEYOND, WITHIN = 0.3, 1e-9  # [rad] past a limit; before an end that is no limit
 ITERATIONS, MORE_DIGITS, CLOSE = 40, 6, 1e-17
 
 CrankPoses = Callable[[Numbers, Sequence[Jet], Closing], dict[str, Pose]]
@@ -39,7 +39,7 @@ class Inverse:
         return self.poses(numbers, [Jet(numbers, theta, d1, 0 * d1)], Closing())[self.body].phi
 
     def reach(self) -> tuple[float, float]:
-        """Values of psi to look at: past the stretch where it ends in a limit, and not quite to its end elsewhere."""
+        """Values of psi to examine: past the interval if its end is a limit, and just before its end otherwise."""
         low, high = (float(value) for value in (self.psi[0], self.psi[-1]))
         past = [BEYOND if turns_back else -WITHIN for turns_back in self.turns_back]
         return low - past[0], high + past[1]
@@ -101,7 +101,7 @@ def driven_at(sketch: Sketch, body: str, chosen: float) -> Sketch | None:
         one = LONG.array(np.ones(FINE + 1))
         psi = sketch.poses(LONG, [Jet(LONG, theta, one, 0 * one)], closing)[body].phi
         lowest = np.minimum.reduce([*closing.limits, one])
-        rising = np.where(lowest > ROOM, np.sign(psi.d1), 0.0)
+        rising = np.where(lowest > LEAST_POSITIVE, np.sign(psi.d1), 0.0)
     edges = np.flatnonzero(np.diff(rising) != 0) + 1
     pieces = [p for p in np.split(np.arange(FINE + 1), edges) if len(p) >= SHORTEST and rising[p[0]] != 0]
     if not pieces:

@@ -21,11 +21,11 @@ from tests.stress.jets import Array, Exact, Jet, Numbers, Vector, turned
 
 @dataclass
 class Closing:
-    """What tells how well the loops close, a number each for every sample.
+    """Measures of how well the loops close, one number each for every sample.
 
     limits: must be positive, about 1 where regular; one is 0 at a dead centre and falls linearly. sines: of the angle
-    under which two bars meet; 0 at every singular point. widths: [rad], one a loop with an arm: within so much of a
-    change point the motion turns its direction, as the arm's end passes so close to the pivot.
+    under which two bars meet; 0 at every singular point. widths: [rad], one per loop with an arm: within this distance
+    of a change point the motion turns its direction, as the arm's end passes so close to the pivot.
     """
 
     limits: list[Array] = field(default_factory=list)

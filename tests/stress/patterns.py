@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.stress.branch import Floats, Interval, Walk
+from tests.stress.branch import BranchPath, Floats, Interval
 from tests.stress.drawn import TURN
 
 Values = list[float]
@@ -127,9 +127,9 @@ PATTERNS: dict[str, Callable[[Random, Interval], Values]] = {
 }
 
 
-def drawn_steps(rng: Random, branch: Interval | Walk) -> tuple[list[str], Floats]:
+def drawn_steps(rng: Random, branch: Interval | BranchPath) -> tuple[list[str], Floats]:
     """Names of three patterns, and their driver values (n, d) one after the other."""
-    if isinstance(branch, Walk):
+    if isinstance(branch, BranchPath):
         names, steps = ["ways", "to limits and back"], [_ways(rng, branch), _to_limits(rng, branch)]
         if branch.marks:
             names, steps = [*names, "over change points"], [*steps, _over_marks(rng, branch)]
@@ -141,14 +141,14 @@ def drawn_steps(rng: Random, branch: Interval | Walk) -> tuple[list[str], Floats
         for value in PATTERNS[name](rng, branch):
             is_inside = branch.is_free or branch.low <= value <= branch.high
             if not is_inside and not (branch.low_is_limit if value < branch.low else branch.high_is_limit):
-                continue  # nobody looked that far
+                continue  # beyond the examined range
             outside += not is_inside
             if is_inside or outside <= OUTSIDE_SAMPLES:
                 steps.append(value)
     return names, np.array(steps or [branch.drawn.start[0]])[:, None]
 
 
-def _ways(rng: Random, branch: Walk) -> Floats:
+def _ways(rng: Random, branch: BranchPath) -> Floats:
     """Of several drivers: steps, jumps and tiny steps, from place to place."""
     drawn = branch.drawn
     units = np.array([1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds])
@@ -165,7 +165,7 @@ def _ways(rng: Random, branch: Walk) -> Floats:
     return np.array(found)
 
 
-def _to_limits(rng: Random, branch: Walk) -> Floats:
+def _to_limits(rng: Random, branch: BranchPath) -> Floats:
     """Of several drivers: straight to 1e-1 ... 1e-6 before a limit and back, by the same places or by others."""
     drawn = branch.drawn
     units = np.array([1.0 if kind == "angle" else float(drawn.frame.scale) for kind in drawn.sketch.kinds])
@@ -184,7 +184,7 @@ def _to_limits(rng: Random, branch: Walk) -> Floats:
     return np.array(found)
 
 
-def _over_marks(rng: Random, branch: Walk) -> Floats:
+def _over_marks(rng: Random, branch: BranchPath) -> Floats:
     """Of several drivers: even steps of each there and back, in order or not; and close to change points of some."""
     generator = np.random.default_rng(rng.getrandbits(64))
     start = np.array(branch.drawn.start)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.stress.branch import EDGE, OUTSIDE
-from tests.stress.trial import NARROW, ORDERS, ROOM, TIGHT, Verdict
+from tests.stress.trial import NARROW, NEAR_LIMIT, ORDERS, TIGHT, Verdict
 
 STATUSES = ("ok", "near_singular", "bridged", "outside", "inconsistent", "not_converged")
 EPS = float(np.finfo(float).eps)
@@ -46,7 +46,7 @@ class Report:
     edge: int = 0
     spared: int = 0
     narrow: int = 0
-    refused: int = 0  # samples past a limit, told so
+    refused: int = 0  # samples past a limit, reported as such
 
     def take(self, verdict: Verdict) -> None:
         """Count one more trial."""
@@ -82,44 +82,44 @@ class Report:
 
     def lines(self, command: str) -> list[str]:
         """The report; `command` is what one mechanism is tried by, but for its seed."""
-        said = [_row("family", "mechanisms", "at fault", "samples", *STATUSES)]
+        lines = [_row("family", "mechanisms", "at fault", "samples", *STATUSES)]
         for family in sorted(self.mechanisms):
             counts = [self.statuses[family, k] for k in range(len(STATUSES))]
-            said.append(_row(family, self.mechanisms[family], self.faulty[family], self.samples[family], *counts))
+            lines.append(_row(family, self.mechanisms[family], self.faulty[family], self.samples[family], *counts))
         totals = [sum(self.statuses[family, k] for family in self.mechanisms) for k in range(len(STATUSES))]
-        said.append(_row("all", self.mechanisms.total(), self.faulty.total(), self.samples.total(), *totals))
-        said.append("")
-        said.append("largest error of a column, of its largest magnitude, and what shows it alone:")
+        lines.append(_row("all", self.mechanisms.total(), self.faulty.total(), self.samples.total(), *totals))
+        lines.append("")
+        lines.append("largest error of a column, of its largest magnitude, and what shows it alone:")
         for (status, order), worst in sorted(self.worst.items()):
-            said.append(
+            lines.append(
                 f"  {STATUSES[status]:<14} {ORDERS[order]:<4} {worst.error:8.2g}   {command} --seed {worst.seed}"
             )
-        said.append("")
-        said.append(
+        lines.append("")
+        lines.append(
             "error estimates: share of samples where it is at least the error (or that is a rounding); median of"
         )
-        said.append("estimate / error (or rounding), one in a hundred below, one in a hundred above:")
+        lines.append("estimate / error (or rounding), one in a hundred below, one in a hundred above:")
         for order, name in enumerate(ORDERS):
             hit, count = self.covered[order]
             low, middle, high = np.percentile(np.concatenate(self.ratios[order] or [np.ones(1)]), (1, 50, 99))
-            said.append(f"  {name:<4} {100.0 * hit / max(count, 1):8.3f} %   {middle:8.3g} {low:8.3g} {high:8.3g}")
-        said.append("")
-        said.append(
-            f"{self.refused} samples past a limit were told so; {self.edge} lay within 1e-10 of one; "
-            f"told outside though the branch goes on: {self.spared} behind a place tighter than {TIGHT:g}, "
-            f"{self.narrow} behind a change point narrower than {NARROW:g} rad or within {ROOM:g} of a limit"
+            lines.append(f"  {name:<4} {100.0 * hit / max(count, 1):8.3f} %   {middle:8.3g} {low:8.3g} {high:8.3g}")
+        lines.append("")
+        lines.append(
+            f"{self.refused} samples past a limit were reported as such; {self.edge} were within 1e-10 of one; "
+            f"reported as outside though the branch continues: {self.spared} behind a place tighter than {TIGHT:g}, "
+            f"{self.narrow} behind a change point narrower than {NARROW:g} rad or within {NEAR_LIMIT:g} of a limit"
         )
-        said.append(
+        lines.append(
             f"{self.digits} samples were judged in 50 digits; the two oracles differed by {self.gap:.1g} of what counts"
         )
         for kind, found in sorted(self.faults.items()):
-            said.append("")
-            said.append(f"{kind}: {len(found)} mechanisms")
+            lines.append("")
+            lines.append(f"{kind}: {len(found)} mechanisms")
             found = sorted(found, key=lambda one: one[0].seed)
-            said += [f"  {command} --seed {v.seed}   # {v.family}; {text}" for v, text in found[:SHOWN]]
+            lines += [f"  {command} --seed {v.seed}   # {v.family}; {text}" for v, text in found[:SHOWN]]
             if len(found) > SHOWN:
-                said.append(f"  and {len(found) - SHOWN} more")
-        return said
+                lines.append(f"  and {len(found) - SHOWN} more")
+        return lines
 
 
 def _row(first: str, *cells: object) -> str:
@@ -128,12 +128,12 @@ def _row(first: str, *cells: object) -> str:
 
 def details(verdict: Verdict, values: Sequence[Sequence[float]]) -> list[str]:
     """Sample by sample what a trial showed."""
-    said = [f"seed {verdict.seed}, {verdict.family}; {', '.join(verdict.patterns)}"]
-    said.append("sample  driver values  status  side  error of q, qd, qdd of magnitude | as estimated | estimate")
+    lines = [f"seed {verdict.seed}, {verdict.family}; {', '.join(verdict.patterns)}"]
+    lines.append("sample  driver values  status  side  error of q, qd, qdd of magnitude | as estimated | estimate")
     faults: dict[int, list[str]] = {}
     for fault in verdict.faults:
         faults.setdefault(fault.sample, []).append(f"{fault.kind}: {fault.text}")
-    said += faults.pop(-1, [])
+    lines += faults.pop(-1, [])
     for k, u in enumerate(values):
         numbers = " | ".join(
             " ".join(f"{value:8.1e}" for value in table[k])
@@ -141,5 +141,5 @@ def details(verdict: Verdict, values: Sequence[Sequence[float]]) -> list[str]:
         )
         driven = " ".join(f"{value:.17g}" for value in u)
         side = ("inside", "outside", "edge", "?")[verdict.side[k]]
-        said.append(f"{k:4d}  {driven}  {verdict.statuses[k]}  {side}  {numbers}  {'; '.join(faults.get(k, []))}")
-    return said
+        lines.append(f"{k:4d}  {driven}  {verdict.statuses[k]}  {side}  {numbers}  {'; '.join(faults.get(k, []))}")
+    return lines

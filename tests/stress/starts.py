@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.stress.branch import TURN, Floats, Interval, Walk
+from tests.stress.branch import TURN, BranchPath, Floats, Interval
 from tests.stress.drawn import Drawn
 from tests.stress.families import Draw
 
@@ -27,7 +27,7 @@ class Started:
     is_there: bool
 
 
-def started(rng: Draw, branch: Interval | Walk) -> Started:
+def started(rng: Draw, branch: Interval | BranchPath) -> Started:
     """Return a mechanism started anywhere on its branch."""
     drawn = branch.drawn
     start = np.array(drawn.start)
@@ -56,8 +56,8 @@ def started(rng: Draw, branch: Interval | Walk) -> Started:
 
 def _law_start(rng: Draw, branch: Interval, start: float, unit: float) -> float:
     """A driver value on the branch, less than half a turn from the start: anywhere, or near what is singular."""
-    room = 0.49 * TURN if branch.drawn.sketch.kinds == ("angle",) else np.inf
-    low, high = max(branch.low, start - room), min(branch.high, start + room)
+    reach = 0.49 * TURN if branch.drawn.sketch.kinds == ("angle",) else np.inf
+    low, high = max(branch.low, start - reach), min(branch.high, start + reach)
     special = [low] * branch.low_is_limit * (low == branch.low) + [high] * branch.high_is_limit * (high == branch.high)
     special += [mark for mark in branch.marks if low < mark < high]
     if special and rng.random() < 0.6:

@@ -35,8 +35,8 @@ def test_random_mechanisms_over_random_steps_are_right_or_say_why_not(family: st
 @pytest.mark.parametrize("family", FAMILIES)
 def test_so_they_are_by_the_native_engine(family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path))
-    told = f"scripts/stress --engine native --family '{family}' --seed 1"
-    assert trial(1, family, "native").judged().faults == [], told
+    command = f"scripts/stress --engine native --family '{family}' --seed 1"
+    assert trial(1, family, "native").judged().faults == [], command
 
 
 @pytest.mark.parametrize(("seed", "family"), [(136, "pins in slots"), (299, "near change points")])
@@ -49,7 +49,7 @@ def test_what_can_be_had_on_one_way_and_not_on_another_has_an_estimate(
 
 
 def test_at_a_crossing_without_a_bridge_the_rates_are_not_known() -> None:
-    """3e-3 rad beside a limit no bridge fits; on the crossing itself the rates are those of neither branch."""
+    """3e-3 rad from a limit no bridge fits; on the crossing itself the rates are those of neither branch."""
     one = replace(trial(236, "watt six-bars", "native"), engine="python")
     verdict = one.judged()
     assert verdict.faults == []
@@ -66,7 +66,7 @@ def test_a_loop_that_falls_in_line_inside_a_larger_block_keeps_its_smooth_branch
 
 @pytest.mark.parametrize("seed", [3263, 3583, 6731, 7940])
 def test_a_near_change_point_that_falls_steeply_is_not_bridged(seed: int) -> None:
-    """Half a width beside it the block is regular; it is interpolated all the same, and must prove that it closes."""
+    """Half a width from it the block is regular; it is interpolated all the same, and must be shown to close."""
     assert trial(seed, "near change points").judged().faults == []
 
 
@@ -82,7 +82,7 @@ def test_a_crossing_1e_3_rad_before_a_limit_is_a_limit_and_counted_as_such() -> 
     ("seed", "family"),
     [(6838, "stephenson six-bars"), (7342, "watt six-bars"), (7440, "four-bars"), (21356, "near change points")],
 )
-def test_beside_a_limit_where_long_doubles_lose_their_digits_samples_are_judged_by_50(seed: int, family: str) -> None:
+def test_near_a_limit_samples_are_judged_by_50_digits(seed: int, family: str) -> None:
     """Up to 4e-8 of what must stay positive: long doubles are wrong by as much as counts."""
     assert trial(seed, family).judged().faults == []
 
@@ -199,11 +199,11 @@ def _flagged(run: Run) -> Run:
     [
         (_shifted, "wrong with status ok"),
         (_holed, "NaN"),
-        (_refused, "told unreachable"),
+        (_refused, "reported unreachable"),
         (_flagged, "beyond its estimate"),
     ],
 )
-def test_what_is_wrong_is_told(
+def test_faults_are_reported(
     monkeypatch: pytest.MonkeyPatch, plain: Trial, change: Callable[[Run], Run], kind: str
 ) -> None:
     run, size = plain.run()
@@ -218,7 +218,7 @@ def test_what_is_wrong_is_told(
     assert f"{kind}: 1 mechanisms" in report.lines("scripts/stress")
 
 
-def test_numbers_past_a_limit_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numbers_past_a_limit_are_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     one = next(found for s in range(50) if (found := trial(s, "four-bars")).branch.low_is_limit)  # type: ignore[union-attr]
     run, size = one.run()
     outside = int(np.flatnonzero(run.status == 3)[0])

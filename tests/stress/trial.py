@@ -17,7 +17,7 @@ from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError
 from kinfmu.plan import compile_plan
 from kinfmu.units import derivative_name
-from tests.stress.branch import INSIDE, OUTSIDE, TURN, Expected, Floats, Interval, Walk, branch_of
+from tests.stress.branch import INSIDE, OUTSIDE, TURN, BranchPath, Expected, Floats, Interval, branch_of
 from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError
 from tests.stress.jets import DIGITS, SCREENING, Numbers
@@ -26,19 +26,19 @@ from tests.stress.starts import Started, started
 
 WRONG = 1e-9  # of the column's largest magnitude
 TIGHT = 4e-6  # where what must stay positive falls below on the way, `outside` is an answer too
-NARROW = 0.015  # [rad]; change points that turn in less have no room for a bridge: `outside` is an answer too
-ROOM = 4e-3  # [rad, lengths]; nor have those as close to a limit: four half widths of the narrowest bridge
+NARROW = 0.015  # [rad]; change points that turn in less are too narrow for a bridge: `outside` is accepted too
+NEAR_LIMIT = 4e-3  # [rad, lengths]; the same this close to a limit: four half widths of the narrowest bridge
 AT = 1e-9  # [rad, lengths]; samples as close to such a change point count as those behind it
-BEYOND = 10.0  # times its own estimate: a flagged sample may not be wronger
-SHARE = 0.01  # of the samples that go to 50 digits whatever the screening says
+BEYOND = 10.0  # times its own estimate: the largest error of a flagged sample
+SHARE = 0.01  # of the samples are judged by 50 digits in any case
 SINGULAR = 1e-6  # product of what must stay positive; below, long doubles lose the digits that errors are judged by
 AGREED = 0.1  # the two oracles may differ by this part of the error, or of what counts as wrong
 STARTS = 64
-MANY = 400  # samples at least for the native engine, which lays many side by side
-FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms stand a million lengths, or some, off the origin
-AMBIGUOUS = 1e-4  # sine at the start of a law below which several branches may be told to leave it
-SAME = 1e-3  # [rad, lengths]; a pose further off is another assembly
-CLEAR = 0.1  # least sine of the angle under which bars meet where assemblies are told apart
+MANY = 400  # least number of samples for the native engine, which solves many at once
+FAR_SHARE, BESIDE_SHARE = 0.05, 0.2  # of the mechanisms are a million lengths, or a few, from the origin
+AMBIGUOUS = 1e-4  # sine at the start of a law below which AmbiguousStartError is accepted
+SAME = 1e-3  # [rad, lengths]; a pose at a larger distance is another assembly
+CLEAR = 0.1  # least sine of the angle between bars where assemblies are distinguished
 MEETING = 0.3  # least sine of the angle under which bars meet at the start
 DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (Fraction(3, 5), Fraction(4, 5)), (Fraction(-7, 25), Fraction(24, 25)))
 ORDERS = ("q", "qd", "qdd")
@@ -64,12 +64,12 @@ class Verdict:
     relative: Floats  # (n, 3) error of q, qd, qdd, each column relative to its magnitude; NaN where there is no number
     absolute: Floats  # (n, 3) the same relative to the size for lengths, in radians for angles: as estimates are
     estimate: Floats  # (n, 3)
-    spared: int  # samples that were told unreachable behind a place too tight
+    spared: int  # samples reported unreachable behind a place too tight
     narrow: int  # the same behind a change point too narrow, or too close to a limit
     digits: int  # samples that were judged by 50 digits
     gap: float  # largest difference of the two oracles, as a part of what is judged
     refused: bool = False  # as ambiguous, at a singular start
-    other: bool = False  # assembled otherwise: the start poses do not tell which is meant
+    other: bool = False  # another assembly: the start poses do not determine which
     faults: list[Fault] = field(default_factory=list)
 
 
@@ -80,7 +80,7 @@ class Trial:
     seed: int
     family: str
     drawn: Drawn
-    branch: Interval | Walk
+    branch: Interval | BranchPath
     patterns: Sequence[str]
     inputs: tuple[Floats, Floats, Floats]  # (n, d) each: values, speeds, accelerations
     engine: Literal["python", "native"] = "python"
@@ -94,7 +94,7 @@ class Trial:
         return kinfmu.solve(plan, engine=self.engine, **given), load_model(plan).SIZE
 
     def judged(self) -> Verdict:
-        """kinfmu's run beside the closed forms."""
+        """Return kinfmu's run, to be compared with the closed forms."""
         n = len(self.inputs[0])
         nothing = np.full((n, 3), np.nan)
         none = np.full(n, -1)
@@ -146,7 +146,7 @@ class Trial:
         return not self.started.is_there or self._sine_at_start() > MEETING
 
     def _is_on_the_branch(self, run: Run, expected: Expected) -> bool:
-        """True if the first sample that tells the assemblies apart is the oracle's pose; or if there is none."""
+        """True if the first sample that distinguishes the assemblies is the oracle's pose; or if there is none."""
         with np.errstate(all="ignore"):
             exact = self.drawn.positions(self.inputs[0])
         sines = np.minimum.reduce([np.abs(np.asarray(sine, dtype=float)) for sine in exact.closing.sines])
@@ -179,7 +179,7 @@ class Trial:
                 elif is_narrow or self._is_behind_a_crowded_change_point(float(self.inputs[0][k, 0])):
                     verdict.narrow += 1
                 else:
-                    verdict.faults.append(Fault("told unreachable", k, f"status {status}"))
+                    verdict.faults.append(Fault("reported unreachable", k, f"status {status}"))
             if not run.good[k] and status != 3:
                 verdict.faults.append(Fault("not outside", k, f"status {status}"))
 
@@ -191,7 +191,7 @@ class Trial:
         for mark in branch.marks:
             after, before = branch.high_is_limit and x > mark - AT * unit, branch.low_is_limit and x < mark + AT * unit
             left = min(branch.high - mark if after else np.inf, mark - branch.low if before else np.inf)
-            if left < ROOM * unit:
+            if left < NEAR_LIMIT * unit:
                 sines = self.drawn.positions(np.array([[mark]])).closing.sines
                 return min(abs(float(np.atleast_1d(sine)[0])) for sine in sines) < 1e-12
         return False
