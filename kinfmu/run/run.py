@@ -71,25 +71,42 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Run:
-    """n samples of a mechanism's motion.
+    """The motion of a mechanism at n samples.
 
-    t: (n,) [s]. outputs: names of the m output coordinates, first the generalized coordinates q, then the points of
-    interest; values, rates, accelerations: (n, m) in the mechanism's unit of length, rad and s. fixed: coordinates that
-    a joint holds at a constant. inputs: (n, 3 d): value, speed and acceleration of each driver. status, iterations:
-    (n,); residual: (n,) how far the rows of the worst block are open, relative to the mechanism's size; margin: (n,)
-    1 / condition; error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the
-    size; watch: (n, w) residual of the rows set aside as redundant, relative to the size. margin and error may be given
-    as functions that compute them when they are first read.
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics.
-    absent: names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
-    mechanism_source: the mechanism with the parameters set, or its TOML text as a file holds it, empty if unknown.
-    axis: what pictures and reports show the samples over: 'time'; of driver values given instead of times the input
-    that changes, such as 'crank_angle', or 'sample' where more than one does. t then counts the samples.
+
+    Attributes:
+        t: (n,) times [s]; of a run over driver values the numbers of the samples.
+        outputs: Names of the m outputs: the generalized coordinates q, then the points of interest.
+        coordinate_count: How many of the outputs are generalized coordinates.
+        values: (n, m) in the mechanism's unit of length and rad.
+        rates: (n, m), per second or per unit of the driver on the axis.
+        accelerations: (n, m), the same.
+        fixed: Coordinates that a joint holds at a constant, by name.
+        input_names: Names of the 3 d inputs: value, speed and acceleration of each driver.
+        inputs: (n, 3 d).
+        status: (n,) values of Status.
+        iterations: (n,) Newton iterations.
+        residual: (n,) largest residual of a block, relative to the mechanism's size.
+        margin: (n,) 1 / condition. May be given as a function that is called when the table is first read.
+        error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the size; may be
+            given as a function too.
+        watch_names: Names of the w redundant rows.
+        watch: (n, w) residuals of the redundant rows, relative to the size.
+        length_unit: The mechanism's unit of length.
+        mechanism_source: The mechanism with the parameters set, or its TOML text as a file holds it; empty if unknown.
+        model_description: XML of the FMU that was stepped; empty if none.
+        info: Name, title, versions, token and parameters, as text.
+        events: What happened at a time of the run.
+        absent: Names of columns that were not kept, such as 'coupler.ax'; the tables hold NaN in their places.
+        axis: The quantity over which pictures and reports show the samples: 'time'; for driver values the input that
+            changes, such as 'crank_angle', or 'sample' if several change.
+
     """
 
     t: FloatArray
     outputs: tuple[str, ...]
-    coordinate_count: int  # how many of the outputs are generalized coordinates
+    coordinate_count: int
     values: FloatArray
     rates: FloatArray
     accelerations: FloatArray
@@ -105,8 +122,8 @@ class Run:
     watch: FloatArray
     length_unit: str = "m"
     mechanism_source: Mechanism | str = ""
-    model_description: str = ""  # of the FMU that was stepped, as XML
-    info: Mapping[str, str] = field(default_factory=dict)  # name, title, versions, token, parameters
+    model_description: str = ""
+    info: Mapping[str, str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     absent: frozenset[str] = frozenset()
     axis: str = TIME
@@ -160,8 +177,10 @@ class Run:
         return np.asarray(self.status <= Status.BRIDGED)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all tables as numbers, for copies and for other processes."""
-        return {**self.__dict__, "margin": self.margin, "error": self.error}
+        """Return all tables as numbers and the mechanism as text, for copies and for other processes."""
+        state = {**self.__dict__, "margin": self.margin, "error": self.error, "mechanism_source": self.mechanism_text}
+        state.pop("mechanism", None)  # a mechanism has views of its tables, which cannot be sent
+        return state
 
     def __repr__(self) -> str:
         name = self.info.get("name", "run")

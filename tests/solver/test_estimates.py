@@ -125,6 +125,7 @@ def test_a_run_that_travels_has_its_estimates_with_it() -> None:
     there: Run = pickle.loads(pickle.dumps(run))  # noqa: S301
     np.testing.assert_array_equal(there.error, run.error)
     np.testing.assert_array_equal(there.margin, run.margin)
+    assert there.mechanism == run.mechanism
 
 
 def test_a_run_has_the_estimates_of_its_poses(fourbar: Solver) -> None:
