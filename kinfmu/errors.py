@@ -37,15 +37,15 @@ class KinfmuError(Exception):
 
 
 class RequestError(KinfmuError):
-    """A request is invalid: an unknown name or a wrong value; on the command line: wrong usage."""
+    """An invalid request: an unknown name or a wrong value; on the command line: wrong usage."""
 
 
 class MechanismError(KinfmuError):
-    """The mechanism as written is invalid."""
+    """An invalid mechanism, as written in a file or in Python."""
 
 
 class InconsistentError(MechanismError):
-    """A constraint contradicts the others; `gap` is the misfit as a length."""
+    """A constraint that contradicts the others; `gap` is the misfit as a length."""
 
 
 class MobilityError(MechanismError):
@@ -53,15 +53,15 @@ class MobilityError(MechanismError):
 
 
 class AssemblyError(KinfmuError):
-    """The bodies cannot be assembled near the start pose."""
+    """Bodies that cannot be assembled near the start pose."""
 
 
 class AmbiguousStartError(AssemblyError):
-    """The start pose lies where branches cross, so the branch is not defined."""
+    """A start pose where branches cross, so that the branch is not defined."""
 
 
 class PoseError(KinfmuError):
-    """A sample is unreachable, or the solver did not converge."""
+    """A sample that is unreachable, or where the solver did not converge."""
 
 
 class CompilerError(KinfmuError):

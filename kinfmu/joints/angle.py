@@ -11,7 +11,7 @@ from kinfmu.units import Radians
 
 @dataclass(frozen=True)
 class Angle(Held):
-    """The angle of one body is held at a value: the body moves without turning.
+    """A fixed angle of one body: the body moves without turning.
 
         Phi = phi_i - value        (1 row)
 

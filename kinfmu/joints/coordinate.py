@@ -12,7 +12,7 @@ from kinfmu.units import Length
 
 @dataclass(frozen=True)
 class Coordinate(Held):
-    """A world coordinate of a point is held at a value: the point slides along a line parallel to an axis.
+    """A fixed world coordinate of a point: the point slides along a line parallel to an axis.
 
         Phi = (r_i + A_i s_a)_x - value     or the same with y        (1 row, scale 1)
 

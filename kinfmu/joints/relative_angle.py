@@ -11,7 +11,7 @@ from kinfmu.units import Radians
 
 @dataclass(frozen=True)
 class RelativeAngle(Held):
-    """The angle of one body relative to another is held at a value: they turn together.
+    """A fixed angle of one body relative to another: they turn together.
 
         Phi = phi_j - phi_i - value        (1 row)
 

@@ -8,7 +8,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.laws.law import Constant, Law, LawQuantity, Path
 from kinfmu.measures.arithmetic import Value
 
-HIGHEST_DEGREE = 20  # beyond, doubles hold little of a polynomial but its rounding
+HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error
 
 
 @dataclass(frozen=True)

@@ -39,15 +39,19 @@ class Rise(Law):
 
 
 def polynomial(origin: float, *coefficients: float) -> Piece:
-    """A piece that is a polynomial of s = x - origin, highest power first."""
+    """Return a piece that is a polynomial of s = x - origin, highest power first."""
     return origin, coefficients, 0.0, 0.0, 0.0
 
 
 def normalized(half: Sequence[tuple[float, Piece]]) -> CurveData:
-    """The curve that is 0 before 0, 1 after 1, and between them N(x) = 1 - N(1 - x).
+    """Return the curve that is 0 before 0, 1 after 1, and in between satisfies N(x) = 1 - N(1 - x).
 
-    half: the pieces of the first half, each with where it begins. The second half is their mirror image about
-    (1/2, 1/2) with origins mirrored too, so that both ends are met to the last bit.
+    The second half is the mirror image of the first about (1/2, 1/2), with origins mirrored too, so that both ends are
+    met to the last bit.
+
+    Args:
+        half: The pieces of the first half, each with the x where it begins.
+
     """
     begins = [begin for begin, _ in half]
     ends = [*begins[1:], 0.5]
@@ -100,7 +104,7 @@ _SINE_WAVE = 0.25 / (4.0 + math.pi)
 
 @dataclass(frozen=True)
 class ModifiedSine(Rise):
-    """A rise whose acceleration is a sine, quicker in the first and last eighth than between them.
+    """A rise whose acceleration is a sine, of higher frequency in the first and last eighth than in between.
 
         N'' = A sin(4 pi x)                     up to 1/8,   A = 4 pi^2 / (4 + pi)
         N'' = A sin(4 pi x / 3 + pi / 3)        up to 7/8

@@ -43,7 +43,7 @@ def floor(x: Value) -> Value:
 
 @singledispatch
 def curve(x: Value, data: CurveData, order: int = 0) -> Value:
-    """The derivative of the given order (0: the value) of a piecewise function at x; data as in `solver.curve`."""
+    """Return the derivative of an order (0: the value) of a piecewise function at x; data as in `solver.curve`."""
     return curve_value(data, order, x)
 
 

@@ -118,7 +118,7 @@ class LawConstant(NamedTuple):
 
 
 def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
-    """The constants of all drivers' laws in file order, without those that an expression gives (`computed`)."""
+    """Yield the constants of all drivers' laws in file order, without those given by an expression (`computed`)."""
     for driver in drivers:
         for key, (value, said) in driver.law.constants().items():
             if ("drivers", driver.name, "law", key) not in computed:
@@ -127,7 +127,7 @@ def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -
 
 
 def with_law_constants(drivers: Sequence[Driver], values: Mapping[str, float]) -> tuple[Driver, ...]:
-    """The drivers with other values of some of those constants."""
+    """Return the drivers with other values of some of those constants."""
 
     def changed(driver: Driver) -> Driver:
         named = {key: f"{driver.name}.{key}" for key in driver.law.constants()}

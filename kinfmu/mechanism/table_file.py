@@ -44,7 +44,7 @@ def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, A
     try:
         lines = content.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise MechanismError(f"{where} is no text file (byte {error.start} is not UTF-8)") from None
+        raise MechanismError(f"{where} is not a text file (byte {error.start} is not UTF-8)") from None
     numbered = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     units, rows = ("", ""), []
     for place, (k, line) in enumerate(numbered):

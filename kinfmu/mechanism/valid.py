@@ -58,7 +58,7 @@ def _is_text(character: str) -> bool:
 
 
 LONGEST = 120
-_LARGEST_WHOLE = 10**40  # whole numbers beyond are shown by their size; Python refuses to print very long ones
+_LARGEST_WHOLE = 10**40  # larger whole numbers are shown by their size; Python refuses to print very long ones
 
 
 class _Quoter(reprlib.Repr):
@@ -82,7 +82,7 @@ class _Quoter(reprlib.Repr):
 
 
 def quoted(value: object) -> str:
-    """'text' in quotes with its line breaks escaped, numbers and lists as they are; LONGEST characters at most."""
+    """Return text in quotes with escaped line breaks, numbers and lists as they are; at most LONGEST characters."""
     shown = _QUOTER.repr(float(value) if isinstance(value, float) else value)  # numpy's floats print their type
     return shown if len(shown) <= LONGEST else shown[: LONGEST - 3] + "..."
 

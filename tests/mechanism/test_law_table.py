@@ -268,7 +268,7 @@ def test_a_wrong_law_is_reported_in_one_line(case: str, tmp_path: Path) -> None:
         (b"0,0\n1,Infinity\n", ", line 2: 'Infinity' must be a number"),
         ("0,0\n1,\u0663\n".encode(), ", line 2: '\u0663' must be a number"),
         (b"0,0\n1," + b"1" * 200_000, ", line 2: field larger than field limit (131072)"),
-        (b"\x00\xff\xfe", " is no text file (byte 1 is not UTF-8)"),
+        (b"\x00\xff\xfe", " is not a text file (byte 1 is not UTF-8)"),
         (b"0,0\n" * 1_000_001, " is too large for a table (largest: 4000000 bytes)"),
     ],
     ids=[
