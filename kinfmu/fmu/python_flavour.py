@@ -41,7 +41,7 @@ CAPABILITIES = {
     "canSerializeFMUstate": True,
     "providesDirectionalDerivative": False,  # pythonfmu's binary rejects all derivatives
 }
-RUN_TIME = ("slave.py", "layout.py", "estimated_rates.py")  # of this package
+RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
 PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source")
 
