@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from kinfmu.drivers import Driver
@@ -26,8 +26,8 @@ class HeldDriver(Held):
     labels: ClassVar[tuple[str, ...]] = ("value",)
 
     name: str
-    driver: Driver
-    value: float
+    driver: Driver = field(metadata={"internal": True})
+    value: float = field(metadata={"internal": True})
 
     def moved(self, dx: float, dy: float) -> HeldDriver:
         measure = self.driver.measured()

@@ -42,9 +42,10 @@ class Key(NamedTuple):
 
 @cache
 def keys_of(cls: Any) -> tuple[Key, ...]:
-    """Return the keys that a class declares, without `type` and `name`, in the order of its fields."""
+    """Return the keys that a class declares, without `type`, `name` and internal fields, in the order of its fields."""
     hints = get_type_hints(cls, include_extras=True)
-    return tuple(_key(cls, field, hints[field.name]) for field in fields(cls) if field.name != "name")
+    keys = [field for field in fields(cls) if field.name != "name" and not field.metadata.get("internal")]
+    return tuple(_key(cls, field, hints[field.name]) for field in keys)
 
 
 def _key(cls: Any, field: Any, hint: Any) -> Key:
