@@ -1,6 +1,6 @@
-"""Figures for paper and pages: of a mechanism, of a run's coordinates, of a run as it moves.
+"""Figures for reports and web pages: of a mechanism, of a run's coordinates, of a moving run.
 
-By matplotlib and Pillow, which load when one is drawn.
+matplotlib and Pillow draw them; they are loaded when first used.
 """
 
 from __future__ import annotations

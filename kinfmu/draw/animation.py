@@ -1,4 +1,4 @@
-"""animate(): the linkage of a run as a moving picture that any page shows."""
+"""animate(): the linkage of a run as a GIF animation."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 DOTS_PER_INCH = 80  # about 600 pixels across
-SHORTEST, LONGEST = 3.0, 8.0  # [s] that the picture plays: the run's own time where that lies between
-PER_SECOND, MOST = 20.0, 100  # pictures; viewers of GIF round their times to hundredths of a second
-COLOURS = 32  # of the whole picture; more cost room and are not seen
-REST = 1.0  # [s] that the last picture of a motion that does not come back stands
-_SAMPLES = 1000  # of the run; paths show no more
-_CLOSED = 1e-3  # of a body's way over the run; a motion that ends so near to where it began repeats
-_TRAIL = 0.12  # of the pictures, over which the trail reaches back
-_FARTHEST = 0.5 * math.pi  # [rad] that a body may turn from picture to picture
-_LARGEST = 1e100  # of positions to draw: squares of larger ones are infinite
+SHORTEST, LONGEST = 3.0, 8.0  # [s], limits of the duration; between them it is the run's own time
+PER_SECOND, MOST = 20.0, 100  # pictures; viewers of GIF round times to hundredths of a second
+COLOURS = 32  # of the whole animation; more make the file larger without a visible difference
+REST = 1.0  # [s] that the last picture is shown if the motion does not return to its start
+_SAMPLES = 1000  # of the run, in a path
+_CLOSED = 1e-3  # of a body's extent over the run; a motion whose end is so near to its start repeats
+_TRAIL = 0.12  # of the pictures, length of a trail
+_FARTHEST = 0.5 * math.pi  # [rad], largest rotation of a body from picture to picture
+_LARGEST = 1e100  # largest position to draw: squares of larger ones are infinite
 _WIDTHS = (1.3, 1.9, 2.6, 3.3)  # [pt] of a trail, along it
 _LOST: palette.Colour = (185, 28, 28)
 
 
 class _Film(NamedTuple):
-    """Samples to show one after the other, and whether the last leads on to the first."""
+    """Samples to show in order, the duration, and whether the motion repeats."""
 
     rows: NDArray[np.int64]
     seconds: float
@@ -59,19 +59,25 @@ class _Film(NamedTuple):
 
 
 def animate(run: Run, path: str | Path) -> None:
-    """Draw the linkage of `run` moving into a .gif file: bodies, joints, cams, wheels, cylinders, paths and trails.
+    """Draw the moving linkage of `run` into a .gif file: bodies, joints, cams, wheels, cylinders, paths and trails.
 
-    The run plays in its own time if that is between SHORTEST and LONGEST, else in the nearer of them, and for LONGEST
-    if it has no time; a motion that ends where it began repeats without a stop. Samples without numbers show the last
-    pose that closed, and say so. The same run gives the same bytes with the same matplotlib and Pillow.
+    The animation takes the run's own time, but at least SHORTEST and at most LONGEST; LONGEST if the run has no time. A
+    motion that ends where it began repeats without a pause. Samples without numbers show the last pose that closed,
+    with a notice. The same run gives the same bytes with the same versions of matplotlib and Pillow.
 
-    Raises FigureError if the run does not hold its mechanism or coordinates of it, has fewer than two samples with
-    numbers or too many turns for its pictures, and for files that cannot be written; MissingPackageError without
-    matplotlib.
+    Args:
+        run: The run.
+        path: The .gif file.
+
+    Raises:
+        FigureError: The run has no mechanism, not all its coordinates, fewer than two samples with numbers, or too many
+            turns for the number of pictures; or the file cannot be written.
+        MissingPackageError: matplotlib is not installed.
+
     """
     path = Path(path)
     if suffix_of(path) != ".gif":
-        raise FigureError(f"{path}: '{path.suffix}' is no moving picture that can be drawn; known: .gif")
+        raise FigureError(f"{path}: '{path.suffix}' is not a known format of animations; known: .gif")
     mechanism, poses = _placed(run, path)
     film = _film(run, poses, path)
     with figure_style(path):
@@ -80,7 +86,7 @@ def animate(run: Run, path: str | Path) -> None:
 
 
 def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
-    """The run's mechanism, and poses (n, 3) by body, the ground too; a gap holds the pose before it."""
+    """Return the run's mechanism, and poses (n, 3) by body and for the ground; gaps hold the pose before them."""
     try:
         mechanism = run.mechanism
     except MechanismError as error:
@@ -98,14 +104,14 @@ def _placed(run: Run, path: Path) -> tuple[Mechanism, dict[str, FloatArray]]:
     held = {body: pose[last] for body, pose in poses.items()}
     for body, pose in held.items():
         if not (np.abs(pose[run.good]) < _LARGEST).all():
-            raise FigureError(f"{path}: the run holds poses of '{body}' that are no numbers, or too large to draw")
+            raise FigureError(f"{path}: the run holds poses of '{body}' that are not numbers or too large to draw")
     return mechanism, held | {GROUND_NAME: np.zeros((len(run), 3))}
 
 
 def _film(run: Run, poses: dict[str, FloatArray], path: Path) -> _Film:
     good = np.flatnonzero(run.good)
     if len(good) < 2:
-        raise FigureError(f"{path}: a moving picture needs two samples with numbers; the run has {len(good)}")
+        raise FigureError(f"{path}: an animation needs two samples with numbers; the run has {len(good)}")
     axis = axis_of(run)
     t = np.abs(axis.values[good[0] :] - axis.values[good[0]])
     seconds = float(np.clip(t[-1], SHORTEST, LONGEST)) if axis.is_time else LONGEST
@@ -118,7 +124,7 @@ def _film(run: Run, poses: dict[str, FloatArray], path: Path) -> _Film:
 
 
 def _check_seen(run: Run, poses: dict[str, FloatArray], rows: NDArray[np.int64], path: Path) -> None:
-    """Raise a FigureError if a body turns so far from picture to picture that it seems to go another way."""
+    """Raise a FigureError if a body turns so far from picture to picture that its direction is not visible."""
     steps = {body: float(np.abs(np.diff(pose[rows, 2])).max()) for body, pose in poses.items()}
     body = max(steps, key=lambda name: steps[name])
     if steps[body] > _FARTHEST:
@@ -132,23 +138,24 @@ def _check_seen(run: Run, poses: dict[str, FloatArray], rows: NDArray[np.int64],
 
 
 def _comes_back(pose: FloatArray) -> bool:
-    """True if a body (n, 3) ends where it began, turns aside."""
+    """Return True if a body (n, 3) ends where it began, up to whole turns."""
     first, last = pose[0], pose[-1]
-    way = np.hypot(*np.ptp(pose[:, :2], axis=0))
+    extent = np.hypot(*np.ptp(pose[:, :2], axis=0))
     turn = (last[2] - first[2] + np.pi) % (2.0 * np.pi) - np.pi
-    return bool(np.hypot(*(last - first)[:2]) <= _CLOSED * way and abs(turn) <= _CLOSED * np.ptp(pose[:, 2]))
+    return bool(np.hypot(*(last - first)[:2]) <= _CLOSED * extent and abs(turn) <= _CLOSED * np.ptp(pose[:, 2]))
 
 
 def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: _Film) -> Iterator[Image]:
-    """The pictures one after the other, all of one size."""
+    """Yield the pictures in order, all of one size."""
     some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
-    ways = {driver.name: 1.0 for driver in mechanism.drivers}
+    directions = {driver.name: 1.0 for driver in mechanism.drivers}
 
     def shown(row: int) -> Instant:
-        return Instant(mechanism, {body: np.vstack([pose[row], pose[some]]) for body, pose in poses.items()}, ways)
+        placed = {body: np.vstack([pose[row], pose[some]]) for body, pose in poses.items()}
+        return Instant(mechanism, placed, directions)
 
     first = shown(int(film.rows[0]))
-    ground = [*supports(first), *rails(first, slides(first))]  # which must not go from side to side
+    ground = [*supports(first), *rails(first, slides(first))]  # the same in all pictures, so that it does not move
     scenes = [_marks(shown(int(row)), ground) for row in film.rows]
     extent = np.vstack([mark.extent() for marks in scenes for mark in marks])
     thinnest = shortest(scenes[0], float(np.ptp(extent, axis=0).max()))
@@ -164,7 +171,7 @@ def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: 
 
 
 def _marks(shown: Instant, ground: Sequence[Mark]) -> list[Mark]:
-    """Everything to draw of one picture, what is drawn later on top."""
+    """Return everything to draw of one picture; later marks cover earlier ones."""
     sliding = slides(shown)
     plates, bars = links(shown, rods(shown, sliding))
     return [
@@ -182,7 +189,7 @@ def _marks(shown: Instant, ground: Sequence[Mark]) -> list[Mark]:
 
 
 def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], ends: tuple[int, int]) -> None:
-    """Where points of interest just came from, the wider the later."""
+    """Draw trails of the points of interest, wider towards the present."""
     first, last = ends
     rows = np.arange(first, last + 1) if first <= last else np.r_[first : len(run), 0 : last + 1]
     bodies = len(mechanism.moving_bodies)
@@ -195,7 +202,7 @@ def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, Float
 
 
 def _clock(sheet: Sheet, run: Run, row: int) -> None:
-    """The time, and whether the run has numbers then."""
+    """Draw the time, and a notice if the run has no numbers then."""
     axis = axis_of(run)
     digits = max(2 - math.floor(math.log10(float(np.ptp(axis.values)))), 0)
     name = "" if axis.is_time else f"{axis.name}{' =' if axis.unit else ''} "
@@ -213,12 +220,12 @@ def _picture(sheet: Sheet) -> Image:
 
     sheet.figure.set_dpi(DOTS_PER_INCH)
     canvas = FigureCanvasAgg(sheet.figure)
-    canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib says no types here
+    canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[no-untyped-call]
 
 
 def _gif(images: Sequence[Image], film: _Film) -> bytes:
-    """All pictures in the colours that they need most, without dots between these."""
+    """Return the pictures as a GIF with their COLOURS most important colours, without dithering."""
     from PIL import Image
 
     width, height = images[0].size
@@ -226,7 +233,7 @@ def _gif(images: Sequence[Image], film: _Film) -> bytes:
     together = Image.new("RGB", (width, height * len(some)))
     for k, image in enumerate(some):
         together.paste(image, (0, k * height))
-    fixed = [*PAPER, *_LOST]  # which the quantizing would mix with others
+    fixed = [*PAPER, *_LOST]  # quantizing would mix them with others
     mixed = together.quantize(COLOURS - len(fixed) // 3, method=Image.Quantize.MEDIANCUT).getpalette() or []
     colours = np.array([*fixed, *mixed[: 3 * COLOURS - len(fixed)]], int).reshape(-1, 3)
     nearest = _nearest(colours)
@@ -245,7 +252,7 @@ def _gif(images: Sequence[Image], film: _Film) -> bytes:
 
 
 def _nearest(colours: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Which of some colours (k, 3) is nearest to one of 32 shades of red, green and blue, (32, 32, 32)."""
+    """Return the index of the nearest of some colours (k, 3) for 32 shades of red, green and blue, (32, 32, 32)."""
     shades = np.arange(32) * 255 // 31
     red, green, blue = np.meshgrid(shades, shades, shades, indexing="ij")
     apart = sum((part[..., None] - colours[:, k]) ** 2 for k, part in enumerate((red, green, blue)))

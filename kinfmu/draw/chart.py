@@ -1,4 +1,4 @@
-"""Paper for charts: log-log axes in the house's look, and names that stand beside what they name."""
+"""Style of charts: axes with a grid, and names next to their curves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SMALL = 8.0  # [pt]
 
 
 class Look(NamedTuple):
-    """How the curves of one engine are drawn."""
+    """Style of the curves of one engine."""
 
     colour: Colour
     width: float = 1.4  # [pt]
@@ -23,7 +23,7 @@ class Look(NamedTuple):
 
 
 def dress(axes: Axes, title: str) -> None:
-    """Grey scales, a faint grid of decades, no frame."""
+    """Give axes grey scales, a faint grid and no frame."""
     grey = ink(GREY)
     for side, spine in axes.spines.items():
         spine.set_visible(side in ("left", "bottom"))
@@ -37,7 +37,7 @@ def dress(axes: Axes, title: str) -> None:
 
 
 def named(axes: Axes, at: tuple[float, float], text: str, colour: Colour, **where: Any) -> None:
-    """A name beside its curve, in its colour, on a bit of paper."""
+    """Write a name next to its curve, in its colour, on a white background."""
     axes.annotate(
         text,
         at,

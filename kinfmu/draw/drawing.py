@@ -1,4 +1,4 @@
-"""figure(): a mechanism with its names, as a textbook would print it."""
+"""figure(): a textbook figure of a mechanism with its names."""
 
 from __future__ import annotations
 
@@ -24,26 +24,34 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.slides import rods, slides
 
 MOST_NAMES = 90  # more would cover the drawing
-_SEEN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)  # joints that always have a picture
+_ALWAYS_DRAWN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)
 
 
 def figure(mechanism: Mechanism, path: str | Path, at: float | None = None) -> None:
-    """Draw a mechanism into a .svg or .png file, where its run starts or, where links hide one another there, later.
+    """Draw a mechanism into a .svg or .png file.
 
-    at: value of the only driver at which it is drawn instead [rad or length].
+    The figure shows bodies, joints, drivers and points of interest with their names, and the paths of these points over
+    the file's run; the axes are in the mechanism's unit of length, with equal scales. The same mechanism gives the same
+    bytes. A mechanism that closes but cannot be solved is drawn too.
 
-    Bodies, joints, drivers and points of interest with their names and the paths of these points over the file's run;
-    axes in the mechanism's unit of length, both of one scale. The same mechanism gives the same bytes. A mechanism that
-    cannot be solved but closes is drawn too.
+    Args:
+        mechanism: The mechanism.
+        path: The .svg or .png file.
+        at: Value of the only driver [rad or length]. Default: the start of the run, or a later sample if links hide one
+            another at the start.
 
-    Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib,
-    AssemblyError or MechanismError if the mechanism does not close, FigureError for a value that cannot be reached.
+    Raises:
+        FigureError: The suffix is unknown, the file cannot be written, or `at` cannot be reached.
+        MissingPackageError: matplotlib is not installed.
+        AssemblyError: The mechanism does not close.
+        MechanismError: The mechanism is invalid.
+
     """
     write(Path(path), lambda: sheet_of(instant(mechanism, at)).figure)
 
 
 def sheet_of(shown: Instant) -> Sheet:
-    """The sheet with everything on it; needs matplotlib."""
+    """Return the sheet with everything drawn on it; needs matplotlib."""
     marks = _marks(shown)
     mechanism = shown.mechanism
     extent = np.vstack([mark.extent() for mark in marks])
@@ -55,21 +63,22 @@ def sheet_of(shown: Instant) -> Sheet:
         place(names, sheet)
     else:
         notes.append(f"{len(names)} names left out")
-    unseen = _unseen(mechanism, marks)
-    if unseen:
-        notes.append(f"not drawn: {listed(unseen)}")
+    missing = _not_drawn(mechanism, marks)
+    if missing:
+        notes.append(f"not drawn: {listed(missing)}")
     sheet.note("; ".join(notes))
     return sheet
 
 
-def _unseen(mechanism: Mechanism, marks: list[Mark]) -> list[str]:
-    """Names of joints that have no picture, such as a held angle, or wheels that no pins hold."""
-    meshing = {mark.name for mark in marks if isinstance(mark, MeshName)}
-    return [joint.name for joint in mechanism.joints if not isinstance(joint, _SEEN) and joint.name not in meshing]
+def _not_drawn(mechanism: Mechanism, marks: list[Mark]) -> list[str]:
+    """Return the names of joints that are not drawn, such as a held angle, or wheels without pins."""
+    drawn = {mark.name for mark in marks if isinstance(mark, MeshName)}
+    joints = [joint for joint in mechanism.joints if not isinstance(joint, _ALWAYS_DRAWN)]
+    return [joint.name for joint in joints if joint.name not in drawn]
 
 
 def _marks(shown: Instant) -> list[Mark]:
-    """Everything to draw, what is drawn later on top."""
+    """Return everything to draw; later marks cover earlier ones."""
     sliding = slides(shown)
     plates, bars = links(shown, rods(shown, sliding))
     return [

@@ -1,4 +1,4 @@
-"""The ground: supports of pins, rails of slides, hatched."""
+"""The ground: supports of pins and rails of slides, with hatching."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from kinfmu.scene.instant import Instant
 
 EDGE = palette.darker(palette.GROUND)
 _HEIGHT, _HALF, _HATCH = 13.0, 8.0, 4.5  # [pt]
-_CROWDED = 0.8  # cosine to a link beyond which a support would hide it
-_SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # a support stands below where there is room
+_CROWDED = 0.8  # cosine of the angle to a link; above it a support would hide the link
+_SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # of a support; below is preferred
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,10 @@ class Support(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Rail(Mark):
-    """A straight line of the ground on which a block slides: ends (2, 2); towards: unit vector into the ground.
+    """A straight line of the ground on which a block slides.
 
-    lift: from the line to the rail [pt]: half of the block's height; reach: beyond the ends [pt].
+    ends: (2, 2); towards: unit vector into the ground; lift: distance of the rail from the line [pt], half of the
+    block's height; reach: additional length at both ends [pt].
     """
 
     name: str
@@ -79,7 +80,7 @@ class Rail(Mark):
 
 
 def hatched(sheet: Sheet, line: FloatArray, towards: FloatArray, size: float) -> None:
-    """A line (2, 2) with strokes on the side of the ground; size: of a usual point there [length]."""
+    """Draw a line (2, 2) with hatching on the side of the ground; size: [length] of a printer's point there."""
     length = float(np.hypot(*(line[1] - line[0])))
     along = (line[1] - line[0]) / length
     count = max(int(length / (4.5 * size)), 3)
@@ -93,8 +94,8 @@ def hatched(sheet: Sheet, line: FloatArray, towards: FloatArray, size: float) ->
 
 
 def supports(shown: Instant) -> list[Mark]:
-    """Supports of all points of the ground that hold a pin."""
-    held: dict[tuple[float, float], list[FloatArray]] = {}  # what leaves a pin of the ground, towards where
+    """Return supports of all points of the ground that hold a pin."""
+    leaving: dict[tuple[float, float], list[FloatArray]] = {}  # vectors from a pin of the ground to its bodies
     for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Distance | DistanceDriver | Fixed | PointOnLine):
             continue
@@ -105,18 +106,18 @@ def supports(shown: Instant) -> list[Mark]:
                 body = body_of(other)
                 ends = [shown.point(f"{body}.{name}") for name in _points(shown, body)]
                 ends.append(np.mean(ends, axis=0))  # a plate covers what lies between its points
-                held.setdefault((float(at[0]), float(at[1])), []).extend(end - at for end in ends)
-    return [Support(np.array(at), _free_side(leaving)) for at, leaving in held.items()]
+                leaving.setdefault((float(at[0]), float(at[1])), []).extend(end - at for end in ends)
+    return [Support(np.array(at), _free_side(vectors)) for at, vectors in leaving.items()]
 
 
 def _points(shown: Instant, body: str) -> list[str]:
     return [name for one in shown.mechanism.bodies if one.name == body for name in one.points]
 
 
-def _free_side(leaving: list[FloatArray]) -> FloatArray:
-    """Below if nothing goes there, else the side that is furthest from everything."""
-    furthest = max(float(np.hypot(*way)) for way in leaving)
-    ways = [way / np.hypot(*way) for way in leaving if np.hypot(*way) > 1e-6 * furthest]
-    crowded = [max((float(np.dot(side, way)) for way in ways), default=-1.0) for side in _SIDES]
+def _free_side(vectors: list[FloatArray]) -> FloatArray:
+    """Return the side of a support: below if no vector points there, else the side furthest from all vectors."""
+    longest = max(float(np.hypot(*vector)) for vector in vectors)
+    directions = [vector / np.hypot(*vector) for vector in vectors if np.hypot(*vector) > 1e-6 * longest]
+    crowded = [max((float(np.dot(side, way)) for way in directions), default=-1.0) for side in _SIDES]
     best = 0 if crowded[0] < _CROWDED else int(np.argmin(np.round(crowded, 6)))
     return np.array(_SIDES[best])

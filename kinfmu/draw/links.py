@@ -1,4 +1,4 @@
-"""Bodies as links: bars and plates through their points; massless bars."""
+"""Links: bars and plates through the points of bodies, and massless bars."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import points_of, rim
 
 _EDGE = 0.9  # [pt]
-_NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # parts of an edge beside which its name may stand
+_NAMED_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # of the length of an edge, places for its name
 
 
 @dataclass(frozen=True, eq=False)
 class Link(Mark):
-    """A moving body: corners (k, 2) along it or, if closed, around it; rods: (r, 2, 2) ends of its slots and rods."""
+    """A moving body: corners (k, 2), around it if closed, else along it; rods: ends (r, 2, 2) of slots and rods."""
 
     name: str
     corners: FloatArray
@@ -42,14 +42,14 @@ class Link(Mark):
         routes += [(rod, False) for rod in self.rods]
         if not routes:
             return [Name(self.name, self.corners, 2.0 * clearance, edge, italic=True, rank=3)]
-        for route, is_closed in routes:  # first all edges, so that the parts look like one
+        for route, is_closed in routes:  # all edges first, so that the parts look like one body
             sheet.line(route, width + _EDGE, edge, closed=is_closed, matters=0.8)
         for route, is_closed in routes:
             sheet.line(route, width - _EDGE, fill, closed=is_closed, fill=fill if is_closed else None, matters=0.0)
         edges = [ends for route, is_closed in routes for ends in pairwise([*route, *route[: int(is_closed)]])]
         edges.sort(key=lambda ends: -float(np.hypot(*(ends[1] - ends[0]))))
         anchors = [a + part * (b - a) for a, b in edges for part in _NAMED_AT]
-        if self.is_closed:  # inside if there is room
+        if self.is_closed:  # its name is inside, if it fits
             anchors, clearance = [self.corners.mean(axis=0), *anchors], 0.0
         return [Name(self.name, np.array(anchors), clearance, edge, italic=True, rank=2)]
 
@@ -74,7 +74,7 @@ class ThinBar(Mark):
 
 
 def links(shown: Instant, rods: Mapping[str, FloatArray]) -> tuple[list[Mark], list[Mark]]:
-    """All moving bodies and massless bars: the plates, which lie below, and the bars.
+    """Return all moving bodies and massless bars: the plates, which are drawn first, and the bars.
 
     rods: by body, ends (r, 2, 2) of its slots and rods in its own frame.
     """
@@ -95,7 +95,7 @@ def links(shown: Instant, rods: Mapping[str, FloatArray]) -> tuple[list[Mark], l
 
 
 def shortest(marks: list[Mark], size: float) -> float:
-    """Shortest link of a figure [length], `size` if none has a length."""
+    """Return the length of the shortest link of a figure, `size` if there is none."""
     lengths = []
     for mark in marks:
         if isinstance(mark, Link | ThinBar):

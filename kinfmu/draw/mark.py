@@ -1,4 +1,4 @@
-"""The contract of a mark: one thing that a figure shows."""
+"""The base class of marks: one mark is one thing that a figure shows."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from kinfmu.run import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Mark(ABC):
-    """A leaf is a frozen dataclass in world coordinates; its ornaments are sized on the sheet."""
+    """A thing to draw; subclasses are frozen dataclasses in world coordinates, and the sheet sets sizes of details."""
 
     @abstractmethod
     def extent(self) -> FloatArray:
-        """World coordinates (k, 2) that the sheet must hold."""
+        """Return world coordinates (k, 2) that must be on the sheet."""
 
     @abstractmethod
     def draw(self, sheet: Sheet) -> list[Name]:
-        """Put it on the sheet, over what is there already; its names, to be placed once everything is drawn."""
+        """Draw it over what is on the sheet, and return its names, which are placed when everything is drawn."""

@@ -1,4 +1,4 @@
-"""Drivers: cylinders, and arrows with the name and the value at which the figure stands."""
+"""Drivers: cylinders and arrows, with name and drawn value."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from kinfmu.scene.instant import Instant
 
 COLOUR: palette.Colour = (185, 28, 28)
 _RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow
-_PUSH, _BESIDE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from the line it is about
+_PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
 _HEAD, _HALF_HEAD = 7.0, 2.8  # [pt]
 _STROKE = 1.4  # [pt]
 _BARREL, _ROD = 5.5, 1.9  # [pt]; half widths of a cylinder
-_TRIES = 12  # places tried for an arrow
+_TRIES = 12  # places for an arrow that are compared
 
 
 @dataclass(frozen=True, eq=False)
 class Turn(Mark):
-    """A curved arrow about a pin; way: 1.0 counter-clockwise, -1.0 clockwise; beside: angle of the driven body."""
+    """A curved arrow about a pin; sense: 1.0 counter-clockwise, -1.0 clockwise; heading: of the driven body [rad]."""
 
     text: str
     centre: FloatArray
-    way: float
-    beside: float
+    sense: float
+    heading: float
 
     def extent(self) -> FloatArray:
         return self.centre[None]
@@ -47,15 +47,15 @@ class Turn(Mark):
         return [Name(self.text, route[[len(route) // 2, -1, 0]], 4.0, COLOUR, rank=1)]
 
     def _route(self, sheet: Sheet) -> FloatArray:
-        """The arc where it covers least, the first one just ahead of the body."""
+        """Return the arc that covers least; the first one compared begins just ahead of the body."""
         radius = _RADIUS * sheet.ornament
-        starts = [self.beside + self.way * (math.radians(25.0) + k * 2.0 * math.pi / _TRIES) for k in range(_TRIES)]
-        return _freest(sheet, [arc(self.centre, radius, start, start + self.way * _TURN) for start in starts])
+        starts = [self.heading + self.sense * (math.radians(25.0) + k * math.tau / _TRIES) for k in range(_TRIES)]
+        return _freest(sheet, [arc(self.centre, radius, start, start + self.sense * _TURN) for start in starts])
 
 
 @dataclass(frozen=True, eq=False)
 class Push(Mark):
-    """A straight arrow beside a point that is driven along a unit vector."""
+    """A straight arrow next to a point that is driven along a unit vector."""
 
     text: str
     at: FloatArray
@@ -75,7 +75,7 @@ class Push(Mark):
         half = 0.5 * _PUSH * size * self.along
         shaft = np.array([part * half for part in (-1.0, -0.5, 0.0, 0.5, 1.0)]) + self.at
         offsets = [way * side * across for way in (1.0, 1.6) for side in (1.0, -1.0)]
-        return _freest(sheet, [shaft + _BESIDE * size * offset for offset in offsets])
+        return _freest(sheet, [shaft + _DISTANCE * size * offset for offset in offsets])
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +110,13 @@ class Cylinder(Mark):
 
 
 def motion(shown: Instant) -> list[Mark]:
-    """One mark a driver."""
+    """Return one mark for each driver."""
     return [_mark(shown, driver) for driver in shown.drivers]
 
 
 def _mark(shown: Instant, driver: Driver) -> Mark:
-    value, way = shown.value(driver.name), shown.ways[driver.name]
-    text = f"{driver.name} = {told_value(shown, driver, value)}"
+    value, direction = shown.value(driver.name), shown.directions[driver.name]
+    text = f"{driver.name} = {value_text(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
         (shape,) = (one for one in cylinder_shapes(shown) if one.driver == driver.name)
         return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel, shape.rod)
@@ -124,17 +124,17 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
         a, b = driver.between
         e = np.array(unit_vector(driver.axis))
         ends = shown.placed(body_of(a), np.array([[0.0, 0.0], e]))
-        return Push(text, shown.point(b), way * (ends[1] - ends[0]))
+        return Push(text, shown.point(b), direction * (ends[1] - ends[0]))
     if isinstance(driver, CoordinateDriver):
         along = np.array([1.0, 0.0] if driver.axis == "x" else [0.0, 1.0])
-        return Push(text, shown.point(driver.of), way * along)
+        return Push(text, shown.point(driver.of), direction * along)
     *held, body = driver.bodies()
     centre = _pivot(shown, body, held[0] if held else GROUND_NAME)
-    return Turn(text, centre, way, _heading(shown, body, centre))
+    return Turn(text, centre, direction, _heading(shown, body, centre))
 
 
-def told_value(shown: Instant, driver: Driver, value: float) -> str:
-    """A driver's value with its unit, to a tenth of a degree or to four digits of the mechanism's size."""
+def value_text(shown: Instant, driver: Driver, value: float) -> str:
+    """Return a driver's value with its unit, to a tenth of a degree or to four digits of the mechanism's size."""
     if driver.quantity.kind == "angle":
         return f"{round(math.degrees(value), 1) + 0.0:.6g}\N{DEGREE SIGN}"
     finest = 4 - math.ceil(math.log10(size_of(shown.mechanism)))
@@ -142,7 +142,7 @@ def told_value(shown: Instant, driver: Driver, value: float) -> str:
 
 
 def _pivot(shown: Instant, body: str, against: str) -> FloatArray:
-    """The pin between two bodies, else the first pin of the body, else its frame."""
+    """Return the pin between two bodies, else the first pin of the body, else the origin of its frame."""
     pins = [joint for joint in shown.joints if isinstance(joint, Revolute) and body in joint.bodies()]
     for joint in sorted(pins, key=lambda joint: against not in joint.bodies()):
         return shown.point(joint.between[0])
@@ -150,15 +150,15 @@ def _pivot(shown: Instant, body: str, against: str) -> FloatArray:
 
 
 def _heading(shown: Instant, body: str, centre: FloatArray) -> float:
-    """Angle [rad] from a pin to the point of the body that is furthest from it."""
+    """Return the angle [rad] of the line from a pin to the point of the body furthest from it."""
     found = next(one for one in shown.mechanism.bodies if one.name == body)
-    ways = [shown.point(f"{body}.{name}") - centre for name in found.points]
-    furthest = max(ways, key=lambda way: float(np.hypot(*way)), default=np.zeros(2))
+    vectors = [shown.point(f"{body}.{name}") - centre for name in found.points]
+    furthest = max(vectors, key=lambda vector: float(np.hypot(*vector)), default=np.zeros(2))
     return math.atan2(furthest[1], furthest[0]) if furthest.any() else shown.angle(body)
 
 
 def _freest(sheet: Sheet, routes: list[FloatArray]) -> FloatArray:
-    """The route that runs over least; an early one where several are alike."""
+    """Return the route that covers least; of nearly equal ones the first."""
     covered = sheet.covered
     costs = []
     for k, route in enumerate(routes):
@@ -169,7 +169,7 @@ def _freest(sheet: Sheet, routes: list[FloatArray]) -> FloatArray:
 
 
 def _arrow(sheet: Sheet, route: FloatArray) -> None:
-    """A stroke with a head at its end."""
+    """Draw a line with an arrow head at its end."""
     size = sheet.ornament
     tip, before = route[-1], route[-2]
     along = (tip - before) / np.hypot(*(tip - before))

@@ -11,22 +11,22 @@ from kinfmu.draw.sheet import FONT, INK, LINE, Sheet
 from kinfmu.run import FloatArray
 from kinfmu.scene.palette import Colour
 
-_DIRECTIONS = 16  # in which a name may stand beside its anchor
-_FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt] from where it would touch
-_LEADER_FROM = 9.0  # [pt]; a name further off is tied to its anchor by a thin line
-_AIR, _GAP = 1.5, 3.0  # [pt] above and below a name, and beside it
-_OVERLAP, _OFF_SHEET, _DISTANCE, _TILT = 60.0, 200.0, 0.12, 0.05  # costs beside 1 for a dot of what is drawn
-_CROWD, _APART = 0.8, 5.0  # cost of another name nearer than that [pt], with which it would be read as one
+_DIRECTIONS = 16  # from an anchor to a place for its name
+_FURTHER = (0.0, 4.0, 9.0, 16.0, 26.0, 38.0)  # [pt], additional distances
+_LEADER_FROM = 9.0  # [pt]; a leader line connects a name that is further away with its anchor
+_AIR, _GAP = 1.5, 3.0  # [pt], margins above and below a name, and left and right of it
+_OVERLAP, _OFF_SHEET, _DISTANCE, _TILT = 60.0, 200.0, 0.12, 0.05  # costs, relative to 1 for a covered dot
+_CROWD, _APART = 0.8, 5.0  # cost of another name nearer than that [pt], because they would be read as one
 _BROKEN = 0.6  # cost of a name in several lines
-_ROUNDS = 6  # in which names choose again, at most
+_ROUNDS = 6  # at most, in which names are placed again
 
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """A name and where it may stand.
+    """A name and its possible places.
 
-    anchors: (k, 2) [length], the best first; clearance: [pt] from an anchor, 0 if it may stand on the first one itself;
-    rank: names of a lower rank choose first.
+    anchors: (k, 2) [length], the best first; clearance: distance from an anchor [pt], 0 if the name may be on the first
+    anchor; rank: names of a lower rank are placed first.
     """
 
     text: str
@@ -39,8 +39,10 @@ class Name:
 
 @dataclass(frozen=True, eq=False)
 class _Options:
-    """Where a name may stand: middles and half sizes (s, 2) [pt], its text there, the anchors (s, 2) [pt] that it would
-    belong to, and what it costs (s,) as long as no other name stands.
+    """Possible places of a name.
+
+    spots, halves: middles and half sizes (s, 2) [pt]; texts: its text there; homes: the anchors (s, 2) [pt]; costs:
+    (s,), without other names.
     """
 
     spots: FloatArray
@@ -50,11 +52,11 @@ class _Options:
     costs: FloatArray
 
     def box(self, k: int) -> FloatArray:
-        """Lower left and upper right corner, (4,), at spot k."""
+        """Return the lower left and upper right corner, (4,), at spot k."""
         return np.concatenate([self.spots[k] - self.halves[k], self.spots[k] + self.halves[k]])
 
     def best(self, taken: Sequence[FloatArray]) -> int:
-        """The spot that costs least beside boxes (4,) that are taken."""
+        """Return the spot of the least cost, given boxes (4,) of other names."""
         costs = self.costs.copy()
         for box in taken:
             middle, size = (box[:2] + box[2:]) / 2.0, (box[2:] - box[:2]) / 2.0
@@ -64,9 +66,9 @@ class _Options:
 
 
 def place(names: Sequence[Name], sheet: Sheet) -> None:
-    """Write each name where it costs least: near its anchor, on free paper.
+    """Write each name at the place of the least cost: near its anchor, on free paper.
 
-    Names choose one after the other, then again, now that the others stand, until none moves.
+    Names are placed one after another, then again with the others in place, until none moves.
     """
     names = sorted(names, key=lambda name: name.rank)
     options = [_options(name, sheet) for name in names]
@@ -84,7 +86,7 @@ def place(names: Sequence[Name], sheet: Sheet) -> None:
 
 
 def _options(name: Name, sheet: Sheet) -> _Options:
-    """All spots of a name, in one line and, where it is a list, in one line for each of its parts."""
+    """Return all spots of a name, on one line and, if it is a list, with one line for each part."""
     anchors, corner = sheet.to_paper(name.anchors), sheet.to_paper(sheet.high) + sheet.beyond
     found = []
     for broken, text in enumerate(dict.fromkeys([name.text, name.text.replace(", ", ",\n")])):
@@ -98,7 +100,7 @@ def _options(name: Name, sheet: Sheet) -> _Options:
 
 
 def _half_size(text: str, *, italic: bool) -> FloatArray:
-    """Half of width and height of a name [pt]."""
+    """Return half of width and height of a name [pt]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
@@ -111,7 +113,7 @@ def _half_size(text: str, *, italic: bool) -> FloatArray:
 def _spots(
     anchors: FloatArray, half: FloatArray, clearance: float, *, can_stand_on: bool
 ) -> tuple[FloatArray, list[int], FloatArray]:
-    """Middles (s, 2) [pt] where a name may stand, the anchor of each, and what the distance costs."""
+    """Return possible middles (s, 2) [pt] of a name, the anchor of each, and the cost of its distance."""
     spots, homes, costs = [], [], []
     for home, anchor in enumerate(anchors):
         if can_stand_on and home == 0:
@@ -130,7 +132,7 @@ def _spots(
 
 
 def _covering(spots: FloatArray, half: FloatArray, covered: FloatArray, corner: FloatArray) -> FloatArray:
-    """What it costs to cover dots, or to leave the sheet, at each spot (s,)."""
+    """Return the cost (s,) of covered dots and of leaving the sheet at each spot."""
     within = (covered[:, :2] > spots.min(axis=0) - half) & (covered[:, :2] < spots.max(axis=0) + half)
     covered = covered[within.all(axis=1)]
     near = np.abs(covered[None, :, :2] - spots[:, None, :])  # (s, k, 2)
@@ -140,7 +142,7 @@ def _covering(spots: FloatArray, half: FloatArray, covered: FloatArray, corner: 
 
 
 def _lead(sheet: Sheet, home: FloatArray, spot: FloatArray, half: FloatArray, clearance: float) -> None:
-    """A thin line from an anchor to a name that stands far off."""
+    """Draw a leader line from an anchor to a name that is far away."""
     nearest = np.clip(home, spot - half, spot + half)
     distance = float(np.hypot(*(nearest - home)))
     if distance - clearance > _LEADER_FROM:

@@ -18,13 +18,13 @@ from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.slides import Slide
 
-_SAME = 1e-6  # of the size; points nearer than that are one place
-_ORDER = ("loose", "slide", "weld", "pin")  # what is drawn where several are in one place: the last of these
+_SAME = 1e-6  # of the size; points that are nearer are one place
+_ORDER = ("loose", "slide", "weld", "pin")  # kinds of places; if one place has several, the last one is drawn
 
 
 @dataclass(eq=False)
 class _Place:
-    """What is in one place: kinds of _ORDER, names of joints, of points, of points of interest."""
+    """The content of one place: kinds of _ORDER, names of joints, of points, and of points of interest."""
 
     at: FloatArray
     kinds: set[str] = field(default_factory=set)
@@ -35,9 +35,9 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class Pin(Mark):
-    """One place with a name: a pin, a weld, a loose point of a body, or nothing but a point of interest.
+    """One place with a name: a pin, a weld, a loose point of a body, or only a point of interest.
 
-    colour: of the point of interest that is here, None if there is none.
+    colour: of the point of interest at this place, None if there is none.
     """
 
     at: FloatArray
@@ -67,7 +67,7 @@ class Pin(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Path(Mark):
-    """Where a point of interest goes over the run: points (n, 2), NaN in gaps."""
+    """The path of a point of interest over the run: points (n, 2), NaN in gaps."""
 
     points: FloatArray
     colour: palette.Colour
@@ -81,7 +81,7 @@ class Path(Mark):
 
 
 def paths(shown: Instant) -> list[Mark]:
-    """Coupler curves of the points of interest."""
+    """Return the paths of the points of interest."""
     first = len(shown.mechanism.moving_bodies)
     return [
         Path(shown.track(point)[1:], palette.body(first + index))
@@ -91,7 +91,7 @@ def paths(shown: Instant) -> list[Mark]:
 
 
 def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
-    """All places that have a name."""
+    """Return all places that have a name."""
     mechanism = shown.mechanism
     names = list(shown.body_points)
     where = np.array([shown.point(name) for name in names]).reshape(-1, 2)
@@ -115,7 +115,7 @@ def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
 
 
 def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Place]) -> None:
-    """What joints and cylinders are in which place."""
+    """Add the joints and cylinders to the places of their points."""
     for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
             continue
@@ -135,7 +135,7 @@ def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Plac
 
 
 def _pin(place: _Place) -> Pin:
-    """A place with its names: those of its joints, else of its points, then those of interest."""
+    """Return the mark of a place; its names are those of its joints, else of its points, then of points of interest."""
     kind = max(place.kinds, key=_ORDER.index, default="")
     points = [name.partition(".")[2] for name in place.points]
     if kind == "slide" or (kind == "loose" and place.interest):

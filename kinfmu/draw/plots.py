@@ -1,4 +1,4 @@
-"""plot(): coordinates of a run against time or driver values, each with velocity and acceleration, for a report."""
+"""plot(): coordinates of a run over time or driver values, each with velocity and acceleration, for a report."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_COORDINATES = 30  # more make a sheet that nobody prints
-_ABREAST = 3  # coordinates beside each other
-_WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its surroundings
+MOST_COORDINATES = 30  # more make a sheet too large to print
+_ABREAST = 3  # coordinates in a row
+_WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _EDGE = 8.0  # [pt] around the title
@@ -37,15 +37,24 @@ _LOST: palette.Colour = (246, 222, 222)
 
 
 def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
-    """Draw coordinates of `run` against its axis, usually time, into a .svg or .png file, as a report prints them.
+    """Draw coordinates of `run` over its axis, usually time, into a .svg or .png file for a report.
 
-    columns: names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as those of tables; all generalized
-    coordinates if there are none. Each coordinate is a column of three panels: position, velocity and acceleration, in
-    rad and the mechanism's unit of length. Stretches without numbers are gaps on a tinted ground; panels of what was
-    not kept say so. The same run gives the same bytes.
+    Each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of length.
+    Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text "not
+    kept". The same run gives the same bytes.
 
-    Raises RequestError for a name that is no coordinate; FigureError for more than MOST_COORDINATES of them, a run
-    without samples, another suffix, or a file that cannot be written; MissingPackageError without matplotlib.
+    Args:
+        run: The run.
+        path: The .svg or .png file.
+        columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as in tables. Default: all generalized
+            coordinates.
+
+    Raises:
+        RequestError: A name is not a coordinate.
+        FigureError: There are more than MOST_COORDINATES coordinates, the run has no samples, the suffix is unknown, or
+            the file cannot be written.
+        MissingPackageError: matplotlib is not installed.
+
     """
     path = Path(path)
     check_suffix(path)
@@ -54,7 +63,7 @@ def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
 
 
 def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[str, ...]:
-    """Names of coordinates that the run holds."""
+    """Return the names of the coordinates to plot."""
     names = coordinates(run, columns) if columns else run.names or run.outputs
     if len(names) > MOST_COORDINATES:
         raise FigureError(
@@ -100,7 +109,7 @@ def _sheet(run: Run, names: Sequence[str]) -> Figure:
 
 
 def _panel(axes: Axes, run: Run, axis: Axis, name: str, order: int) -> None:
-    """One curve over the whole run."""
+    """Draw one curve over the whole run."""
     column = derivative_name(name, order)
     is_kept = column not in run.absent
     values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan) if is_kept else np.full(len(run), np.nan)
@@ -127,12 +136,12 @@ def _panel(axes: Axes, run: Run, axis: Axis, name: str, order: int) -> None:
 
 
 def _shown(run: Run, axis: Axis, name: str, order: int, known: FloatArray) -> tuple[float, float] | None:
-    """Range of the axis: noise about a constant is a straight line; None where matplotlib's own choice is right."""
+    """Return the range of an axis, so that noise about a constant is a straight line; None for matplotlib's default."""
     if not len(known):
         return -1.0, 1.0
     kind = quantity_of(name).kind
-    alike = [k for k, other in enumerate(run.outputs) if quantity_of(other).kind == kind]
-    positions = run.values[run.good][:, alike]
+    same_kind = [k for k, other in enumerate(run.outputs) if quantity_of(other).kind == kind]
+    positions = run.values[run.good][:, same_kind]
     size = float(np.max(np.abs(positions), initial=0.0, where=np.isfinite(positions)))
     usual = size / (axis.span or 1.0) ** order
     if np.ptp(known) <= ROUND_OFF * np.abs(known).max():
@@ -143,7 +152,7 @@ def _shown(run: Run, axis: Axis, name: str, order: int, known: FloatArray) -> tu
 
 
 def _rows(values: FloatArray) -> NDArray[np.int64]:
-    """Samples that draw the curve as all would: of long runs the extremes of short stretches, and gaps."""
+    """Return samples that give the same picture as all: of long runs the extremes of short intervals, and gaps."""
     count = len(values)
     if count <= 4 * _BINS:
         return np.arange(count)
@@ -163,7 +172,7 @@ def _span(t: FloatArray) -> tuple[float, float]:
 
 
 def _gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
-    """From the last sample with numbers before each gap to the first one after it."""
+    """Return for each gap the last sample with numbers before it and the first one after it."""
     turns = np.flatnonzero(np.diff(np.r_[True, run.good, True].astype(int)))  # first of a gap, first after it, ...
     last = len(run) - 1
     return [

@@ -1,4 +1,4 @@
-"""The sheet of a figure: paper of the mechanism's proportions, strokes in world coordinates, and what they cover."""
+"""The sheet of a figure: paper of the mechanism's proportions, lines in world coordinates, and what they cover."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ INK: Colour = (40, 40, 40)
 GREY: Colour = (110, 110, 110)
 PAPER: Colour = (255, 255, 255)
 INCH = 72.0  # [pt]
-BAR = 9.0  # [pt]; width of a link, where there is room
+BAR = 9.0  # [pt]; largest width of a link
 FONT = 9.0  # [pt]
-LINE = 11.0  # [pt], from line to line of a name in several
-_WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of what is drawn
+LINE = 11.0  # [pt], from line to line of a name in several lines
+_WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of the drawing
 _SMALLEST = 120.0  # [pt]
-_LONG, _LONGEST_STRIP = 6.0, 2.5  # what is longer than it is high, such as a chain, may be wider, up to so many times
-_MARGIN = 34.0  # [pt]; room for supports and names
+_LONG, _LONGEST_STRIP = 6.0, 2.5  # width to height from which a drawing, such as a chain, may be wider; largest factor
+_MARGIN = 34.0  # [pt]; for supports and names
 _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
-_EDGE = 12.0  # [pt] left and below where no axes are drawn
-_FINEST = 0.45  # part of the usual size to which ornaments shrink where links are short
-_SPACING = 3.0  # [pt] between the dots that remember what is covered
+_EDGE = 12.0  # [pt], margin left and below without axes
+_FINEST = 0.45  # smallest factor of the sizes of details, for short links
+_SPACING = 3.0  # [pt] between the dots that record what is covered
 
 
 class Sheet:
-    """An empty sheet for a mechanism that reaches over `extent` (k, 2) and whose shortest link is `shortest` [length].
+    """A sheet for a mechanism within `extent` (k, 2), whose shortest link is `shortest` [length].
 
-    point: how long a point of the printer (1/72 inch) is in the world; fine: size of ornaments against the usual one;
-    unit: of the axes, None for a sheet without them and without names, one of many.
+    unit: of the axes, None for a sheet without axes and names, as in animations; point: length of a printer's point
+    (1/72 inch) in the world; fine: factor of the sizes of details.
     """
 
     def __init__(self, extent: FloatArray, shortest: float, unit: str | None, title: str) -> None:
@@ -54,26 +54,26 @@ class Sheet:
         self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
         self._has_names = unit is not None
         self._layer = 1.0
-        self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], how much it matters
+        self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], weight
         self.figure, self.axes = _paper(paper, self.low, self.high, unit, title)
 
     def to_paper(self, points: ArrayLike) -> FloatArray:
-        """World coordinates (..., 2) as points of the printer from the lower left corner."""
+        """Return world coordinates (..., 2) as printer's points from the lower left corner."""
         return np.asarray((np.asarray(points, dtype=float) - self.low) / self.point)
 
     @property
     def ornament(self) -> float:
-        """A point of the printer for supports and blocks [length], which shrink less than links do."""
+        """Length of a printer's point for supports and blocks [length], which shrink less than links."""
         return float(self.point * (0.35 + 0.65 * self.fine))
 
     @property
     def beyond(self) -> FloatArray:
-        """How far names may reach over the upper right corner, (2,) [pt]."""
+        """Space for names beyond the upper right corner, (2,) [pt]."""
         return np.array([_RIGHT - 2.0, 0.0])
 
     @property
     def covered(self) -> FloatArray:
-        """Dots (k, 3) on what is drawn so far: x, y [pt] from the lower left corner, and how much it matters."""
+        """Dots (k, 3) on what is drawn so far: x, y [pt] from the lower left corner, and weight."""
         return np.vstack([np.empty((0, 3)), *self._dots])
 
     def line(
@@ -87,7 +87,7 @@ class Sheet:
         fill: Colour | None = None,
         style: Any = "solid",
     ) -> None:
-        """A stroke `width` [pt] through points (k, 2), round at its ends; closed and filled if asked for."""
+        """Draw a line of `width` [pt] through points (k, 2) with round ends; matters: its weight for names."""
         from matplotlib.patches import PathPatch
         from matplotlib.path import Path as Outline
 
@@ -112,7 +112,7 @@ class Sheet:
             self.cover(route, matters, width)
 
     def strokes(self, ends: ArrayLike, width: float, colour: Colour) -> None:
-        """Straight strokes with ends (k, 2, 2), all alike, that nobody keeps away from: hatching."""
+        """Draw hatching: straight lines of one style with ends (k, 2, 2), which names may cover."""
         from matplotlib.patches import PathPatch
         from matplotlib.path import Path as Outline
 
@@ -132,7 +132,7 @@ class Sheet:
         fill: Colour | None = None,
         style: Any = "solid",
     ) -> None:
-        """A circle of `radius` [length] with a stroke of `width` [pt]."""
+        """Draw a circle of `radius` [length] with a line of `width` [pt]."""
         from matplotlib.patches import Circle
 
         x, y = np.asarray(centre, dtype=float)
@@ -151,14 +151,14 @@ class Sheet:
             self.cover(arc((x, y), radius, 0.0, 2.0 * np.pi), matters, width)
 
     def track(self, points: FloatArray, width: float, colour: Colour) -> None:
-        """A thin line through points (n, 2) with gaps where they are NaN."""
+        """Draw a thin line through points (n, 2) with gaps where they are NaN."""
         self.axes.plot(*points.T, linewidth=width, color=ink(colour), zorder=self._next(), solid_capstyle="round")
         known = points[np.isfinite(points).all(axis=1)]
         if len(known) > 1:
             self.cover(known, 0.35, width)
 
     def cover(self, route: FloatArray, matters: float, width: float = 0.0) -> None:
-        """Remember that a stroke of `width` [pt] lies along a route (k, 2), for names to keep away from."""
+        """Record that a line of `width` [pt] covers a route (k, 2), which names avoid."""
         if not self._has_names:
             return
         paper = self.to_paper(route)
@@ -176,7 +176,7 @@ class Sheet:
         self._dots.append(np.column_stack([found := np.vstack(dots), np.full(len(found), matters)]))
 
     def text(self, at: ArrayLike, text: str, colour: Colour, *, italic: bool = False) -> None:
-        """A name, of one line or several, with its middle at `at` [pt from the lower left corner]."""
+        """Write a name, of one or several lines, with its middle at `at` [pt from the lower left corner]."""
         x, y = self.low + np.asarray(at, dtype=float) * self.point
         self.axes.text(
             x,
@@ -193,7 +193,7 @@ class Sheet:
         )
 
     def note(self, text: str) -> None:
-        """A sentence below the right end of the title's line."""
+        """Write a sentence below the right end of the title's line."""
         if not text:
             return
         self.axes.text(
@@ -201,25 +201,25 @@ class Sheet:
         )
 
     def _next(self) -> float:
-        """What is drawn later covers what is drawn earlier."""
+        """Return the next layer, which covers all earlier ones."""
         self._layer += 0.001
         return self._layer
 
 
 def ink(colour: Colour) -> tuple[float, float, float]:
-    """A colour as matplotlib takes it."""
+    """Return a colour for matplotlib."""
     red, green, blue = (value / 255.0 for value in colour)
     return red, green, blue
 
 
 def arc(centre: ArrayLike, radius: float, first: float, last: float) -> FloatArray:
-    """Points (k, 2) on a circle from one angle [rad] to another."""
+    """Return points (k, 2) on a circle from one angle [rad] to another."""
     angles = np.linspace(first, last, max(int(abs(last - first) / 0.1), 2) + 1)
     return np.asarray(centre, dtype=float) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | None, title: str) -> tuple[Figure, Axes]:
-    """A figure around a drawing of size `paper` [pt], with axes in the mechanism's unit of length."""
+    """Return a figure for a drawing of size `paper` [pt], with axes in the mechanism's unit of length."""
     from matplotlib.figure import Figure
 
     left, bottom = (_LEFT, _BOTTOM) if unit else (_EDGE, _EDGE)
@@ -232,7 +232,7 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
     axes.set_ylim(low[1], high[1])
     if not unit:
         axes.set_axis_off()
-        axes.set_xticks([])  # which take long to place, seen or not
+        axes.set_xticks([])  # placing ticks takes long, even if they are invisible
         axes.set_yticks([])
         above: Any = {"va": "bottom", "transform": axes.transAxes}
         axes.text(
@@ -258,7 +258,7 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
 
 
 def box(centre: FloatArray, along: FloatArray, half_length: float, half_width: float) -> FloatArray:
-    """Corners (4, 2) of a rectangle whose long side lies along a unit vector."""
+    """Return the corners (4, 2) of a rectangle whose long side is along a unit vector."""
     length, width = half_length * along, half_width * np.array([-along[1], along[0]])
     return np.array(
         [centre - length - width, centre + length - width, centre + length + width, centre - length + width]
@@ -268,24 +268,24 @@ def box(centre: FloatArray, along: FloatArray, half_length: float, half_width: f
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
 MOST_LINES = 2
-_THINNEST = 2.0  # [pt]; a line of i and l alone has no more letters than that
+_THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
 
 
 @lru_cache(maxsize=64)
-def title_lines(title: str, room: float) -> list[str]:
-    """The lines of a title, none wider than `room` [pt]; MOST_LINES at most, one if that holds it, none if it is ''."""
-    title = title[: 2 * MOST_LINES * max(int(room / _THINNEST), 1)]  # what follows is in none of the lines
-    for count in range(max(min(len(title), int(room / _THINNEST)), 1), 1, -1):
+def title_lines(title: str, width: float) -> list[str]:
+    """Return the lines of a title, at most MOST_LINES, none wider than `width` [pt]; none if the title is ''."""
+    title = title[: 2 * MOST_LINES * max(int(width / _THINNEST), 1)]  # the lines cannot hold more
+    for count in range(max(min(len(title), int(width / _THINNEST)), 1), 1, -1):
         lines = textwrap.wrap(title, count)
         if len(lines) > MOST_LINES:
             lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]}\N{HORIZONTAL ELLIPSIS}"]
-        if all(_width(line) <= room for line in lines):
+        if all(_width(line) <= width for line in lines):
             return lines
     return [title] if title else []
 
 
 def _width(line: str) -> float:
-    """[pt]."""
+    """Return the width of a line of a title [pt]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 

@@ -18,9 +18,9 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.slides import Slide, place, racks_of
 
 HALF_LENGTH, HALF_WIDTH = 11.0, 7.0  # [pt], of a block
-RACK_BACK = 11.0  # [pt]; from a rack's pitch line to its back
-_REACH = 19.0  # [pt]; by which a rail goes beyond the middle of its block
-_SLOT, _OPENING = 1.55, 0.75  # widths of a slotted link and of its slot beside that of a bar
+RACK_BACK = 11.0  # [pt], from a rack's pitch line to its back
+_REACH = 19.0  # [pt], length of a rail beyond the middle of its block
+_SLOT, _OPENING = 1.55, 0.75  # widths of a slotted link and of its slot, relative to a bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Block(Mark):
 
 
 def rails(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
-    """The ground's part of slides: rails under blocks, and where a rod runs through a block that does not move."""
+    """Return the rails of the ground: under blocks, and under a fixed block through which a rod slides."""
     moving = np.vstack([shown.point(f"{body}.{name}") for body, name in _points(shown)])
     middle = (moving.min(axis=0) + moving.max(axis=0)) / 2.0
     racks = racks_of(shown)
@@ -83,7 +83,7 @@ def rails(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
 
 
 def slots_and_blocks(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
-    """The moving part of slides."""
+    """Return the moving parts of slides."""
     racks = racks_of(shown)
     found: list[Mark] = []
     for slide in sliding:
@@ -93,18 +93,18 @@ def slots_and_blocks(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
         if slide.turns and slide.holder != GROUND_NAME:
             found.append(Slot(shown.placed(slide.holder, slide.ends), shown.colour(slide.holder)))
         else:
-            is_ours = slide.turns or slide.slider == GROUND_NAME  # a pin's block belongs to no body
-            found.append(Block(at, along, palette.BAR if is_ours else shown.colour(slide.slider)))
+            is_grey = slide.turns or slide.slider == GROUND_NAME  # a pin's block is not part of a body
+            found.append(Block(at, along, palette.BAR if is_grey else shown.colour(slide.slider)))
     return found
 
 
 def _points(shown: Instant) -> list[tuple[str, str]]:
-    """All points, as body and name, of bodies that have any."""
+    """Return all points as body and name."""
     return [(body.name, name) for body in shown.mechanism.bodies for name in body.points]
 
 
 def _outwards(along: FloatArray, at: FloatArray, middle: FloatArray) -> FloatArray:
-    """Unit vector across a line into the ground: downwards, or away from the mechanism if the line is steep."""
+    """Return the unit vector across a line into the ground: down, or away from the mechanism if the line is steep."""
     across = np.array([along[1], -along[0]])
     is_steep = abs(along[1]) > 0.9
     wanted = at - middle if is_steep and abs((at - middle) @ across) > 0.0 else np.array([-0.1, -1.0])

@@ -1,4 +1,4 @@
-"""Which pose of a motion shows a mechanism best: one in which links do not lie on one another."""
+"""Choice of the pose in which links hide one another least."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from kinfmu.run import FloatArray
 from kinfmu.scene.outline import points_of, rim
 from kinfmu.scene.placing import world
 
-ENOUGH = 0.04  # part of all links that may be covered without another pose being looked for
-_CANDIDATES = 24  # poses of a run that are looked at
-_DOTS = np.linspace(0.12, 0.88, 9)  # along each link, away from its pins
-_NEAR = 0.025  # part of the size; a dot nearer than that to another link is covered
-_SAME = 1e-6  # part of the size; points nearer than that are one pin
-_PIN = 0.05  # what a pin on a link that it does not hold counts
-_MOST_LINKS = 60  # beyond, the start pose is as good as any
+ENOUGH = 0.04  # of all links; if no more is covered, no other pose is looked for
+_CANDIDATES = 24  # poses of a run that are compared
+_DOTS = np.linspace(0.12, 0.88, 9)  # along each link, without the ends near its pins
+_NEAR = 0.025  # of the size; a dot nearer to another link is covered
+_SAME = 1e-6  # of the size; points that are nearer are one pin
+_PIN = 0.05  # cost of a pin that covers a link of another joint
+_MOST_LINKS = 60  # with more links no pose is clearly better than the start
 
 
 def is_clear(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> bool:
@@ -30,7 +30,7 @@ def is_clear(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> bool:
 
 
 def clearest(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
-    """Row of poses (n, 3) by body that shows the mechanism best: the first one if it is clear enough."""
+    """Return the row of poses (n, 3) by body in which links hide one another least, or the first clear one."""
     rows = np.unique(np.linspace(0, len(poses[GROUND_NAME]) - 1, _CANDIDATES + 1).astype(int))
     rows = np.array([row for row in rows if all(np.isfinite(pose[row]).all() for pose in poses.values())])
     owners, links = _links(mechanism, {body: pose[rows] for body, pose in poses.items()})  # (r, links, 2, 2)
@@ -45,7 +45,7 @@ def clearest(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> int:
 
 
 def _links(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> tuple[list[str], FloatArray]:
-    """Owners of all straight edges, and their ends (r, links, 2, 2) in the world."""
+    """Return the owners of all straight edges, and their ends (r, links, 2, 2) in the world."""
     owners: list[str] = []
     ends: list[FloatArray] = []
 
@@ -74,7 +74,7 @@ def _links(mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> tuple[list[
 
 
 def _covered(owners: list[str], ends: FloatArray) -> float:
-    """How much lies on links of other bodies: part of the dots on all links, and pins; ends: (links, 2, 2)."""
+    """Return the part of all links, with pins, that covers links of other bodies; ends: (links, 2, 2)."""
     names = np.array(owners)
     size = float(np.ptp(ends.reshape(-1, 2), axis=0).max())
     dots = (ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _DOTS[:, None]).reshape(-1, 2)  # (links * dots, 2)
@@ -88,7 +88,7 @@ def _covered(owners: list[str], ends: FloatArray) -> float:
 
 
 def _distances(dots: FloatArray, ends: FloatArray) -> FloatArray:
-    """Distances (k, links) of dots (k, 2) from straight links."""
+    """Return distances (k, links) of dots (k, 2) from straight links."""
     a, d = ends[:, 0], ends[:, 1] - ends[:, 0]
     part = ((dots[:, None] - a[None]) * d[None]).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30)
     nearest = a[None] + np.clip(part, 0.0, 1.0)[:, :, None] * d[None]

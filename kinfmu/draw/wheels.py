@@ -15,8 +15,8 @@ from kinfmu.scene.cams import CamShape, cam_shapes
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.wheels import WheelShape, gear_pairs, rack_pairs
 
-_TEETH = 9.0  # [pt] from tooth to tooth of a rack, where there is room
-_TOOTH, _BACK = 4.0, 6.0  # [pt]; half height of the teeth, thickness of the rack behind them
+_TEETH = 9.0  # [pt], usual pitch of a rack's teeth
+_TOOTH, _BACK = 4.0, 6.0  # [pt]; half height of the teeth, thickness of the rack without teeth
 DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle
 
 
@@ -84,8 +84,8 @@ class Rack(Mark):
         back = (_TOOTH + _BACK) * size * self.towards
         corners = [*teeth, self.ends[1] + _TOOTH * size * self.towards, self.ends[1] + back, self.ends[0] + back]
         edge, fill = palette.darker(self.colour), palette.lighter(self.colour)
-        room = box(self.ends.mean(axis=0), along, length / 2.0, (_TOOTH + 2.0) * size)  # where the body's own bar lies
-        sheet.line(room, 0.0, PAPER, closed=True, fill=PAPER, matters=0.0)
+        bar = box(self.ends.mean(axis=0), along, length / 2.0, (_TOOTH + 2.0) * size)  # the body's own bar, covered
+        sheet.line(bar, 0.0, PAPER, closed=True, fill=PAPER, matters=0.0)
         sheet.line(corners, 0.9, edge, closed=True, fill=fill)
         sheet.line(self.ends, 0.7, edge, style=DASHES, matters=0.0)
         return []
@@ -93,7 +93,7 @@ class Rack(Mark):
 
 @dataclass(frozen=True, eq=False)
 class MeshName(Mark):
-    """The name of a pair of wheels, of a rack and its pinion, or of a cam and its follower, where they meet."""
+    """The name of two wheels, of a rack and its pinion, or of a cam and its follower, at the point of contact."""
 
     name: str
     at: FloatArray
@@ -106,7 +106,7 @@ class MeshName(Mark):
 
 
 def wheels(shown: Instant) -> list[Mark]:
-    """Gear pairs and belts; larger wheels below smaller ones."""
+    """Return gear pairs and belts; larger wheels are drawn first."""
     marks: list[Mark] = []
     for pair in gear_pairs(shown):
         marks += [_wheel(shown, wheel) for wheel in pair.wheels]
@@ -117,7 +117,7 @@ def wheels(shown: Instant) -> list[Mark]:
 
 
 def racks(shown: Instant) -> list[Mark]:
-    """Racks and their pinions; over the links, for a rack is often a link too."""
+    """Return racks and their pinions; they are drawn over the links, since a rack is often a link too."""
     marks: list[Mark] = []
     for pair in rack_pairs(shown):
         marks.append(Rack(pair.ends, pair.towards, shown.colour(pair.rack)))

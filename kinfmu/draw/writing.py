@@ -1,4 +1,4 @@
-"""Writing a figure of matplotlib's into a file: the same picture on every computer, whatever its settings are."""
+"""Writing a figure of matplotlib into a file: the same picture on every computer, whatever its settings are."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ DOTS_PER_INCH = 150  # of a PNG
 
 
 def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
-    """Write what `draw` gives into a .svg or .png file, or the same figure into several; equal figures, equal bytes.
+    """Write the figure of `draw` into one or several .svg or .png files; equal figures give equal bytes.
 
-    Raises FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib.
+    FigureError for another suffix or a file that cannot be written, MissingPackageError without matplotlib.
     """
     paths = paths if isinstance(paths, tuple) else (paths,)
     for path in paths:
@@ -36,13 +36,13 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
 
 @contextmanager
 def figure_style(path: Path) -> Iterator[None]:
-    """A picture of ours, whatever the user's own settings are; MissingPackageError about `path` without matplotlib."""
+    """Apply kinfmu's style instead of the user's settings; MissingPackageError about `path` without matplotlib."""
     try:
         import matplotlib as mpl
     except ImportError:
         raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
     with mpl.rc_context(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")  # a frame is drawn in its place
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")  # a frame is drawn instead
         mpl.rcdefaults()
         mpl.rcParams["svg.fonttype"] = "none"  # text as text
         mpl.rcParams["svg.hashsalt"] = "kinfmu"  # the same identifiers every time
@@ -51,7 +51,7 @@ def figure_style(path: Path) -> Iterator[None]:
 
 
 def write_bytes(path: Path, image: bytes) -> None:
-    """Write a picture; a FigureError if the file cannot be written."""
+    """Write a picture; FigureError if the file cannot be written."""
     try:
         write_whole(path, image)
     except OSError as error:
@@ -59,13 +59,13 @@ def write_bytes(path: Path, image: bytes) -> None:
 
 
 def check_suffix(path: Path) -> None:
-    """Raise a FigureError unless the name of a file says what to draw."""
+    """Raise a FigureError unless the suffix of a file is a known format."""
     if suffix_of(path) not in SUFFIXES:
-        raise FigureError(f"{path}: '{path.suffix}' is no figure that can be drawn; known: {listed(SUFFIXES)}")
+        raise FigureError(f"{path}: '{path.suffix}' is not a known format of figures; known: {listed(SUFFIXES)}")
 
 
 def _image(figure: Figure, suffix: str) -> bytes:
-    """A figure as the bytes of a file."""
+    """Return a figure as the bytes of a file."""
     file = io.BytesIO()
     if suffix == ".svg":
         figure.savefig(file, format="svg", metadata={"Date": None})

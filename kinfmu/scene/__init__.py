@@ -1,1 +1,1 @@
-"""What pictures of a mechanism share, moving or printed: outlines of bodies, pins of joints, poses, colours."""
+"""The common base of figures, recordings and robot descriptions: outlines, pins, poses, joint shapes, colours."""

@@ -14,15 +14,17 @@ from kinfmu.run import FloatArray
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.placing import seen_from
 
-_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], at which a pitch curve is looked at
-_ROLLER = 0.25  # of the smallest radius of the pitch curve: the files say nothing of the roller
-_BEND = 0.5  # of the sharpest bend; a larger roller would undercut the profile
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)[:-1]  # [rad], points of a pitch curve
+_ROLLER = 0.25  # of the smallest radius of the pitch curve: files do not state the roller's radius
+_BEND = 0.5  # of the smallest radius of curvature; a larger roller would undercut the profile
 
 
 @dataclass(frozen=True, eq=False)
 class CamShape:
-    """A cam and its roller in the world as drawn: names of the joint and of the two bodies, the pitch curve (k, 2), the
-    roller's centre (2,) and its radius [length].
+    """A cam and its roller in the world as drawn.
+
+    joint, cam, follower: names of the joint and the two bodies; pitch: the pitch curve (k, 2); roller: its centre (2,);
+    radius: of the roller [length].
     """
 
     joint: str
@@ -39,13 +41,13 @@ class CamShape:
 
     @property
     def contact(self) -> FloatArray:
-        """Where the roller touches the cam, (2,)."""
+        """Point of contact of roller and cam, (2,)."""
         nearest = int(np.argmin(np.hypot(*(self.pitch - self.roller).T)))
         return np.asarray(self.roller - self.radius * _outward(self.pitch)[nearest])
 
 
 def cam_shapes(shown: Instant) -> list[CamShape]:
-    """All cams whose pitch curve is known."""
+    """Return all cams whose pitch curve is known."""
     found = [_shape(shown, joint) for joint in shown.joints]
     return [shape for shape in found if shape is not None]
 
@@ -59,7 +61,7 @@ def _shape(shown: Instant, joint: Joint) -> CamShape | None:
 
 
 def _rolled(shown: Instant, joint: CamRoller) -> CamShape:
-    """A cam whose pitch curve is given in polar coordinates."""
+    """Return a cam whose pitch curve is given in polar coordinates."""
     pole, roller = joint.between
     cam = body_of(pole)
     radii = np.array([float(joint.law.at(angle)) for angle in _ANGLES])
@@ -69,18 +71,18 @@ def _rolled(shown: Instant, joint: CamRoller) -> CamShape:
 
 
 def _lifted(shown: Instant, joint: CamTranslating) -> CamShape:
-    """A cam that lifts a point of the follower along an axis."""
+    """Return a cam that lifts a point of the follower along an axis."""
     a, b = joint.between
     holder = shown.poses[body_of(a)][:1]
     e = np.array(unit_vector(joint.axis))
     at = seen_from(holder, shown.point(b)[None])[0]
-    foot = at - ((at - shown.body_points[a]) @ e) * e  # where the lift is counted from
-    ways = np.array([joint.offset + float(joint.law.at(angle)) for angle in _ANGLES])
-    return _traced(shown, joint, body_of(b), shown.placed(joint.holder(), foot + ways[:, None] * e), shown.point(b))
+    foot = at - ((at - shown.body_points[a]) @ e) * e  # origin of the lift
+    lifts = np.array([joint.offset + float(joint.law.at(angle)) for angle in _ANGLES])
+    return _traced(shown, joint, body_of(b), shown.placed(joint.holder(), foot + lifts[:, None] * e), shown.point(b))
 
 
 def _swung(shown: Instant, joint: CamOscillating) -> CamShape | None:
-    """A cam that swings the follower's point furthest from its pivot; None if it has none."""
+    """Return a cam that swings the point of the follower furthest from its pivot; None without such a point."""
     holder, follower = joint.between
     pivot = shown.axle(follower, holder)
     points = [shown.point(name) for name in shown.body_points if body_of(name) == follower]
@@ -93,7 +95,7 @@ def _swung(shown: Instant, joint: CamOscillating) -> CamShape | None:
 
 
 def _traced(shown: Instant, joint: Cam, follower: str, tips: FloatArray, now: FloatArray) -> CamShape:
-    """The cam that leads a point of the follower through `tips` (k, 2) of the world at _ANGLES; the holder stands."""
+    """Return the cam that leads a follower's point through `tips` (k, 2) of the world at _ANGLES, the holder fixed."""
     axle = shown.axle(joint.cam, joint.holder())
     centre = shown.poses[joint.cam][0, :2] if axle is None else axle
     turn = shown.angle(joint.cam) - shown.angle(joint.holder())
@@ -102,26 +104,26 @@ def _traced(shown: Instant, joint: Cam, follower: str, tips: FloatArray, now: Fl
 
 
 def _closed(name: str, bodies: tuple[str, str], pitch: FloatArray, centre: FloatArray, roller: FloatArray) -> CamShape:
-    """With a roller that is small against the cam and its bends; bodies: of the cam and of the roller."""
+    """Return a cam with a roller that is small compared with the cam and its curvature; bodies: of cam and roller."""
     smallest = float(np.hypot(*(pitch - centre).T).min())
     return CamShape(name, *bodies, pitch, roller, min(_ROLLER * smallest, _BEND * _sharpest(pitch)))
 
 
-def _turned(ways: FloatArray, angles: FloatArray) -> FloatArray:
-    """Vectors (k, 2), each turned by its angle [rad]."""
+def _turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return vectors (k, 2), each turned by its angle [rad]."""
     c, s = np.cos(angles), np.sin(angles)
-    return np.column_stack([c * ways[:, 0] - s * ways[:, 1], s * ways[:, 0] + c * ways[:, 1]])
+    return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
 
 
 def _outward(curve: FloatArray) -> FloatArray:
-    """Unit normals (k, 2) of a closed curve, away from its inside."""
+    """Return the outward unit normals (k, 2) of a closed curve."""
     along = np.roll(curve, -1, axis=0) - np.roll(curve, 1, axis=0)
     normal = np.column_stack([along[:, 1], -along[:, 0]]) * _sense(curve)
     return np.asarray(normal / np.maximum(np.hypot(*normal.T), 1e-30)[:, None])
 
 
 def _sharpest(curve: FloatArray) -> float:
-    """Smallest radius of curvature of a closed curve where it bends around its inside [length]."""
+    """Return the smallest radius of curvature [length] of the convex parts of a closed curve."""
     before, after = curve - np.roll(curve, 1, axis=0), np.roll(curve, -1, axis=0) - curve
     bends = 2.0 * _sense(curve) * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     lengths = np.hypot(*before.T) * np.hypot(*after.T) * np.hypot(*(before + after).T)
@@ -130,6 +132,6 @@ def _sharpest(curve: FloatArray) -> float:
 
 
 def _sense(curve: FloatArray) -> float:
-    """1.0 if a closed curve (k, 2) runs counter-clockwise, -1.0 if clockwise."""
+    """Return 1.0 if a closed curve (k, 2) is counter-clockwise, -1.0 if clockwise."""
     after = np.roll(curve, -1, axis=0)
     return float(np.sign((curve[:, 0] * after[:, 1] - curve[:, 1] * after[:, 0]).sum()))

@@ -1,4 +1,4 @@
-"""Coordinates that a run was not asked for, solved again from the drivers' values that it holds, for pictures."""
+"""Coordinates that are not outputs of a run, recomputed for pictures from the drivers' values in the run."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from kinfmu.run import FloatArray, IntArray, Run
 if TYPE_CHECKING:
     from kinfmu.plan import SolvePlan
 
-_SAME = 1e-6  # [rad, sizes]; how near the coordinates solved again must come to those of the run
+_SAME = 1e-6  # [rad, sizes]; largest difference of recomputed coordinates from those of the run
 
 
 def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | None:
-    """Return all coordinates (n,) by name, NaN in a gap; None if they cannot be known.
+    """Return all coordinates (n,) by name, NaN in a gap; None if they cannot be computed.
 
-    A run of few outputs, as [outputs] or --outputs choose them, is solved for all of them at its drivers' values. What
-    the run holds itself must come out the same; a column that was left out by --channels stays so.
+    A run of few outputs, as [outputs] or --outputs choose them, is solved for all coordinates at its drivers' values.
+    The result must agree with the coordinates in the run; columns left out by --channels are not recomputed.
     """
     from kinfmu.sweep import solve
 
@@ -41,13 +41,13 @@ def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | Non
     columns = {name: found[name] for name in (*plan.outputs, *plan.fixed)}
     for name in set(run.names) & columns.keys():
         size = 1.0 if name.endswith(".phi") else plan.size
-        if not np.all(np.abs(columns[name] - run[name][good]) <= _SAME * size):  # nor where one is NaN
+        if not np.all(np.abs(columns[name] - run[name][good]) <= _SAME * size):  # False for NaN
             return None
     return {name: _spread(column, good, len(run)) for name, column in columns.items()}
 
 
 def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
-    """The mechanism with the parameters of the run, assembled as the run was, and all coordinates as outputs."""
+    """Return the mechanism with the parameters and assembly of the run, and with all coordinates as outputs."""
     from kinfmu.sweep.continued import continued
 
     settings = (entry.partition(" = ") for entry in run.info.get("parameters", "").split(", "))  # of an FMU
@@ -79,14 +79,14 @@ def _plan_of_all(mechanism: Mechanism) -> SolvePlan:
 
 
 def _spread(column: FloatArray, rows: IntArray, count: int) -> FloatArray:
-    """A column at some of so many samples."""
+    """Return a column of `count` samples with values at some rows and NaN at the others."""
     found = np.full(count, np.nan)
     found[rows] = column
     return found
 
 
 def remedy(run: Run, names: Iterable[str]) -> str:
-    """Return what would bring missing coordinates into a run: it depends on how they were left out."""
+    """Return how to get missing coordinates into a run, which depends on how they were left out."""
     if run.absent.intersection(names):
         return "keep them: --channels all, or q among its names"
     return "name them in [outputs] coordinates, or leave that out"

@@ -1,4 +1,4 @@
-"""One instant of a motion: where everything is then, and where the run takes it."""
+"""One instant of a motion: the pose to draw, and the poses of the run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from kinfmu.scene.placing import seen_from, world
 class Instant:
     """The pose to draw, and the poses of the run.
 
-    poses: (1 + n, 3) by body, the ground too: x, y [length], phi [rad] of the drawn pose, then at n samples of the run,
-    NaN where one holds no numbers; a body that the run does not tell of is missing, and with it the joints that hold
-    it. ways: +1.0 or -1.0 by driver, which way it moves first.
+    poses: (1 + n, 3) by body, ground included: x, y [length], phi [rad] of the drawn pose, then of n samples of the
+    run, NaN at samples without numbers. Bodies whose pose is not in the run are missing, and so are their joints.
+    directions: +1.0 or -1.0 by driver, the direction of its first motion.
     """
 
     mechanism: Mechanism
     poses: Mapping[str, FloatArray]
-    ways: Mapping[str, float]
+    directions: Mapping[str, float]
 
     @property
     def joints(self) -> Sequence[Joint]:
@@ -47,39 +47,39 @@ class Instant:
         return self.mechanism.body_points
 
     def track(self, point: str) -> FloatArray:
-        """World coordinates (1 + n, 2) of 'body.point', the first as drawn."""
+        """Return world coordinates (1 + n, 2) of 'body.point', first as drawn."""
         return world(self.poses[body_of(point)], self.body_points[point])
 
     def point(self, point: str) -> FloatArray:
-        """World coordinates (2,) of 'body.point' as drawn."""
+        """Return world coordinates (2,) of 'body.point' as drawn."""
         return np.asarray(world(self.poses[body_of(point)][:1], self.body_points[point])[0])
 
     def placed(self, body: str, points: FloatArray) -> FloatArray:
-        """World coordinates (k, 2) of points (k, 2) in a body's frame, as drawn."""
+        """Return world coordinates (k, 2) as drawn of points (k, 2) in a body's frame."""
         return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
 
     def seen(self, body: str, points: FloatArray) -> FloatArray:
-        """Coordinates (k, 2) in a body's frame of points (k, 2) of the world as drawn: the inverse of `placed`."""
+        """Return coordinates (k, 2) in a body's frame of points (k, 2) of the world, the inverse of `placed`."""
         return seen_from(np.tile(self.poses[body][:1], (len(points), 1)), points)
 
     def angle(self, body: str) -> float:
-        """Angle of a body as drawn [rad]."""
+        """Return the angle of a body as drawn [rad]."""
         return float(self.poses[body][0, 2])
 
     def colour(self, body: str) -> palette.Colour:
-        """Colour of a body, the ground's too."""
+        """Return the colour of a body or of the ground."""
         order = [moving.name for moving in self.mechanism.moving_bodies]
         return palette.body(order.index(body)) if body in order else palette.GROUND
 
     def axle(self, wheel: str, carrier: str) -> FloatArray | None:
-        """Where a pin holds a wheel on its carrier, (2,); None if none does."""
+        """Return the place of the pin between a wheel and its carrier, (2,); None if there is none."""
         for joint in self.joints:
             if isinstance(joint, Revolute) and set(joint.bodies()) == {wheel, carrier}:
                 return self.point(joint.between[0])
         return None
 
     def value(self, driver: str) -> float:
-        """What a driver measures as drawn [rad or length]."""
+        """Return the value of a driver as drawn [rad or length]."""
         poses = {name: BodyFrame.of(*pose[0].tolist()) for name, pose in self.poses.items()}
         (found,) = (one for one in self.mechanism.drivers if one.name == driver)
         return float(found.measured().value(Placement(poses, self.body_points)))

@@ -9,18 +9,18 @@ from kinfmu.joints.joint import Joint
 from kinfmu.mechanism.body import Body
 from kinfmu.run import FloatArray
 
-FLAT = 1e-6  # points nearer to one line than this part of their extent count as a line
+FLAT = 1e-6  # of the points' extent; points nearer to a line than that count as a line
 
 
 def points_of(body: Body) -> FloatArray:
-    """Body-fixed points (p, 2), the frame's origin for a body that names none."""
+    """Return body-fixed points (p, 2); the frame's origin for a body without points."""
     return np.array([tuple(point) for point in body.points.values()] or [(0.0, 0.0)])
 
 
 def rim(points: FloatArray) -> tuple[FloatArray, bool]:
-    """Corners (k, 2) of a link with these points (p, 2), and True if they go around it.
+    """Return the corners (k, 2) of a link with these points (p, 2), and True if they are a closed line.
 
-    Points in one line come along it, all of them; others give their convex hull, counter-clockwise.
+    Points on one line are all corners, in order; other points give their convex hull, counter-clockwise.
     """
     points = np.unique(points, axis=0)
     if len(points) < 3:
@@ -33,7 +33,7 @@ def rim(points: FloatArray) -> tuple[FloatArray, bool]:
 
 
 def outline(points: FloatArray) -> FloatArray:
-    """A polyline (k, 2) that makes a link out of its points (p, 2): along them, or around them and to those inside."""
+    """Return the polyline (k, 2) of a link with points (p, 2): along them, or their hull with lines to inner points."""
     corners, is_closed = rim(points)
     if not is_closed:
         return corners
@@ -44,12 +44,12 @@ def outline(points: FloatArray) -> FloatArray:
         route.append(corner)
         for point, home in zip(inside, nearest, strict=True):
             if home == k:
-                route += [point, corner]  # a spoke, there and back
+                route += [point, corner]  # a line to the inner point and back
     return np.array([*route, corners[0]])
 
 
 def _hull(points: FloatArray) -> list[int]:
-    """Indices of the convex hull of points sorted by x then y, counter-clockwise (Andrew's monotone chain)."""
+    """Return indices of the convex hull of points sorted by x, then y; counter-clockwise (Andrew's monotone chain)."""
 
     def chain(order: range) -> list[int]:
         kept: list[int] = []

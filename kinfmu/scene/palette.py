@@ -1,4 +1,4 @@
-"""Colours: one a body, the same in linkage and plots. After Okabe and Ito (2008), safe for colour-blind eyes."""
+"""Colours: one for each body, the same in linkage and plots; distinguishable by the colour-blind (Okabe, Ito 2008)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GROUND: Colour = (150, 150, 150)
 BAR: Colour = (190, 190, 190)
 PIN: Colour = (235, 235, 235)
 RUNS: tuple[Colour, Colour] = ((213, 94, 0), (86, 180, 233))  # two runs compared
-BACKDROP: Colour = (13, 16, 17)  # what lies behind a recording's linkage
+BACKDROP: Colour = (13, 16, 17)  # background of a recording's linkage
 OUT_OF_REACH: Colour = (110, 110, 110)
 STATUS: tuple[Colour, ...] = (
     (0, 140, 100),
@@ -30,9 +30,9 @@ STATUS: tuple[Colour, ...] = (
 
 
 def body(index: int) -> Colour:
-    """Colour of the body at this place of the mechanism file; points of interest go on after the bodies.
+    """Return the colour of a body by its index in the mechanism file; points of interest follow after the bodies.
 
-    After BODIES they come again darker, then paler; those of the first 21, and these made lighter, are all different.
+    The colours of BODIES are repeated darker, then paler. The first 21 and their lighter versions are all different.
     """
     turn, place = divmod(index, len(BODIES))
     own = BODIES[place]
@@ -40,18 +40,18 @@ def body(index: int) -> Colour:
 
 
 def _mixed(colour: Colour, other: Colour, part: float) -> Colour:
-    """The colour with a part of another one in it."""
+    """Return a mixture of two colours; part: of the other one."""
     red, green, blue = (round(a + part * (b - a)) for a, b in zip(colour, other, strict=True))
     return red, green, blue
 
 
 def lighter(colour: Colour) -> Colour:
-    """The same colour half way to white: y beside x."""
+    """Return the colour halfway to white, such as for y next to x."""
     red, green, blue = ((value + 255) // 2 for value in colour)
     return red, green, blue
 
 
 def darker(colour: Colour) -> Colour:
-    """The same colour for edges and names on white paper."""
+    """Return the colour for edges and names on white paper."""
     red, green, blue = ((11 * value) // 20 for value in colour)
     return red, green, blue

@@ -1,4 +1,4 @@
-"""Where bodies and their points are over a run."""
+"""Poses of bodies and places of their points over a run."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from kinfmu.scene.completing import recomputed
 
 
 def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dict[str, tuple[str, ...]]]:
-    """Pose (n, 3) by body, and for each body that cannot be drawn the coordinates that are missing.
+    """Return poses (n, 3) by body, and for each body that cannot be drawn the missing coordinates.
 
-    Coordinates that are no outputs of the run are solved again, if they follow from its drivers' values.
+    Coordinates that are not outputs of the run are recomputed, if they follow from its drivers' values.
     """
     columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
@@ -33,14 +33,14 @@ def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dic
 
 
 def world(pose: FloatArray, s: tuple[float, float]) -> FloatArray:
-    """World coordinates r + A s, (n, 2), of the body-fixed point s under poses (n, 3)."""
+    """Return world coordinates r + A s, (n, 2), of the body-fixed point s in poses (n, 3)."""
     x, y, phi = pose.T
     c, sin = np.cos(phi), np.sin(phi)
     return np.column_stack([x + c * s[0] - sin * s[1], y + sin * s[0] + c * s[1]])
 
 
 def seen_from(pose: FloatArray, r: FloatArray) -> FloatArray:
-    """Body-fixed coordinates A^T (r_p - r), (n, 2), of points r_p (n, 2) of the world seen from poses (n, 3)."""
+    """Return body-fixed coordinates A^T (r_p - r), (n, 2), of points r_p (n, 2) of the world, in poses (n, 3)."""
     x, y, phi = pose.T
     c, sin = np.cos(phi), np.sin(phi)
     d_x, d_y = r[:, 0] - x, r[:, 1] - y

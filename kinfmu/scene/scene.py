@@ -1,4 +1,4 @@
-"""What of a run can be drawn: bodies as lines in their own frames, pins, supports, rails, bars, cylinders and paths."""
+"""The scene of a run: bodies as lines in their own frames, pins, supports, rails, bars, cylinders and paths."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from kinfmu.scene.outline import outline, pins_of, points_of, supported
 from kinfmu.scene.placing import poses_of, world
 from kinfmu.scene.strokes import Stroke, strokes
 
-LOOKS = 2000  # samples of a run that tell how far everything goes
-_ROOMY, _FINEST = 0.15, 0.1  # shortest link, as a part of the size, that needs no thinner lines; the thinnest
+MOST_SAMPLES = 2000  # of a run, from which bounds and shapes are computed
+_LONG_ENOUGH, _FINEST = 0.15, 0.1  # of the size: shortest link that needs no thinner lines; factor of the thinnest
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A moving body: lines in its own frame, and where the frame is.
+    """A moving body: lines in its own frame, and poses of the frame.
 
-    outline: polyline (k, 2) through its points; strokes: what joints add, such as a cam's profile or a slot; pins: by
-    joint, (2,); points: of interest, by name; pose: (n, 3) of x, y [length], phi [rad], NaN where the run has no
-    numbers; index: its place in the file, for the colour.
+    outline: polyline (k, 2) through its points; strokes: lines that joints add, such as a cam's profile or a slot;
+    pins: by joint, (2,); points: of interest, by name; pose: (n, 3) of x, y [length], phi [rad], NaN where the run has
+    no numbers; index: of the body in the file, which chooses the colour.
     """
 
     name: str
@@ -64,9 +64,9 @@ class DrawnCylinder:
 class Scene:
     """Everything to draw of one run, lengths in the mechanism's unit, y up.
 
-    supports: pins of the ground, name -> (x, y); ground: rails and wheels that stand still; pins: of the ground, by
-    joint, (2,); paths: (n, 2) of the points of interest, by name; left_out: bodies whose pose the run does not hold ->
-    the missing coordinates; low, high: corners (2,) of the box around everything.
+    supports: pins of the ground, name -> (x, y); ground: rails and other fixed lines; pins: of the ground, by joint,
+    (2,); paths: (n, 2) of the points of interest, by name; left_out: bodies whose pose is not in the run -> the missing
+    coordinates; low, high: corners (2,) of the bounding box.
     """
 
     bodies: tuple[DrawnBody, ...]
@@ -82,21 +82,21 @@ class Scene:
 
     @property
     def size(self) -> float:
-        """Larger side of the bounding box; 1 when everything is one point."""
+        """Larger side of the bounding box; 1 if everything is one point."""
         return float(max(self.high - self.low)) or 1.0
 
     @property
     def stroke(self) -> float:
-        """The measure for line widths: the size, less of it where links are short against it."""
+        """Reference length of line widths: the size, or less if links are short compared with it."""
         lengths = [bar.length for bar in self.bars]
         for body in self.bodies:
             lengths += np.hypot(*np.diff(body.outline, axis=0).T).tolist()
         shortest = min((length for length in lengths if length > 1e-3 * self.size), default=self.size)
-        return self.size * math.sqrt(min(max(shortest / (_ROOMY * self.size), _FINEST**2), 1.0))
+        return self.size * math.sqrt(min(max(shortest / (_LONG_ENOUGH * self.size), _FINEST**2), 1.0))
 
 
 def drawable(run: Run) -> tuple[Scene | None, str]:
-    """Return the scene of a run, and one sentence on what cannot be drawn, empty if nothing."""
+    """Return the scene of a run, None if there is none, and a sentence on what cannot be drawn, '' if all is drawn."""
     try:
         if run.mechanism is None:
             return None, "Not drawn: the run does not hold its mechanism."
@@ -109,7 +109,7 @@ def drawable(run: Run) -> tuple[Scene | None, str]:
 
 
 def scene(run: Run, mechanism: Mechanism) -> Scene:
-    """The drawable part of `run`."""
+    """Return the scene of `run`, without bodies whose poses are unknown."""
     poses, left_out = poses_of(run, mechanism)
     points = mechanism.body_points
     shown = _instant(run, mechanism, poses)
@@ -162,7 +162,7 @@ def scene(run: Run, mechanism: Mechanism) -> Scene:
 
 
 def _pins(mechanism: Mechanism) -> dict[str, list[tuple[str, FloatArray]]]:
-    """Pins by body, in its frame, each with the name of its joint."""
+    """Return pins by body, in its frame, each with the name of its joint."""
     points = mechanism.body_points
     pins: dict[str, list[tuple[str, FloatArray]]] = {}
     for joint in mechanism.joints:
@@ -172,8 +172,9 @@ def _pins(mechanism: Mechanism) -> dict[str, list[tuple[str, FloatArray]]]:
 
 
 def _supports(mechanism: Mechanism, cylinders: Sequence[CylinderShape]) -> dict[str, tuple[float, float]]:
-    """Points of the ground that hold joints or cylinders, by the names of revolute joints and welds there, else by
-    their own, as figures name them.
+    """Return points of the ground that hold joints or cylinders, by name.
+
+    The names are those of the revolute joints and welds there, else of the points, as in figures.
     """
     joints: dict[str, list[str]] = {end: [] for cylinder in cylinders for end in cylinder.between}
     for joint in mechanism.joints:
@@ -187,7 +188,7 @@ def _supports(mechanism: Mechanism, cylinders: Sequence[CylinderShape]) -> dict[
 
 
 def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> Instant | None:
-    """The first sample with numbers, and some of the others; None if there is none."""
+    """Return the first sample with numbers, and some of the others; None if there is none."""
     good = np.flatnonzero(run.good)
     if not len(good):
         return None
@@ -197,14 +198,14 @@ def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) ->
 
 
 def _some(count: int) -> slice:
-    """At most LOOKS of so many samples."""
-    return slice(None, None, max(-(-count // LOOKS), 1))
+    """Return a slice of at most MOST_SAMPLES of `count` samples."""
+    return slice(None, None, max(-(-count // MOST_SAMPLES), 1))
 
 
 def _bounds(
     bodies: tuple[DrawnBody, ...], ground: tuple[Stroke, ...], supports: Mapping[str, tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Corners of the box around the ground and all lines of all bodies over the run."""
+    """Return the corners of the box around the ground and all lines of all bodies over the run."""
     corners = [np.array(list(supports.values()), dtype=float).reshape(-1, 2), *(stroke.points for stroke in ground)]
     for body in bodies:
         pose = body.pose[np.isfinite(body.pose).all(axis=1)]

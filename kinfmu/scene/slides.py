@@ -1,4 +1,4 @@
-"""Slides: points that stay on lines of other bodies, with the stretch of the line that a run needs."""
+"""Slides: points that stay on lines of other bodies, with the part of the line that a run uses."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from kinfmu.scene.placing import seen_from
 class Slide:
     """A line fixed in one body, the holder, and the point of another that stays on it.
 
-    origin: a point of the line, 'body.point', 'ground' if it has no name; point: the one that slides;
-    ends: of the way over the run in the holder's frame, (2, 2); turns: True for a pin, which is free to turn, False for
-    a block, which is not.
+    origin: a point of the line, 'body.point', or 'ground' if it has no name; point: the sliding point; ends: of its
+    path over the run in the holder's frame, (2, 2); turns: True for a pin, which can turn, False for a block.
     """
 
     name: str
@@ -43,7 +42,7 @@ class Slide:
 
 
 def slides(shown: Instant) -> list[Slide]:
-    """All lines on which points slide; a held coordinate is a line of the ground."""
+    """Return all lines on which points slide; a held coordinate is a line of the ground."""
     found = []
     for joint in shown.joints:
         if isinstance(joint, Coordinate):
@@ -64,7 +63,7 @@ def slides(shown: Instant) -> list[Slide]:
 
 
 def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
-    """By moving body, ends (r, 2, 2) of its slots and rods in its own frame; each reaches to the origin of its line."""
+    """Return ends (r, 2, 2) of slots and rods by moving body, in its frame; each includes the origin of its line."""
     found: dict[str, list[FloatArray]] = {}
     for slide in sliding:
         if slide.holder != GROUND_NAME:
@@ -77,15 +76,15 @@ def rods(shown: Instant, sliding: Sequence[Slide]) -> dict[str, FloatArray]:
 
 
 def _ends(shown: Instant, a: str, b: str, axis: float) -> FloatArray:
-    """Ends (2, 2) of the way of b along an axis [rad] through a, in the frame of a's body."""
+    """Return the ends (2, 2) of the path of b along an axis [rad] through a, in the frame of a's body."""
     e = np.array(unit_vector(axis))
     origin = np.array(shown.body_points[a])
-    way = (seen_from(shown.poses[body_of(a)], shown.track(b)) - origin) @ e
-    return np.array([origin + np.nanmin(way) * e, origin + np.nanmax(way) * e])
+    distance = (seen_from(shown.poses[body_of(a)], shown.track(b)) - origin) @ e
+    return np.array([origin + np.nanmin(distance) * e, origin + np.nanmax(distance) * e])
 
 
 def place(shown: Instant, slide: Slide) -> tuple[FloatArray, FloatArray]:
-    """Where the sliding point is, and the direction of its line."""
+    """Return the place of the sliding point, and the unit vector of its line."""
     first, last = slide.ends
     along = last - first
     if not np.hypot(*along) > 0.0:
@@ -95,12 +94,12 @@ def place(shown: Instant, slide: Slide) -> tuple[FloatArray, FloatArray]:
 
 
 def _is_block(shown: Instant, body: str) -> bool:
-    """True for a moving body that is no longer than its one point."""
+    """Return True for a moving body without extent, all of whose points coincide."""
     found = next(one for one in shown.mechanism.bodies if one.name == body)
     return body != GROUND_NAME and not np.ptp(points_of(found), axis=0).any()
 
 
 def racks_of(shown: Instant) -> set[str]:
-    """Bodies that are drawn as racks."""
+    """Return the bodies that are drawn as racks."""
     joints = shown.joints
     return {body_of(joint.between[1]) for joint in joints if isinstance(joint, RackAndPinion)}

@@ -1,4 +1,4 @@
-"""What joints add to the lines of bodies: cams, rollers, wheels, racks, slots, rods, blocks; rails to the ground."""
+"""Lines that joints add to bodies: cams, rollers, wheels, racks, slots, rods, blocks; to the ground: rails."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ _ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """A line (k, 2) in the frame of a body; name: below the body's own; radius: as a part of the linkage's size;
-    tone: 'own', the body's colour, 'grey', or 'dark', as dark as what lies behind; layer: above its body by that much.
+    """A line (k, 2) in the frame of a body.
+
+    name: path below the body's; radius: relative to the linkage's size; tone: 'own' (the body's colour), 'grey' or
+    'dark' (the background's colour); layer: height above the body.
     """
 
     name: str
@@ -35,12 +37,12 @@ class Stroke:
 
     @property
     def extent(self) -> FloatArray:
-        """Some of the points, (at most 25, 2), which tell how far it reaches."""
+        """Some of the points, (at most 25, 2), for bounds."""
         return self.points[:: max(len(self.points) // 24, 1)]
 
 
 def strokes(shown: Instant) -> dict[str, list[Stroke]]:
-    """What joints add to bodies, by body and in its frame; to the ground, 'ground', what stands still."""
+    """Return the lines that joints add, by body ('ground' included), in the body's frame."""
     found: dict[str, list[Stroke]] = {}
     for body, stroke in (*_cams(shown), *_wheels(shown), *_racks(shown), *_slides(shown)):
         found.setdefault(body, []).append(replace(stroke, points=shown.seen(body, stroke.points)))
@@ -73,7 +75,7 @@ def _racks(shown: Instant) -> _Found:
 
 
 def _wheel(shown: Instant, wheel: WheelShape, joint: str) -> _Found:
-    """A pitch circle with a spoke by which one sees it turn."""
+    """Yield a pitch circle and a spoke, which shows the rotation."""
     angle = shown.angle(wheel.body)
     rim = wheel.centre + wheel.radius * np.array([np.cos(angle), np.sin(angle)])
     yield wheel.body, Stroke(f"wheel/{joint}", _circle(wheel.centre, wheel.radius), 1.5 * FINE)
@@ -81,7 +83,7 @@ def _wheel(shown: Instant, wheel: WheelShape, joint: str) -> _Found:
 
 
 def _slides(shown: Instant) -> _Found:
-    """Rails of the ground; slots and rods of bodies, and the blocks on them."""
+    """Yield rails of the ground, slots and rods of bodies, and the blocks on them."""
     sliding = slides(shown)
     for body, ends in rods(shown, sliding).items():
         for k, rod in enumerate(ends):
@@ -102,7 +104,7 @@ def _slides(shown: Instant) -> _Found:
 
 
 def _reach(shown: Instant) -> float:
-    """How far the mechanism goes, by which blocks are sized [length]."""
+    """Return the extent of the mechanism over the run [length], the reference size of blocks."""
     tracks = [shown.track(name) for name in shown.body_points if body_of(name) in shown.poses]
     return float(np.nanmax(np.ptp(np.vstack(tracks), axis=0))) if tracks else 1.0
 
@@ -116,7 +118,7 @@ def _closed(points: FloatArray) -> FloatArray:
 
 
 def _teeth(ends: FloatArray, towards: FloatArray, pitch: float) -> FloatArray:
-    """The outline of a rack: teeth along its pitch line, a straight back."""
+    """Return the outline of a rack: teeth along its pitch line, a straight back."""
     along = ends[1] - ends[0]
     length = float(np.hypot(*along))
     count = max(round(length / pitch), 2)

@@ -13,7 +13,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.placing import seen_from
 
-_BELT = 0.3  # radius of the larger pulley of a belt beside the distance of the axles, where only the ratio is known
+_BELT = 0.3  # of the distance of the axles: radius of a belt's larger pulley, since files state only the ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class WheelShape:
 
 @dataclass(frozen=True, eq=False)
 class GearPair:
-    """Two wheels that mesh, or pulleys under a belt, on the body that carries both; meets: where they do, (2,)."""
+    """Two wheels that mesh, or pulleys with a belt, on the body that carries both; meets: point of contact, (2,)."""
 
     joint: str
     wheels: tuple[WheelShape, WheelShape]
@@ -36,10 +36,10 @@ class GearPair:
     meets: FloatArray
 
     def belt(self) -> FloatArray:
-        """Ends (2, 2, 2) of the straight parts of an open belt around the two."""
+        """Return the ends (2, 2, 2) of the straight parts of an open belt around the two."""
         (a, r), (b, s) = ((wheel.centre, wheel.radius) for wheel in self.wheels)
         d = b - a
-        lean = np.arccos((r - s) / np.hypot(*d))  # of the radius where the belt leaves, against the axles
+        lean = np.arccos((r - s) / np.hypot(*d))  # angle between the line of axles and the radius where the belt leaves
         angles = np.arctan2(d[1], d[0]) + lean * np.array([1.0, -1.0])
         off = np.column_stack([np.cos(angles), np.sin(angles)])
         return np.stack([a + r * off, b + s * off], axis=1)
@@ -58,19 +58,19 @@ class RackPair:
 
 
 def gear_pairs(shown: Instant) -> list[GearPair]:
-    """All gear pairs and belts whose axles are pinned on their carrier."""
+    """Return all gear pairs and belts whose axles are pinned on their carrier."""
     found = [_pair(shown, joint) for joint in shown.joints if isinstance(joint, Gear)]
     return [pair for pair in found if pair is not None]
 
 
 def rack_pairs(shown: Instant) -> list[RackPair]:
-    """All racks whose pinion is pinned on what holds both."""
+    """Return all racks whose pinion is pinned on the body that holds both."""
     found = [_rack(shown, joint) for joint in shown.joints if isinstance(joint, RackAndPinion)]
     return [pair for pair in found if pair is not None]
 
 
 def _pair(shown: Instant, joint: Gear) -> GearPair | None:
-    """Two wheels, from the distance of their axles and their ratio."""
+    """Return two wheels with radii from the distance of their axles and their ratio."""
     a, b = (shown.axle(gear, joint.carrier) for gear in joint.between)
     if a is None or b is None:
         return None
@@ -92,7 +92,7 @@ def _pair(shown: Instant, joint: Gear) -> GearPair | None:
 
 
 def _rack(shown: Instant, joint: RackAndPinion) -> RackPair | None:
-    """The pinion, and the rack along its way over the run."""
+    """Return the pinion, and the rack over its path in the run."""
     holder, rack = map(body_of, joint.between)
     centre = shown.axle(joint.pinion, holder)
     if centre is None:
@@ -105,7 +105,7 @@ def _rack(shown: Instant, joint: RackAndPinion) -> RackPair | None:
     contact = centre + radius * across
     way = seen_from(shown.poses[holder], shown.track(joint.between[1])) @ np.array([e_x, e_y])
     way = way - way[0]
-    end = 0.35 * radius  # of the rack beyond where it is needed
-    first, last = -np.nanmax(way) - end, -np.nanmin(way) + end  # what passes the pinion, against the rack's place now
+    end = 0.35 * radius  # additional length at both ends of the rack
+    first, last = -np.nanmax(way) - end, -np.nanmin(way) + end  # part that passes the pinion, relative to the rack now
     ends = np.array([contact + first * along, contact + last * along])
     return RackPair(joint.name, rack, ends, across, WheelShape(joint.pinion, centre, radius), contact)

@@ -1,4 +1,4 @@
-"""Moving pictures: what moves, how long, and what is refused."""
+"""Animations: what moves, the duration, and what is refused."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def pages(path: Path) -> tuple[list[np.ndarray], list[int]]:
         return found, times
 
 
-def test_a_turning_linkage_repeats_without_a_stop(tmp_path: Path) -> None:
+def test_a_turning_linkage_repeats_without_a_pause(tmp_path: Path) -> None:
     animate(solved("crank_rocker"), tmp_path / "run.gif")
     found, times = pages(tmp_path / "run.gif")
     assert len(found) == 6
@@ -61,7 +61,7 @@ def test_bodies_are_in_their_colours_on_white(tmp_path: Path) -> None:
         assert (np.abs(page - palette.lighter(colour)).max(axis=1) <= 12).sum() > 100
 
 
-def test_a_motion_that_does_not_come_back_rests_at_its_end(tmp_path: Path) -> None:
+def test_a_motion_that_does_not_return_pauses_at_its_end(tmp_path: Path) -> None:
     run = fourbar(np.arange(181.0))
     animate(run, tmp_path / "run.gif")
     found, times = pages(tmp_path / "run.gif")
@@ -72,7 +72,7 @@ def test_a_motion_that_does_not_come_back_rests_at_its_end(tmp_path: Path) -> No
     assert not film.repeats
 
 
-def test_more_turns_than_pictures_can_show_are_refused_with_what_they_can(
+def test_more_turns_than_the_pictures_can_show_are_refused_with_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = kinfmu.solve(kinfmu.load("crank_rocker"), np.arange(0.0, 8.1, 0.0625))  # 4 turns
@@ -101,10 +101,10 @@ def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
 def test_a_cylinder_keeps_its_barrel_and_rod_while_it_works() -> None:
     run = solved("excavator")
     mechanism, poses = _placed(run, Path("run.gif"))
-    ways = {driver.name: 1.0 for driver in mechanism.drivers}
+    directions = {driver.name: 1.0 for driver in mechanism.drivers}
     lengths = set()
     for row in (0, 30, 60, 100):
-        shown = Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, ways)
+        shown = Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, directions)
         lengths |= {(mark.barrel, mark.rod) for mark in _marks(shown, []) if isinstance(mark, Cylinder)}
     assert len(lengths) == 3
 
@@ -128,7 +128,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
         animate(run.without(["coupler.x", "coupler.y"]), path)
     with pytest.raises(FigureError, match=r"needs two samples with numbers; the run has 1$"):
         animate(fourbar(np.array([60.0])), path)
-    with pytest.raises(FigureError, match=r"run\.mp4: '\.mp4' is no moving picture that can be drawn; known: \.gif"):
+    with pytest.raises(FigureError, match=r"run\.mp4: '\.mp4' is not a known format of animations; known: \.gif"):
         animate(run, tmp_path / "run.mp4")
     with pytest.raises(FigureError, match=r"run\.gif: cannot be written"):
         animate(fourbar(np.arange(0.0, 181.0, 60.0)), tmp_path / "nowhere" / "run.gif")

@@ -85,7 +85,7 @@ def test_a_cam_turns_as_one_piece(kind: str) -> None:
     np.testing.assert_allclose(second.pitch, first.pitch @ np.array([[c, s], [-s, c]]), atol=1e-9)
 
 
-def test_an_eccentric_is_drawn_as_the_circle_that_it_is() -> None:
+def test_an_eccentric_is_drawn_as_a_circle() -> None:
     level = CamTranslating(
         "contact", ("ground.O", "follower.tip"), "cam", Polynomial((0.0,)), axis=QUARTER, offset=30.0
     )

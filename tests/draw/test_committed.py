@@ -1,4 +1,4 @@
-"""The figures that lie in the gallery are those that would be drawn now."""
+"""The figures in the gallery are equal to those drawn now."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kinfmu import gallery
 NUMBER = re.compile(r"-?\d+\.\d+|-?\d+")
 IDENTIFIER = re.compile(r"\b[mp][0-9a-f]{10}\b")  # matplotlib makes them from the bits of what they name
 MAKER = re.compile(r"Matplotlib v(\d+\.\d+)")
-FAR = 0.02  # [pt]; round-off differs between machines, and is seen by nobody
+FAR = 0.02  # [pt]; round-off differs between machines, and is not visible
 
 
 @pytest.mark.parametrize("name", gallery.names())
@@ -32,6 +32,6 @@ def test_the_figure_in_the_gallery_is_current(name: str, gallery_figure: Callabl
 
 
 def _taken_apart(svg: str) -> tuple[list[str], list[float]]:
-    """What stands between the numbers of a file, and the numbers."""
+    """Return the text between the numbers of a file, and the numbers."""
     plain = IDENTIFIER.sub("", MAKER.sub("", svg))
     return NUMBER.split(plain), [float(number) for number in NUMBER.findall(plain)]

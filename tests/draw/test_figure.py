@@ -73,7 +73,7 @@ def test_a_png_has_the_proportions_of_the_mechanism_at_150_dots_an_inch(tmp_path
     assert height > 1.5 * width
 
 
-def test_the_users_own_settings_do_not_show_and_are_kept(tmp_path: Path) -> None:
+def test_the_users_own_settings_have_no_effect_and_are_kept(tmp_path: Path) -> None:
     import matplotlib as mpl
 
     mechanism = kinfmu.load("fourbar")
@@ -122,10 +122,10 @@ def test_another_kind_of_file_is_refused(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     with pytest.raises(FigureError) as caught:
         figure(kinfmu.load("fourbar"), path)
-    assert str(caught.value) == f"{path}: '{path.suffix}' is no figure that can be drawn; known: .svg, .png"
+    assert str(caught.value) == f"{path}: '{path.suffix}' is not a known format of figures; known: .svg, .png"
 
 
-def test_a_place_where_nothing_can_be_written_is_reported(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "none" / "figure.svg"
     with pytest.raises(FigureError) as caught:
         figure(reference_fourbar(), path)
@@ -187,7 +187,7 @@ def test_check_as_json_stays_json_with_a_figure(run_cli: Callable[..., tuple[int
     assert path.stat().st_size > 1000
 
 
-def test_check_tells_its_findings_before_a_figure_that_cannot_be_drawn(
+def test_check_reports_its_findings_before_a_figure_that_cannot_be_drawn(
     run_cli: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -218,7 +218,7 @@ def test_check_refuses_another_kind_of_figure_before_it_works(run_cli: Callable[
     assert err.endswith("F.pdf: its name must end in one of .svg, .png\n")
 
 
-def test_a_figure_is_drawn_at_the_drivers_value_that_is_asked_for(tmp_path: Path) -> None:
+def test_a_figure_is_drawn_at_the_given_value_of_the_driver(tmp_path: Path) -> None:
     mechanism = kinfmu.load("crank_rocker")
     figure(mechanism, tmp_path / "at.svg", math.radians(45.0))
     words = (tmp_path / "at.svg").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What is drawn where, against closed forms; names that keep apart."""
+"""Places of what is drawn, compared with closed forms; names that do not overlap."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def geared(ratio: float, *, sun: str = "ground", carrier: str = "arm") -> Mechan
 
 
 def test_a_figure_shows_the_start_pose_of_the_file() -> None:
-    shown = instant(load("fourbar"))  # its law begins at 0, its bodies stand at 60 degrees
+    shown = instant(load("fourbar"))  # its law begins at 0, its bodies are at 60 degrees
     np.testing.assert_allclose(shown.point("crank.P"), [0.5, math.sqrt(0.75)], atol=1e-12)
     np.testing.assert_allclose(shown.point("coupler.A"), [2.5, math.sqrt(0.75)], atol=1e-12)
     assert shown.value("crank") == pytest.approx(math.pi / 3, abs=1e-12)
@@ -66,12 +66,12 @@ def test_a_figure_shows_the_start_pose_of_the_file() -> None:
     np.testing.assert_allclose(np.hypot(path[:, 0] - 2.0, path[:, 1]), 1.0, atol=1e-12)
 
 
-def test_a_mechanism_far_from_the_origin_is_drawn_where_it_is() -> None:
+def test_a_mechanism_far_from_the_origin_is_drawn_at_its_place() -> None:
     near, far = instant(fourbar(4.0, 1.0, 3.5, 3.0)), instant(fourbar(4.0, 1.0, 3.5, 3.0, at=(1000.0, -500.0)))
     np.testing.assert_allclose(far.track("coupler.Q") - near.track("coupler.Q"), [[1000.0, -500.0]] * 102, atol=1e-9)
 
 
-def test_a_support_stands_below_its_pin_or_where_there_is_room() -> None:
+def test_a_support_is_below_its_pin_or_on_a_free_side() -> None:
     standing = supports(instant(load("fourbar")))
     assert [(tuple(mark.at), tuple(mark.towards)) for mark in standing if isinstance(mark, Support)] == [
         ((0.0, 0.0), (0.0, -1.0)),
@@ -83,7 +83,7 @@ def test_a_support_stands_below_its_pin_or_where_there_is_room() -> None:
     assert tuple(hanging.towards) == (0.0, 1.0)
 
 
-def test_a_rail_is_as_long_as_the_way_of_its_block() -> None:
+def test_a_rail_is_as_long_as_the_path_of_its_block() -> None:
     mechanism = crank_and_slider()
     shown = instant(Mechanism("slider", mechanism.bodies, mechanism.joints, mechanism.drivers, run=TURN))
     sliding = slides(shown)
@@ -91,7 +91,7 @@ def test_a_rail_is_as_long_as_the_way_of_its_block() -> None:
     assert isinstance(rail, Rail)
     assert isinstance(block, Block)
     dead_centres = [[math.sqrt(2.0**2 - 0.25**2), 0.25], [math.sqrt(4.0**2 - 0.25**2), 0.25]]
-    np.testing.assert_allclose(rail.ends, dead_centres, atol=2e-3)  # the run's samples lie beside them
+    np.testing.assert_allclose(rail.ends, dead_centres, atol=2e-3)  # no sample of the run is exactly there
     assert tuple(rail.towards) == (0.0, -1.0)
     np.testing.assert_allclose(block.at, shown.point("block.S"), atol=0)
 
@@ -123,7 +123,7 @@ def test_a_pin_runs_in_a_slot_of_its_link() -> None:
     assert rails(shown, sliding) == []
 
 
-def test_a_block_on_a_rod_is_the_body_that_is_no_longer_than_a_point() -> None:
+def test_a_block_on_a_rod_is_the_body_without_extent() -> None:
     def inverted(between: tuple[str, str]) -> Mechanism:
         return Mechanism(
             "inverted",
@@ -161,7 +161,7 @@ def test_pitch_circles_touch_and_keep_the_ratio(ratio: float, radii: tuple[float
     assert found[radii[1]].centre == pytest.approx([3.0, 0.0])
 
 
-def test_wheels_that_turn_alike_on_the_ground_have_a_belt() -> None:
+def test_wheels_on_the_ground_that_turn_equally_have_a_belt() -> None:
     marks = wheels(instant(geared(2.0, sun="sun", carrier="arm")))
     (belt,) = (mark for mark in marks if isinstance(mark, Belt))
     sun, planet = sorted((mark for mark in marks if isinstance(mark, Wheel)), key=lambda wheel: wheel.radius)
@@ -214,8 +214,8 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
 
     (turn,) = motion(instant(fourbar(4.0, 1.0, 3.5, 3.0)))
     assert isinstance(turn, Turn)
-    assert (turn.text, turn.way, tuple(turn.centre)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
-    assert turn.beside == pytest.approx(1.0)
+    assert (turn.text, turn.sense, tuple(turn.centre)) == ("crank = 57.3°", 1.0, (0.0, 0.0))
+    assert turn.heading == pytest.approx(1.0)
 
     ram = SlideDriver("ram", ("ground.slot", "block.S"), law=ConstantSpeed(3.5, -0.1))
     (push,) = motion(instant(crank_and_slider(drivers=(ram,))))
@@ -223,7 +223,7 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
     assert tuple(push.along) == (-1.0, 0.0)
 
 
-def test_a_place_is_named_once_by_its_joint_and_what_is_of_interest_there() -> None:
+def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None:
     shown = instant(load("fourbar"))
     found = {tuple(np.round(mark.at, 3)): mark for mark in pins(shown, slides(shown)) if isinstance(mark, Pin)}
     assert [mark.text for mark in found.values()] == ["O", "C", "B", "P", "Q", "A"]
@@ -233,7 +233,7 @@ def test_a_place_is_named_once_by_its_joint_and_what_is_of_interest_there() -> N
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_names_keep_apart_and_stay_on_the_sheet(name: str) -> None:
+def test_names_do_not_overlap_and_stay_on_the_sheet(name: str) -> None:
     pytest.importorskip("matplotlib")
     sheet = sheet_of(instant(load(name)))
     boxes = [text.get_window_extent() for text in sheet.axes.texts]
@@ -256,13 +256,13 @@ def test_names_leave_links_and_paths_free(name: str) -> None:
         assert dots[inside.all(axis=1), 2].sum() < COVERED, text.get_text()
 
 
-def test_a_list_of_names_is_broken_into_lines_where_one_has_no_room() -> None:
+def test_a_list_of_names_that_does_not_fit_on_one_line_is_wrapped() -> None:
     pytest.importorskip("matplotlib")
     texts = {text.get_text() for text in sheet_of(instant(load("jansen_leg"))).axes.texts}
     assert {"X_upper,\nX_lower", "bottom, ankle"} <= texts
 
 
-def test_a_start_pose_in_which_links_lie_on_one_another_gives_way_to_a_clearer_one() -> None:
+def test_a_clearer_pose_replaces_a_start_pose_in_which_links_hide_one_another() -> None:
     flat = crank_and_slider(offset=0.0, drivers=(AngleDriver("crank", "crank"),))
     bodies = [Body(body.name, body.points) for body in flat.bodies]
     shown = instant(Mechanism("flat", bodies, flat.joints, flat.drivers, run=TURN))
@@ -271,7 +271,7 @@ def test_a_start_pose_in_which_links_lie_on_one_another_gives_way_to_a_clearer_o
     assert standing.angle("crank") == pytest.approx(0.0, abs=0.11)  # a run of one sample has no better
 
 
-def test_a_rough_start_pose_away_from_the_run_gives_way_to_the_run() -> None:
+def test_a_pose_of_the_run_replaces_a_rough_start_pose_away_from_the_run() -> None:
     mechanism = fourbar(4.0, 1.0, 3.5, 3.0)
     law = AngleDriver("crank", "crank", ConstantSpeed(2.0, 1.0))
     shown = instant(Mechanism("late", mechanism.bodies, mechanism.joints, [law], run=RunSettings(0.0, 0.5)))
@@ -279,7 +279,7 @@ def test_a_rough_start_pose_away_from_the_run_gives_way_to_the_run() -> None:
     np.testing.assert_array_equal(shown.track("coupler.Q")[0], shown.track("coupler.Q")[1])
 
 
-def test_a_pin_that_lies_on_a_link_it_does_not_hold_is_looked_past() -> None:
+def test_a_pin_on_a_link_of_another_joint_does_not_make_a_pose_unclear() -> None:
     shown = instant(load("double_crank"))  # at 0 its crank lies on the pivot of its follower
     assert shown.angle("crank") > 0.1
     pivot, tip = shown.point("follower.C"), shown.point("crank.P")

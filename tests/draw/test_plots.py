@@ -91,7 +91,7 @@ def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path
     assert set(panels[1].lines[0].get_ydata()) == {0.0}
 
 
-def test_what_was_not_kept_is_an_empty_panel_that_reports_it(run: Run) -> None:
+def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> None:
     panels = _sheet(select(run, ["q"]), ("coupler.x",)).axes
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
@@ -99,7 +99,7 @@ def test_what_was_not_kept_is_an_empty_panel_that_reports_it(run: Run) -> None:
 def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
     with pytest.raises(RequestError, match=r"the run has no coordinate 'cupler\.x'; did you mean 'coupler\.x'\?"):
         plot(run, tmp_path / "run.svg", ["cupler.x"])
-    with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is no figure that can be drawn; known: \.svg, \.png"):
+    with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is not a known format of figures; known: \.svg, \.png"):
         plot(run, tmp_path / "run.jpg")
     names = tuple(f"body{k}.x" for k in range(31))
     table = np.zeros((181, 31))

@@ -1,4 +1,4 @@
-"""Titles: no letter of a long one lies outside its picture, and short ones are as they were."""
+"""Titles: long ones are wrapped and stay within the picture, short ones are one line."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_title_that_fits_is_one_line() -> None:
     assert title_lines("A", 400.0) == ["A"]
 
 
-def test_a_long_title_goes_on_in_a_second_line_and_ends_in_an_ellipsis() -> None:
+def test_a_long_title_continues_on_a_second_line_and_ends_in_an_ellipsis() -> None:
     assert " ".join(title_lines(LONG, 400.0)) == LONG
     assert title_lines(LONG, 200.0) == ["Gripper with parallel jaws whose", "piston opens two of them through…"]
     first, second = title_lines("W" * 90, 200.0)

@@ -46,7 +46,7 @@ def test_a_damaged_chunk_is_reported_with_its_place(
     assert complaint(path) == f"the chunk at byte {name - 32} is damaged: {message}"
 
 
-def test_a_record_of_no_kind_is_reported_with_its_place(run: Run, tmp_path: Path) -> None:
+def test_a_record_of_unknown_kind_is_reported_with_its_place(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     write_mcap(run, path)
     whole = bytearray(path.read_bytes())

@@ -1,4 +1,4 @@
-"""When the disk is full: one clear line, the old file stays, nothing is left behind."""
+"""On a full disk: an error in one line, the old file stays, no other file is left."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ except LogError as error:
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file simulates a full disk")
 @pytest.mark.parametrize(
-    ("suffix", "room"), [*((suffix, 200_000) for suffix in ("mcap", "rrd", "csv", "parquet", "npz")), ("rrd", 1)]
+    ("suffix", "limit"), [*((suffix, 200_000) for suffix in ("mcap", "rrd", "csv", "parquet", "npz")), ("rrd", 1)]
 )
-def test_a_file_that_finds_no_room_is_one_clear_line(suffix: str, room: int, tmp_path: Path) -> None:
+def test_a_file_on_a_full_disk_is_reported_in_one_line(suffix: str, limit: int, tmp_path: Path) -> None:
     path = tmp_path / f"run.{suffix}"
     path.write_bytes(b"old")
     process = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(path), str(room)],
+        [sys.executable, "-c", PROGRAM, str(path), str(limit)],
         capture_output=True,
         text=True,
         check=True,

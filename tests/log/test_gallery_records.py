@@ -1,4 +1,4 @@
-"""Records of every mechanism of the gallery: whole for other readers, and read back as they were."""
+"""Records of every mechanism of the gallery: complete for other readers, and read back unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An MCAP that grows with its run: what was added is there whatever happens, and recover makes a whole file of it."""
+"""An MCAP file that grows with its run: what was added stays, and recover makes a complete file of it."""
 
 from __future__ import annotations
 
@@ -52,16 +52,14 @@ def test_a_run_that_grew_reads_back_bit_for_bit(kind: str, size: int, tmp_path: 
     assert_same(run, read(tmp_path / "run.mcap"))
 
 
-def test_a_run_that_grew_says_in_every_topic_what_one_written_at_once_says(run_with_gap: Run, tmp_path: Path) -> None:
+def test_a_run_that_grew_has_the_same_topics_as_one_written_at_once(run_with_gap: Run, tmp_path: Path) -> None:
     grown(run_with_gap, tmp_path / "grown.mcap", 7)
     write_mcap(run_with_gap, tmp_path / "whole.mcap")
     for topic in ("/sample", "/joint_states", "/joint_accelerations", "/tf", "/robot_description", "/log"):
         assert messages(tmp_path / "grown.mcap", topic) == messages(tmp_path / "whole.mcap", topic), topic
 
 
-def test_a_reason_that_comes_after_its_sample_is_still_the_one_row_that_tells_of_the_failure(
-    run_with_gap: Run, tmp_path: Path
-) -> None:
+def test_a_failure_whose_reason_comes_after_its_sample_has_one_row(run_with_gap: Run, tmp_path: Path) -> None:
     run = run_with_gap.part(slice(0, 101), events=run_with_gap.events)
     sink = McapLog(tmp_path / "run.mcap")
     sink.begin(without_samples(run))
@@ -74,7 +72,7 @@ def test_a_reason_that_comes_after_its_sample_is_still_the_one_row_that_tells_of
 
 
 @pytest.mark.parametrize("rows", [101, 110])
-def test_a_failure_without_a_reason_is_in_the_log_in_the_end(rows: int, run_with_gap: Run, tmp_path: Path) -> None:
+def test_a_failure_without_a_reason_is_in_the_log_at_the_end(rows: int, run_with_gap: Run, tmp_path: Path) -> None:
     run = run_with_gap.part(slice(0, rows))
     sink = McapLog(tmp_path / "run.mcap")
     sink.begin(without_samples(run))
@@ -85,7 +83,7 @@ def test_a_failure_without_a_reason_is_in_the_log_in_the_end(rows: int, run_with
     assert b"outside" in found
 
 
-def test_rerun_finds_no_fault_with_a_file_that_grew(run_with_gap: Run, tmp_path: Path) -> None:
+def test_rerun_verifies_a_file_that_grew(run_with_gap: Run, tmp_path: Path) -> None:
     grown(run_with_gap, tmp_path / "run.mcap", 7)
     process = subprocess.run(
         [executable(), "mcap", "check", "--full", str(tmp_path / "run.mcap")],
@@ -107,7 +105,7 @@ def test_what_was_added_is_in_the_file_at_once(run: Run, tmp_path: Path) -> None
     sink.close()
 
 
-def test_a_sink_that_is_used_again_writes_the_file_anew(run: Run, tmp_path: Path) -> None:
+def test_a_sink_that_is_used_again_writes_a_new_file(run: Run, tmp_path: Path) -> None:
     sink = McapLog(tmp_path / "run.mcap")
     for part in (run, run.part(slice(5, 50))):
         sink.begin(without_samples(part))
@@ -129,7 +127,7 @@ def test_the_older_file_stays_until_the_first_samples(run: Run, tmp_path: Path) 
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_place_where_no_file_can_be_is_reported_before_the_first_sample(run: Run, tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_reported_before_the_first_sample(run: Run, tmp_path: Path) -> None:
     (tmp_path / "null.mcap").symlink_to(os.devnull)
     for name, why in (("none/run.mcap", "the folder '.*none' does not exist"), ("null.mcap", "is a device or a pipe")):
         with pytest.raises(LogError, match=why):
@@ -184,7 +182,7 @@ def test_a_damaged_chunk_ends_what_is_recovered(run: Run, tmp_path: Path) -> Non
     assert found.values.tobytes() == run.values[: len(found)].tobytes()
 
 
-def test_what_holds_no_run_cannot_be_recovered(run: Run, tmp_path: Path) -> None:
+def test_a_file_without_a_run_cannot_be_recovered(run: Run, tmp_path: Path) -> None:
     grown(run, tmp_path / "run.mcap", 20)
     whole = (tmp_path / "run.mcap").read_bytes()
     (tmp_path / "run.mcap").write_bytes(whole[: whole.index(b"/sample")])
@@ -261,7 +259,7 @@ except LogError as error:
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file simulates a full disk")
 def test_a_disk_that_fills_up_loses_nothing_that_was_written(fmu: Callable[[], Path], tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     process = subprocess.run(
@@ -277,7 +275,7 @@ def test_a_disk_that_fills_up_loses_nothing_that_was_written(fmu: Callable[[], P
     assert found.events[-1].text.startswith("the record ends here: it ends at byte ")
 
 
-def test_a_run_that_fails_is_kept_and_says_why(fmu: Callable[[], Path], tmp_path: Path) -> None:
+def test_a_run_that_fails_is_kept_with_the_reason(fmu: Callable[[], Path], tmp_path: Path) -> None:
     def fail(done: int, _: int) -> None:
         if done == 50:
             raise RuntimeError("the host gave up")

@@ -1,4 +1,4 @@
-"""Records made to do harm: odd texts under valid checksums, sizes that lie, chunks that unpack to gigabytes."""
+"""Hostile records: odd texts under valid checksums, false sizes, chunks that unpack to gigabytes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NAMES = 600_000  # more than a record may hold
 
 
 def line_of(path: Path) -> str:
-    """The one line that reading and recovering say, without the name of the file."""
+    """Return the one line that reading and recovering report, without the name of the file."""
     with pytest.raises(LogError) as caught:
         read(path)
     (line,) = str(caught.value).splitlines()
@@ -40,7 +40,7 @@ def line_of(path: Path) -> str:
 
 
 def with_texts(run: Run, path: Path, begin: dict[str, str], end: dict[str, str] | None = None) -> Path:
-    """The record of a run with other texts, whose checksums fit."""
+    """Write the record of a run with other texts and correct checksums."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mcap_file, "description", lambda run: record.description(run) | begin)
         patch.setattr(mcap_file, "ending", lambda run: record.ending(run) | (end or {}))
@@ -90,9 +90,7 @@ def test_odd_texts_at_the_end_are_one_line(run: Run, tmp_path: Path, key: str) -
         ({"format": "9\n9"}, r"format '9\n9' of the record; this version of kinfmu reads '2'"),
     ],
 )
-def test_texts_that_do_not_go_together_are_one_line(
-    run: Run, tmp_path: Path, begin: dict[str, str], words: str
-) -> None:
+def test_texts_that_disagree_are_one_line(run: Run, tmp_path: Path, begin: dict[str, str], words: str) -> None:
     assert words in line_of(with_texts(run, tmp_path / "a.mcap", begin))
 
 
@@ -106,7 +104,7 @@ def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str)
     assert time.process_time() - began < 5.0
 
 
-def test_a_status_and_a_time_that_are_none_are_one_line(run: Run, tmp_path: Path) -> None:
+def test_an_invalid_status_or_time_is_one_line(run: Run, tmp_path: Path) -> None:
     odd = dataclasses.replace(run, status=np.where(np.arange(len(run)) == 1, 17, run.status))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mcap_file, "sentence", lambda _: "")
@@ -115,16 +113,16 @@ def test_a_status_and_a_time_that_are_none_are_one_line(run: Run, tmp_path: Path
     assert line_of(tmp_path / "a.mcap") == "sample 1 has the status 17; known: 0 to 5"
 
 
-def test_numbers_as_large_as_they_get_are_drawn_or_refused(run: Run, tmp_path: Path) -> None:
+def test_the_largest_numbers_are_drawn_or_refused(run: Run, tmp_path: Path) -> None:
     values = run.values.copy()
     values[7, 1], values[8, 1] = 1.7e308, -1.7e308
     values[::9, 2], values[::7, 2] = 1e308, -1e308
     large = dataclasses.replace(run, values=values)
-    with pytest.raises(FigureError, match="poses of 'coupler' that are no numbers, or too large to draw"):
+    with pytest.raises(FigureError, match="poses of 'coupler' that are not numbers or too large to draw"):
         animate(large, tmp_path / "a.gif")
     assert groups(large)["position", "length"].shown is None
     values[7:9, 1:3] = np.nan
-    with pytest.raises(FigureError, match="poses of 'coupler' that are no numbers, or too large to draw"):
+    with pytest.raises(FigureError, match="poses of 'coupler' that are not numbers or too large to draw"):
         animate(dataclasses.replace(run, values=values), tmp_path / "a.gif")
 
 
@@ -132,7 +130,7 @@ def test_numbers_as_large_as_they_get_are_drawn_or_refused(run: Run, tmp_path: P
 
 
 def chunk(raw: bytes, size: int | None = None, compression: str = ZSTD, packed: bytes | None = None) -> bytes:
-    """The record of a chunk of these messages; size: what it says that it unpacks to."""
+    """The record of a chunk of these messages; size: its stated unpacked size."""
     if packed is None:
         packed = zstandard.ZstdCompressor(level=1).compress(raw)
     name = compression.encode()
@@ -150,7 +148,7 @@ def behind_the_first(run: Run, path: Path, *chunks: bytes) -> Path:
     return path
 
 
-def test_a_chunk_that_says_it_unpacks_to_a_terabyte_is_refused(run: Run, tmp_path: Path) -> None:
+def test_a_chunk_that_claims_to_unpack_to_a_terabyte_is_refused(run: Run, tmp_path: Path) -> None:
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 2**40, packed=b""))
     tracemalloc.start()
     try:
@@ -170,7 +168,7 @@ def test_chunks_that_unpack_to_gigabytes_are_refused_together(
     assert "its unpacked size is 1048576 bytes; the largest" in line_of(path)
 
 
-def test_a_chunk_may_unpack_to_little_more_than_its_index_says(run: Run, tmp_path: Path) -> None:
+def test_a_chunk_may_unpack_to_little_more_than_its_index_counts(run: Run, tmp_path: Path) -> None:
     write_mcap(run, tmp_path / "a.mcap")
     opened = scan.Scan(tmp_path / "a.mcap")
     channel = opened.id_of("/sample")
@@ -198,12 +196,12 @@ def test_records_of_odd_lengths_in_a_chunk_are_one_line_or_nothing(run: Run, tmp
         assert "is damaged: a record goes beyond its end" in line_of(path)
 
 
-def test_more_records_than_packed_bytes_can_tell_apart_are_refused(run: Run, tmp_path: Path) -> None:
+def test_more_records_than_the_packed_bytes_can_hold_are_refused(run: Run, tmp_path: Path) -> None:
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(bytes(9) * 100_000))
     assert "is damaged: too many records" in line_of(path)
 
 
-def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_says(run: Run, tmp_path: Path) -> None:
+def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_states(run: Run, tmp_path: Path) -> None:
     lz4 = pytest.importorskip("lz4.frame")
     raw = bytes(2**24)
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 100, "lz4", lz4.compress(raw)))
@@ -217,7 +215,7 @@ def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_says(run: Run, tmp_path: Path
 
 @pytest.mark.parametrize("is_cut", [False, True])
 def test_a_long_run_in_which_nothing_moves_is_read(run: Run, tmp_path: Path, is_cut: bool) -> None:
-    """It packs better than any other honest record."""
+    """Its ratio of compression is the largest of valid records."""
     n = 30_000
     still = dataclasses.replace(run.part(np.zeros(n, int)), t=np.arange(n) * 1.0)
     path = tmp_path / "still.mcap"

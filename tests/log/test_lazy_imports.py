@@ -1,4 +1,4 @@
-"""Heavy packages load when they are used, not before."""
+"""Heavy packages are loaded when they are used, not before."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import sys
 
 
 def loaded(code: str) -> set[str]:
-    """Which of the heavy packages a fresh Python has after running `code`."""
+    """Return which of the heavy packages a new Python process has loaded after running `code`."""
     heavy = "{'rerun', 'mcap', 'pyarrow', 'zstandard', 'fmpy', 'pythonfmu', 'scipy'}"
     program = f"import sys\n{code}\nprint(*sorted({heavy} & set(sys.modules)))"
     process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     return set(process.stdout.split())
 
 
-def test_importing_the_room_loads_nothing_heavy() -> None:
+def test_importing_the_package_loads_nothing_heavy() -> None:
     assert loaded("import kinfmu.log") == set()
 
 

@@ -1,4 +1,4 @@
-"""MCAP: the run comes back bit for bit, and other readers find what they can draw."""
+"""MCAP: the run reads back bit for bit, and other readers find what they can draw."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_margins_and_errors_that_are_not_logged_are_not_computed(run: Run, tmp_p
     assert read(tmp_path / "run.mcap").absent == {"solver.margin", *(f"solver.error_{q}" for q in ("q", "qd", "qdd"))}
 
 
-def test_rerun_finds_no_fault_with_the_file(any_run: Run, tmp_path: Path) -> None:
+def test_rerun_verifies_the_file(any_run: Run, tmp_path: Path) -> None:
     write_mcap(any_run, tmp_path / "run.mcap")
     process = subprocess.run(
         [executable(), "mcap", "check", "--full", str(tmp_path / "run.mcap")],
@@ -229,7 +229,7 @@ def test_every_column_has_a_field_of_its_own() -> None:
     assert names == ["a_x", "a_x_2", "watch_bar_1_length", "b_phi", "n2", "column"]
 
 
-def test_a_time_that_is_no_number_is_refused_and_the_old_file_stays(run: Run, tmp_path: Path) -> None:
+def test_a_time_that_is_not_a_number_is_refused_and_the_old_file_stays(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(b"old")
     with pytest.raises(LogError, match=r"time of sample 3 is nan s; a log needs a number within \+-2147483647 s"):
@@ -258,7 +258,7 @@ def test_a_missing_folder_is_named(run: Run, tmp_path: Path) -> None:
         write_mcap(run, tmp_path)
 
 
-def test_a_link_stays_a_link(run: Run, tmp_path: Path) -> None:
+def test_a_symbolic_link_is_kept(run: Run, tmp_path: Path) -> None:
     (tmp_path / "link.mcap").symlink_to(tmp_path / "run.mcap")
     write_mcap(run, tmp_path / "link.mcap")
     assert (tmp_path / "link.mcap").is_symlink()
@@ -292,7 +292,7 @@ def test_a_damaged_file_is_reported_or_reads_back_as_it_was(run_with_gap: Run, t
     assert all(text.startswith(f"{path}: ") and "\n" not in text for text in messages_found)
 
 
-def test_a_foreign_file_is_reported_from_a_run(tmp_path: Path) -> None:
+def test_a_file_of_another_program_is_not_taken_for_a_run(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -316,7 +316,7 @@ def test_a_gap_of_several_pieces_has_an_empty_message_each(run: Run, tmp_path: P
 
 
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
-def test_a_file_that_another_program_wrote_anew_reads_back(
+def test_a_file_rewritten_by_another_program_reads_back(
     compression: CompressionType, run_with_gap: Run, tmp_path: Path
 ) -> None:
     write_mcap(run_with_gap, tmp_path / "run.mcap")

@@ -52,7 +52,7 @@ def test_of_two_runs_that_begin_at_once_the_first_with_samples_is_written(run: R
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
 
 
-def test_no_other_way_of_writing_replaces_a_run_that_goes_on(growing: McapLog, run: Run) -> None:
+def test_no_other_command_replaces_a_run_that_is_being_written(growing: McapLog, run: Run) -> None:
     with pytest.raises(LogError, match=REFUSED):
         write_mcap(run, growing.path)
     assert len(recover(growing.path, growing.path.with_name("found.mcap"))) == 10

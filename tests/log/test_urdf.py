@@ -1,4 +1,4 @@
-"""The robot description of a record: what it holds beside links, and the frames in which that moves."""
+"""The robot description of a record: links, the parts that joints add, and their frames."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_cylinder_is_a_barrel_and_a_rod_that_move_between_its_pins() -> None:
     assert (reach + back > length).all()  # the rod never leaves the barrel
 
 
-def test_what_one_pose_does_not_tell_the_size_of_is_left_out() -> None:
+def test_parts_whose_size_does_not_follow_from_one_pose_are_left_out() -> None:
     run = solved("inverted_slider_crank")
     drawn = scene(run.part(slice(0, 1)), kinfmu.load("inverted_slider_crank"))
     strokes: list[Stroke] = [stroke for body in drawn.bodies for stroke in body.strokes]

@@ -1,4 +1,4 @@
-"""Coordinates that a run was not asked for are solved again as the run went."""
+"""Coordinates that are not outputs of a run are recomputed on the branch of the run."""
 
 from __future__ import annotations
 

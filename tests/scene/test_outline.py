@@ -26,7 +26,7 @@ def test_a_link_is_drawn_through_all_its_points(points: list[tuple[int, int]], e
     np.testing.assert_array_equal(drawn, expected)
 
 
-def test_the_rim_of_a_link_goes_around_its_points_or_along_them() -> None:
+def test_the_rim_of_a_link_is_around_its_points_or_along_them() -> None:
     corners, is_closed = rim(np.array([(0.0, 4.0), (1.0, 1.0), (4.0, 0.0), (0.0, 0.0)]))
     assert is_closed
     np.testing.assert_array_equal(corners, [(0, 0), (4, 0), (0, 4)])

@@ -1,4 +1,4 @@
-"""Long runs: what a picture may leave out."""
+"""Long runs: the samples that a recording leaves out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kinfmu.log import write_rrd
-from kinfmu.log.viewer import decimated as thinning
+from kinfmu.log.viewer import decimated as module
 from kinfmu.log.viewer.comparison import write_comparison
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.run import Run
@@ -30,7 +30,7 @@ def test_a_short_run_is_left_as_it_is(run: Run) -> None:
     assert decimated(run) is run
 
 
-def test_what_stands_out_is_kept(long_run: Run) -> None:
+def test_peaks_are_kept(long_run: Run) -> None:
     less = decimated(long_run, 100)
     assert 100 <= len(less) < 150
     kept = np.searchsorted(long_run.t, less.t)
@@ -41,10 +41,10 @@ def test_what_stands_out_is_kept(long_run: Run) -> None:
         assert np.nanmin(column.values) == np.nanmin(whole.values)
 
 
-def test_a_recording_says_what_it_leaves_out_and_tells_all_events(
+def test_a_recording_states_what_it_leaves_out_and_holds_all_events(
     long_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(thinning, "MOST_ROWS", 100)
+    monkeypatch.setattr(module, "MOST_ROWS", 100)
     write_rrd(long_run, tmp_path / "run.rrd")
     angles = rows(tmp_path / "run.rrd", "/position/angle", SCALARS)
     assert 100 <= len(angles) < 150

@@ -1,4 +1,4 @@
-"""Rerun recordings: whole files, right numbers, views without complaints."""
+"""Rerun recordings: complete files with the numbers of the run."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def rows(path: Path, entity: str, component: str) -> list[tuple[int, list[object
 
 
 def statics(path: Path, entity: str, component: str) -> list[object]:
-    """What of an entity's component holds at all times."""
+    """Return the static values of an entity's component."""
     import rerun as rr
 
     found = []
@@ -70,7 +70,7 @@ def verified(path: Path) -> bool:
     return process.returncode == 0
 
 
-def test_rerun_finds_no_fault_with_any_recording(tmp_path: Path) -> None:
+def test_rerun_verifies_any_recording(tmp_path: Path) -> None:
     for name, kind in KINDS.items():
         path = tmp_path / f"{name}.rrd"
         write_rrd(kind(), path)
@@ -93,7 +93,7 @@ def test_times_are_rounded_to_whole_nanoseconds(tmp_path: Path) -> None:
     assert [time for time, _ in angles] == [k * 1_000_000 for k in range(-500, 2500)]
 
 
-def test_links_stand_where_the_run_says(run: Run, tmp_path: Path) -> None:
+def test_links_have_the_poses_of_the_run(run: Run, tmp_path: Path) -> None:
     write_rrd(run, tmp_path / "run.rrd")
     path = tmp_path / "run.rrd"
     (line,) = statics(path, "/linkage/bodies/crank", STRIPS)
@@ -201,7 +201,7 @@ def renamed(run: Run, *kept: str) -> Run:
     return dataclasses.replace(run, outputs=outputs, mechanism_source="", info={})
 
 
-def test_a_comparison_says_what_runs_of_two_mechanisms_have_in_common(run: Run, tmp_path: Path) -> None:
+def test_a_comparison_states_what_runs_of_two_mechanisms_have_in_common(run: Run, tmp_path: Path) -> None:
     assert in_common(run, run) == ""
     none = "A and B have no coordinates in common, so there are no differences to show"
     assert in_common(run, renamed(run)) == none

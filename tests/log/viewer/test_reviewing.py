@@ -1,4 +1,4 @@
-"""Reviewing a run: recordings are made, pictures taken, and what is missing is said."""
+"""Reviewing a run: recordings are made, pictures taken, and missing things reported."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_two_runs_are_saved_as_one_recording(mcap: Path, tmp_path: Path) -> None
     assert (tmp_path / "both.rrd").stat().st_size > 10_000
 
 
-def test_without_a_display_it_says_what_else_can_be_done(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_display_the_alternatives_are_reported(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -59,7 +59,7 @@ def test_a_viewer_that_cannot_open_a_window_is_reported(mcap: Path, monkeypatch:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the stand-in for the viewer is a shell script")
-def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
+def test_a_viewer_that_opens_keeps_running_on_a_recording_in_the_folder_of_the_run(
     mcap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     viewer = tmp_path / "viewer"
@@ -78,7 +78,7 @@ def test_a_viewer_that_opens_is_left_running_on_a_recording_beside_the_run(
     process.wait()
 
 
-def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
+def test_a_file_that_is_not_a_run_is_refused(tmp_path: Path, mcap: Path) -> None:
     with pytest.raises(RequestError, match=r"run\.csv: a run to review is an \.mcap or \.rrd file"):
         review(tmp_path / "run.csv")
     with pytest.raises(RequestError, match=r"shot\.jpg: the name must end in \.png"):
@@ -93,7 +93,9 @@ def test_what_is_no_run_is_refused(tmp_path: Path, mcap: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere graphics are not from Vulkan")
-def test_a_machine_without_graphics_is_reported_what_to_install(mcap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_a_machine_without_graphics_the_package_to_install_is_reported(
+    mcap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
     monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
     with pytest.raises(LogError, match="on Debian: apt-get install mesa-vulkan-drivers libvulkan1") as caught:

@@ -75,7 +75,7 @@ def test_round_off_is_drawn_as_a_line_at_zero(run: Run) -> None:
     assert found["acceleration", "length"].shown is None
 
 
-def test_a_sample_beside_a_singular_point_does_not_flatten_the_rest(run: Run) -> None:
+def test_a_sample_near_a_singular_point_does_not_flatten_the_others(run: Run) -> None:
     accelerations = run.accelerations.copy()
     accelerations[100, 1] = -1e22
     found = groups(dataclasses.replace(run, accelerations=accelerations))["acceleration", "length"]

@@ -1,4 +1,4 @@
-"""Views of recordings in a viewer without a window: none complains, whatever is reviewed."""
+"""Views of recordings in a viewer without a window: none reports an error."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _compared(path: Path) -> None:
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
     ],
 )
-def test_no_view_complains(
+def test_no_view_reports_an_error(
     name: str, write: Callable[[Path], None], views: set[str], tmp_path: Path, viewer: headless.Viewer
 ) -> None:
     write(tmp_path / name)
@@ -58,7 +58,7 @@ def test_no_view_complains(
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_no_view_of_the_gallery_complains(name: str, tmp_path: Path, viewer: headless.Viewer) -> None:
+def test_no_view_of_the_gallery_reports_an_error(name: str, tmp_path: Path, viewer: headless.Viewer) -> None:
     mechanism = kinfmu.load(name)
     times = run_times(mechanism.run)
     run = kinfmu.solve(mechanism, times[:: -(-len(times) // MOST_SAMPLES)])
@@ -83,7 +83,7 @@ def test_the_record_alone_opens_with_plots_and_the_linkage(name: str, tmp_path: 
     assert {"/", "joint_states/position", "joint_states/velocity", "joint_accelerations/position"} <= set(shot.views)
 
 
-def test_a_view_that_complains_is_heard(tmp_path: Path, viewer: headless.Viewer) -> None:
+def test_the_error_of_a_view_is_reported(tmp_path: Path, viewer: headless.Viewer) -> None:
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -100,7 +100,7 @@ def test_a_view_that_complains_is_heard(tmp_path: Path, viewer: headless.Viewer)
     assert report.startswith("wrong: error: 2D visualizers require a pinhole")
 
 
-def test_recordings_of_other_mechanisms_do_not_take_over_a_layout(tmp_path: Path, viewer: headless.Viewer) -> None:
+def test_recordings_of_two_mechanisms_do_not_share_a_layout(tmp_path: Path, viewer: headless.Viewer) -> None:
     """Rerun keeps one layout for all recordings of an application; bounds and times of another run would be wrong."""
     write_rrd(fourbar(np.arange(181.0)), tmp_path / "first.rrd")
     write_rrd(select(fourbar(np.arange(20.0)), ["q"]), tmp_path / "second.rrd")
