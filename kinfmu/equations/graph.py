@@ -1,4 +1,4 @@
-"""Symbols: the joints' formulas traced into a graph of arithmetic, with derivatives taken on the graph.
+"""The joints' formulas traced into a graph of arithmetic, with derivatives taken on the graph.
 
 Equal expressions are one node. Simplifications keep every bit of the value (up to the sign of a zero), so that traced
 code and direct evaluation agree exactly. Nodes are numbered in the order of creation, arguments first: all passes run
@@ -149,11 +149,11 @@ class Graph:
         return self._intern("symbol", (), name)
 
     def lift(self, x: Any) -> Node:
-        """A node of this graph for a node or a number."""
+        """Return a node of this graph for a node or a number."""
         return x if isinstance(x, Node) else self.constant(x)
 
     def copy(self, node: Node, *args: Node) -> Node:
-        """An operation of another graph on nodes of this one, as it stands: nothing is simplified."""
+        """Return an operation of another graph on nodes of this one, not simplified."""
         return self._intern(node.op, args, node.value)
 
     def _intern(self, op: str, args: tuple[Node, ...], value: Content) -> Node:
@@ -163,7 +163,7 @@ class Graph:
         return self._nodes[key]
 
     def function(self, name: str, *args: Node, value: Content = None) -> Node:
-        """One of FUNCTIONS of nodes; `value` is what a curve needs besides."""
+        """Return one of FUNCTIONS of nodes; `value`: data and order of a curve."""
         numbers = [arg.constant for arg in args if arg.constant is not None]
         if len(numbers) == len(args):
             return self.constant(_applied(name, value, numbers))
@@ -172,9 +172,9 @@ class Graph:
     def derivative(
         self, targets: Sequence[Node], rates: Mapping[Node, Node], still: Collection[Node] = ()
     ) -> list[Node]:
-        """Derivatives of the targets when symbols move at the given rates, without those that stand still.
+        """Return derivatives of the targets if symbols move at the given rates; those in `still` do not move.
 
-        A symbol without a rate stands still, too.
+        A symbol without a rate does not move either.
         """
         zero, one = self.constant(0.0), self.constant(1.0)
         d: dict[Node, Node] = {}
@@ -210,7 +210,7 @@ class Graph:
 
 
 def reachable(targets: Iterable[Node]) -> list[Node]:
-    """The targets and everything they are made of, arguments first."""
+    """Return the targets and all nodes they are made of, arguments first."""
     found: dict[int, Node] = {}
     stack = list(targets)
     while stack:
@@ -222,7 +222,7 @@ def reachable(targets: Iterable[Node]) -> list[Node]:
 
 
 def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float]:
-    """Numbers for the targets, given a number for each symbol by name. For plans, not for run time."""
+    """Return numbers for the targets, given a number for each symbol by name; used by plans, not at run time."""
     at: dict[Node, float] = {}
     for node in reachable(targets):
         args = [at[arg] for arg in node.args]
@@ -236,7 +236,7 @@ def evaluate(targets: Sequence[Node], values: Mapping[str, float]) -> list[float
 
 
 def _applied(op: str, value: Content, args: Sequence[float]) -> float:
-    """An operation on numbers."""
+    """Return an operation on numbers."""
     if isinstance(value, tuple):
         data, order = value
         return curve_value(data, order, args[0])
@@ -259,7 +259,7 @@ _OPERATIONS: dict[str, Callable[..., float]] = {
 
 
 def symbols(targets: Iterable[Node]) -> list[Node]:
-    """The symbols that the targets are made of, in the order of their numbers."""
+    """Return the symbols that the targets are made of, in the order of their numbers."""
     return [node for node in reachable(targets) if node.op == "symbol"]
 
 

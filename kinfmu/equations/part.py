@@ -1,4 +1,4 @@
-"""Part of a system: some of its rows over some of its coordinates, the others standing still."""
+"""Part of a system: some of its rows over some of its coordinates; the others do not move."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from kinfmu.equations.system import FloatArray, System
 class Part:
     """Rows of a system over some of its coordinates; only the joints and drivers of these rows are evaluated.
 
-    rows, columns: by index into System.rows and System.coordinates, all if None; at: (n,) where the other coordinates
-    stand. q here is (len(columns),).
+    rows, columns: by index into System.rows and System.coordinates, all if None; at: (n,) values of the other
+    coordinates. q here is (len(columns),).
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Part:
         return at
 
     def residual(self, q: FloatArray, u: FloatArray) -> FloatArray:
-        """Phi of the rows relative to the size, (len(rows),)."""
+        """Return Phi of the rows relative to the size, (len(rows),)."""
         at, phi = self.whole(q), np.empty(len(self.rows))
         for member, (rows, places), _ in self._members:
             values = self.system.values(member, at, u)
@@ -59,7 +59,7 @@ class Part:
         return np.asarray(phi / self.row_scales)
 
     def jacobian(self, q: FloatArray) -> FloatArray:
-        """Phi_q, rows relative to the size and columns in sizes and radians: pure numbers of order one."""
+        """Return Phi_q, rows relative to the size and columns in sizes and radians: pure numbers of order one."""
         at, matrix = self.whole(q), np.zeros((len(self.rows), len(self.columns)))
         for member, (rows, row_places), (columns, column_places) in self._members:
             matrix[np.ix_(row_places, column_places)] = self.system.gradients(member, at)[np.ix_(rows, columns)]
@@ -67,7 +67,7 @@ class Part:
 
 
 def _places(chosen: Sequence[int], count: int) -> np.ndarray:
-    """Place of each of `count` indices among those chosen, -1 where it is not."""
+    """Return the place of each of `count` indices among those chosen, -1 for the others."""
     places = np.full(count, -1)
     places[list(chosen)] = np.arange(len(chosen))
     return places

@@ -67,7 +67,7 @@ class Redundancy:
 
 
 def find_redundancy(system: System) -> Redundancy:
-    """Test every joint row without itself, later rows first.
+    """Find redundant and inconsistent joint rows: test every row without itself, later rows first.
 
     A row is dependent if its gradient lies in the span of the other rows' gradients at every sampled pose of the motion
     that the others leave. A loss of rank at one pose only is a singular point and does not count. Haug (1989) judges
@@ -86,7 +86,9 @@ def find_redundancy(system: System) -> Redundancy:
     for index, implying in reversed(suspects.items()):
         others = [k for k in kept if k != index]
         joints = {system.member_of[row] for row in (*implying, index)}
-        of_joints = [k for k in others if system.member_of[k] in joints]  # in one pose some of them have no weight
+        of_joints = [
+            k for k in others if system.member_of[k] in joints
+        ]  # at a single pose some of these have no weight
         companies = [implying, of_joints, others] if implying else [others]
         found = next(filter(None, (_poses_of_dependence(system, start, index, rows) for rows in companies)), None)
         if found is None:
@@ -117,7 +119,7 @@ def _tolerance(system: System, index: int) -> float:
 def _poses_of_dependence(
     system: System, start: FloatArray, index: int, others: Sequence[int]
 ) -> tuple[list[FloatArray], Sequence[int]] | None:
-    """Poses of the motion that other rows leave at all of which a row depends on them, and those rows; or None.
+    """Return poses of the motion that other rows leave, if a row depends on them at all of these, and the rows.
 
     Only the bodies that these rows touch move: what a few rows imply they imply in every company.
     """

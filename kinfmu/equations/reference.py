@@ -25,11 +25,24 @@ class Solution(NamedTuple):
 def solve_reference(
     system: System, rows: Sequence[int], q: FloatArray, u: FloatArray, ud: FloatArray, udd: FloatArray
 ) -> Solution:
-    """One sample: Newton from q, then the two linear solves, over all coordinates. Haug (1989), chapter 3.
+    """Solve one sample: Newton from q, then the two linear solves, over all coordinates. Haug (1989), chapter 3.
 
         Phi_q dq = -Phi,   Phi_q qd = nu,   Phi_q qdd = gamma
 
-    rows: as many independent rows as coordinates, by index into System.rows. Raises PoseError if Newton does not end.
+    Args:
+        system: The equations.
+        rows: As many independent rows as coordinates, by index into System.rows.
+        q: Rough pose, (n,).
+        u: Driver values, (d,).
+        ud: Driver speeds, (d,).
+        udd: Driver accelerations, (d,).
+
+    Returns:
+        The solution.
+
+    Raises:
+        PoseError: Newton does not converge.
+
     """
     chosen = list(rows)
     q = np.array(q, dtype=float)

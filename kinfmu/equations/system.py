@@ -25,7 +25,7 @@ class Row(NamedTuple):
 
     owner: str
     label: str
-    scale: float  # residual per unit of length; an angle counts as the way of a point at distance `size`
+    scale: float  # residual per unit of length; an angle counts as the travel of a point at distance `size`
     kind: str  # 'length' or 'angle': what its gap is
 
     @property
@@ -74,17 +74,17 @@ class System:
         self.column_scales: FloatArray = np.where(is_angle, 1.0, self.size)  # (n,) coordinates per unit of motion
 
     def evaluate(self, q: Sequence[Any], u: Sequence[Any]) -> list[Any]:
-        """Phi in whatever arithmetic q and u are in, one value a row."""
+        """Return Phi, one value per row, in the arithmetic of q and u."""
         at = placement(self.mechanism, q)
         phi = [value for joint in self.mechanism.joints for value in joint.residual(at)]
         return phi + [driver.residual(at, target) for driver, target in zip(self.mechanism.drivers, u, strict=True)]
 
     def residual(self, q: ArrayLike, u: ArrayLike) -> FloatArray:
-        """Phi(q, u), (m,)."""
+        """Return Phi(q, u), (m,)."""
         return np.array(self.evaluate(_floats(q), _floats(u)))
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
-        """Phi_q, (m, n)."""
+        """Return Phi_q, (m, n)."""
         at = np.asarray(q, dtype=float)
         matrix = np.zeros((len(self.rows), len(self.coordinates)))
         for member in self.members:
@@ -112,19 +112,19 @@ class System:
         return tuple(number for number, member in enumerate(self.members) for _ in member.rows)
 
     def values(self, member: Member, q: FloatArray, u: FloatArray) -> list[float]:
-        """Phi of one joint or driver, a value a row; q: (n,) all coordinates."""
+        """Return Phi of one joint or driver, a value per row; q: (n,) all coordinates."""
         target = 0.0 if member.driver is None else float(u[member.driver])
         return [float(value) for value in self._alone(member, q[list(member.columns)].tolist(), target)]
 
     def gradients(self, member: Member, q: FloatArray) -> FloatArray:
-        """Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
+        """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
         unit = np.eye(len(member.columns))
         along = [Taylor(value, unit[k]) for k, value in enumerate(q[list(member.columns)].tolist())]
         lines = [_lines(phi, len(along)) for phi in self._alone(member, along, 0.0)]
         return np.array(lines).reshape(len(member.rows), len(along))
 
     def _alone(self, member: Member, coordinates: Sequence[Any], target: Any) -> Sequence[Any]:
-        """Rows of one joint or driver in whatever arithmetic the coordinates of its bodies are in."""
+        """Return the rows of one joint or driver, in the arithmetic of its bodies' coordinates."""
         poses = {GROUND_NAME: GROUND}
         for k, name in enumerate(member.bodies):
             poses[name] = BodyFrame.of(*coordinates[3 * k : 3 * k + 3])
@@ -136,22 +136,22 @@ class System:
         return self.mechanism.body_points
 
     def nu(self, q: ArrayLike, u: ArrayLike, ud: ArrayLike) -> FloatArray:
-        """Right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""
+        """Return the right side of the velocity equation, -Phi_t = -Phi_u ud, (m,)."""
         moving = [Taylor(value, rate) for value, rate in zip(_floats(u), _floats(ud), strict=True)]
         return np.array([-_derivative(phi, 1) for phi in self.evaluate(_floats(q), moving)])
 
     def gamma(self, q: ArrayLike, qd: ArrayLike, u: ArrayLike, ud: ArrayLike, udd: ArrayLike) -> FloatArray:
-        """Right side of the acceleration equation, (m,): minus the second derivative of Phi along q + qd t, u(t)."""
+        """Return the right side of the acceleration equation, (m,): -Phi'' along q + qd t, u(t)."""
         along = [Taylor(value, rate) for value, rate in zip(_floats(q), _floats(qd), strict=True)]
         moving = [Taylor(*target) for target in zip(_floats(u), _floats(ud), _floats(udd), strict=True)]
         return np.array([-_derivative(phi, 2) for phi in self.evaluate(along, moving)])
 
     def scaled_jacobian(self, q: ArrayLike) -> FloatArray:
-        """Phi_q with rows as lengths over the size and columns in sizes and radians: pure numbers of order one."""
+        """Return Phi_q, rows as lengths over the size and columns in sizes and radians: pure numbers of order one."""
         return self.jacobian(q) / self.scales[:, None] * self.column_scales / self.size
 
     def gaps(self, phi: ArrayLike) -> FloatArray:
-        """By how much each joint row is open, as a length or in radians by its kind, (joint rows,)."""
+        """Return the gap of each joint row, as a length or in radians by its kind, (joint rows,)."""
         values = _floats(phi)
         gaps: list[float] = []
         for joint in self.mechanism.joints:
@@ -161,22 +161,22 @@ class System:
         return np.array(gaps)
 
     def measure(self, q: ArrayLike) -> FloatArray:
-        """The driven quantities in a pose, (d,)."""
+        """Return the driven quantities in a pose, (d,)."""
         at = placement(self.mechanism, _floats(q))
         return np.array([driver.measured().value(at) for driver in self.mechanism.drivers])
 
     def gap_unit(self, row: Row) -> str:
-        """Unit of a row's gap."""
+        """Return the unit of a row's gap."""
         return "rad" if row.kind == "angle" else self.mechanism.length_unit
 
     def relative_gaps(self, phi: ArrayLike) -> FloatArray:
-        """Sizes of the gaps with lengths over the mechanism's size, (joint rows,)."""
+        """Return the absolute gaps, lengths over the mechanism's size, (joint rows,)."""
         sizes = [1.0 if row.kind == "angle" else self.size for row in self.rows[: self.joint_row_count]]
         return np.asarray(np.abs(self.gaps(phi)) / np.array(sizes), dtype=float)
 
 
 def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
-    """Poses of the bodies from all coordinates q, in any arithmetic."""
+    """Return the poses of the bodies from all coordinates q, in any arithmetic."""
     poses = {GROUND_NAME: GROUND}
     for k, body in enumerate(mechanism.moving_bodies):
         poses[body.name] = BodyFrame.of(*q[3 * k : 3 * k + 3])
@@ -184,7 +184,7 @@ def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
 
 
 def size_of(mechanism: Mechanism) -> float:
-    """The mechanism's size [length]: the longest body, measured between its points (and its frame, unless ground)."""
+    """Return the mechanism's size [length]: that of its longest body or joint."""
     longest = max(map(length_of, mechanism.bodies), default=0.0)
     for joint in mechanism.joints:
         longest = max(longest, float(joint.reach()))
@@ -192,7 +192,7 @@ def size_of(mechanism: Mechanism) -> float:
 
 
 def length_of(body: Body) -> float:
-    """How long a body is [length], measured between its points (and its frame, unless ground)."""
+    """Return the length of a body [length], measured between its points (and its frame, unless ground)."""
     points = list(body.points.values()) if body.is_ground else [*body.points.values(), (0.0, 0.0)]
     xy = np.array(points or [(0.0, 0.0)], dtype=float)
     return float(np.hypot(*(xy.max(axis=0) - xy.min(axis=0))))
@@ -203,7 +203,7 @@ def _floats(values: ArrayLike) -> list[float]:
 
 
 def _lines(phi: Any, n: int) -> FloatArray:
-    """First derivatives along n lines; a residual that met no Taylor number depends on nothing."""
+    """Return first derivatives along n lines; zero for a residual that is a plain number."""
     return np.broadcast_to(_derivative(phi, 1), (n,))
 
 

@@ -11,7 +11,9 @@ from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
 
-_NOTHING = 1e-100  # in place of a length of 0 whose derivative is asked for: what stands still stays so, nothing fails
+_NOTHING = (
+    1e-100  # in place of a length of 0 whose derivative is wanted: a point at rest stays at rest, and no division fails
+)
 Derivative = Any  # float, or (n,) for n lines at once
 
 
@@ -65,7 +67,7 @@ def _lifted(x: Taylor | float) -> Taylor:
 
 
 def _chain(x: Taylor, h: float, h1: float, h2: float) -> Taylor:
-    """h(x) from the value and the two derivatives of h at x.f."""
+    """Return h(x) from the value and the two derivatives of h at x.f."""
     return Taylor(h, h1 * x.d1, h2 * x.d1 * x.d1 + h1 * x.d2)
 
 
