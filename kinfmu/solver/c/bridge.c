@@ -310,7 +310,9 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
     return false;
 }
 
-/* Return whether a block has more rows than unknowns: its determinant is never negative, and falls to zero at a crossing. */
+/* Return whether a block has more rows than unknowns: its determinant is never negative, and falls to zero at a
+ * crossing.
+ */
 static bool is_tall(int block)
 {
     return kf_block_rows[block] > kf_block_ends[block] - (block > 0 ? kf_block_ends[block - 1] : 0);

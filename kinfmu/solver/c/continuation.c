@@ -86,7 +86,9 @@ static double normal_equations(const kf_model *model, const kf_found *found, int
     return length_of(m, left);
 }
 
-/* Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if there is none. */
+/* Return the smallest length of a block's residuals near z, relative to the size (Levenberg-Marquardt); 0 if there is
+ * none.
+ */
 static double gap_of(kf_solver *solver, const kf_model *model, int block)
 {
     kf_found *const found = &solver->scratch.follow[0].found;

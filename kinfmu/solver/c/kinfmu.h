@@ -41,10 +41,10 @@ typedef struct {
 
 /* A pose: x holds the unknowns first, then the coordinates that are given outright, then the driver values.
  *
- * determinants: one for each block, 1 far from singular; margin: the smallest of their sizes; residual: the largest length of
- * a block's residuals, relative to the size; moved: the largest correction of the prediction, in radians and sizes;
- * watch: the largest residual of the watches (redundant rows, which are not solved but monitored); hold: numbers of the
- * position stage that rates use.
+ * determinants: one for each block, 1 far from singular; margin: the smallest of their sizes; residual: the largest
+ * length of a block's residuals, relative to the size; moved: the largest correction of the prediction, in radians and
+ * sizes; watch: the largest residual of the watches (redundant rows, which are not solved but monitored); hold:
+ * numbers of the position stage that rates use.
  */
 typedef struct {
     double x[KF_COORDINATES];

@@ -23,8 +23,8 @@ static kf_pose *share_of(const kf_pose *whole, kf_pose *share)
     return share;
 }
 
-/* Take one step of all blocks, or find a failed pose if the tracks end before it; false if the blocks that depend on several
- * drivers cannot be trusted to stay on their branch.
+/* Take one step of all blocks, or find a failed pose if the tracks end before it; false if the blocks that depend on
+ * several drivers cannot be trusted to stay on their branch.
  */
 static bool mixed_step(kf_solver *solver, kf_pose *pose, const double *u, const double *target, kf_pose *there)
 {

@@ -49,9 +49,9 @@ typedef struct {
 /* A pose that was found. If it is not good, only its status is defined.
  *
  * x1, x2: derivatives of the coordinates with respect to the single driver, as many as `derivatives` counts; low,
- * high: the interval around the pose without windows of bridges; map: number of its singularity map, -1: empty; bridge: that
- * by which the pose is interpolated, or -1. A dead centre has no tangent that the next path could start with: that starts
- * from its base, the last regular pose before it, to which map, low and high then belong.
+ * high: the interval around the pose without windows of bridges; map: number of its singularity map, -1: empty;
+ * bridge: that by which the pose is interpolated, or -1. A dead centre has no tangent that the next path could start
+ * with: that starts from its base, the last regular pose before it, to which map, low and high then belong.
  */
 typedef struct {
     kf_found found;

@@ -1,10 +1,10 @@
 /* Sweep: the motion at many samples.
  *
- * With several drivers, or where the model has no lanes, each sample is followed from the last good one. With one driver
- * samples are predicted from segments, in whatever order they come, corrected side by side in lanes, and checked: residual,
- * determinants, corrections and rows set aside. Samples that fail a check are left for later: samples in the window of a bridge are
- * read from it side by side too, and closed; those then left, near a singular point or a limit, are solved one by
- * one.
+ * With several drivers, or where the model has no lanes, each sample is followed from the last good one. With one
+ * driver samples are predicted from segments, in whatever order they come, corrected side by side in lanes, and
+ * checked: residual, determinants, corrections and watches. Samples that fail a check are left for later:
+ * samples in the window of a bridge are read from it side by side too, and closed; those then left, near a singular
+ * point or a limit, are solved one by one.
  */
 #include "sweep.h"
 

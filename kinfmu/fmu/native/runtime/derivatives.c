@@ -294,7 +294,9 @@ static bool is_unknown(unsigned reference)
     return place < KF_REALS && !(KF_BIT(kf_part_of[place]) & KF_GIVEN_PARTS);
 }
 
-/* Variables that may be differentiated by: inputs, time and tunable parameters; before the end of initialization the fixed ones too. */
+/* Variables that may be differentiated by: inputs, time and tunable parameters; before the end of initialization the
+ * fixed ones too.
+ */
 static bool is_known(const kf_state *s, unsigned reference)
 {
     const unsigned place = KF_PLACE(reference);

@@ -172,8 +172,9 @@ static void by_inputs(const kf_state *s, const double *inputs, double t, const d
     }
 }
 
-/* The end of a step that followed derivatives of inputs: they move to its end, and the rates there are found. Rates that are
- * not given follow the parabola through the last samples: the inputs at the end are extrapolated and add no information.
+/* The end of a step that followed derivatives of inputs: they move to its end, and the rates there are found. Rates
+ * that are not given follow the parabola through the last samples: the inputs at the end are extrapolated and add no
+ * information.
  */
 void kf_end_of_step(kf_state *s, double step)
 {

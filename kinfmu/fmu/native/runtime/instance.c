@@ -188,8 +188,8 @@ static KF_RARE void move_inputs(kf_state *s, double step)
     kf_forget(s);
 }
 
-/* When inputs drive, the pose at the communication point is committed as a sample. If the inputs move, the pose at the end is
- * committed too, but not as a sample: its inputs are extrapolated, and the host may set others there.
+/* When inputs drive, the pose at the communication point is committed as a sample. If the inputs move, the pose at the
+ * end is committed too, but not as a sample: its inputs are extrapolated, and the host may set others there.
  */
 static kf_answer step_by_inputs(kf_instance *instance, double time, double step)
 {
