@@ -1,6 +1,6 @@
 """The command line: kinfmu list | new | schema | check | solve | build | simulate | review | export | recover | bench.
 
-A command a file, which puts itself into the group `main` when it is imported.
+One command per file; importing a file adds its command to the group `main`.
 """
 
 from kinfmu.cli import bench, build, check, export, listing, new, recover, review, schema, simulate, solve

@@ -10,7 +10,7 @@ import click
 
 from kinfmu import gallery
 from kinfmu.cli.files import beside, exists, missing
-from kinfmu.cli.tell import note
+from kinfmu.cli.messages import note
 from kinfmu.errors import listed, suggestion
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import ANGLES, Quantity, factors, in_turns, looks_like_degrees
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
-    """A gallery name or a .toml file; what does not exist is wrong usage, what is wrong in it the mechanism's fault."""
+    """A gallery name or a .toml file. A missing file is wrong usage; commands report errors in it."""
 
     name = "MECH"
     suffixes = ".toml"
@@ -32,7 +32,7 @@ class MechanismName(click.ParamType):  # type: ignore[type-arg,unused-ignore]  #
         files = (f"{name}.toml", str(Path(name) / "mechanism.toml"))
         if gallery.has(name):
             if exists(Path(files[0])):
-                note(f"{name} is that of the gallery; the file here is {files[0]}")
+                note(f"{name} is the gallery's; the file in this folder is {files[0]}")
             return name
         near = next((f"; did you mean '{file}'?" for file in files if exists(Path(file))), "")
         near = near or suggestion(name, [*beside(Path(name), ".toml"), *known])
@@ -67,7 +67,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
 
 
 class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
-    """A:B:X of numbers, with units where the quantity has any."""
+    """A range A:B:X of numbers, with units where the quantity has units."""
 
     def __init__(self, quantity: Quantity, last: str, length_unit: str = "m") -> None:
         self.quantity = quantity
@@ -97,7 +97,7 @@ class Range(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
         if self.last == "N" and (x != int(x) or x < 1):
             self.fail(f"'{value}': N = {parts[2]} must be a whole number of samples", param, ctx)
         if self.last == "STEP" and (x <= 0.0 or b < a):
-            self.fail(f"'{value}' must run forwards with a positive step", param, ctx)
+            self.fail(f"'{value}' must increase, with a positive step", param, ctx)
         from kinfmu.run import MOST_SAMPLES
 
         if (x if self.last == "N" else (b - a) / x) > MOST_SAMPLES:
@@ -120,7 +120,7 @@ class Time(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 
 
 def along(text: str | None, option: str, run: Run) -> float | None:
-    """A place on the axis of a run [s, rad or the run's unit of length]; a UsageError for a text that is none."""
+    """Return a position on the axis of a run [s, rad or the run's unit of length]; UsageError for invalid text."""
     if text is None:
         return None
     from kinfmu.run.axis import axis_of
@@ -130,9 +130,9 @@ def along(text: str | None, option: str, run: Run) -> float | None:
 
 
 def on_axis(text: str, option: str, label: str, unit: str, extent: str = "") -> float:
-    """A place on an axis of a label and a unit [s, rad or that unit of length]; a UsageError for a text that is none.
+    """Return a position on an axis [s, rad or its unit of length]; raise a UsageError for invalid text.
 
-    extent: what the message adds to the label, such as the range of the run.
+    label, unit: of the axis; extent: what the message adds to the label, such as the range of the run.
     """
     kind = "time" if unit == "s" else "angle" if unit in ANGLES else "length" if unit else "number"
     try:
@@ -142,7 +142,7 @@ def on_axis(text: str, option: str, label: str, unit: str, extent: str = "") -> 
 
 
 def driver_value(option: str, text: str, quantity: Quantity, length_unit: str) -> float:
-    """A value of a driver, or a time [rad, length, s]; a UsageError for a text that is none."""
+    """Return a driver value or a time [rad, length, s]; raise a UsageError for invalid text."""
     try:
         value = _number(text, quantity, length_unit)
     except ValueError as error:
@@ -161,12 +161,12 @@ def is_bare(text: str) -> bool:
 
 
 def names_in(text: str | None) -> list[str] | None:
-    """Names parted by commas; None if there are none."""
+    """Return names separated by commas; None for no text."""
     return [name.strip() for name in text.split(",")] if text else None
 
 
 def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
-    """'360deg' as radians, '1.5' as it is, '3mm' in the unit of length; ValueError says what would be valid."""
+    """Return '360deg' in radians, '1.5' unchanged, '3mm' in the unit of length; a ValueError lists the valid units."""
     known = factors(quantity, length_unit)
     for unit in sorted(known, key=len, reverse=True):
         if text.endswith(unit) and text[: -len(unit)].strip():
@@ -183,7 +183,7 @@ def _number(text: str, quantity: Quantity, length_unit: str = "m") -> float:
     return number
 
 
-OUTPUTS_HELP = "Only these outputs, such as coupler.x,rocker.phi (rates come along)"
+OUTPUTS_HELP = "Only these outputs with their rates, such as coupler.x,rocker.phi"
 MECHANISM = MechanismName()
 MODEL = ModelName()
 SETTING = Setting()
@@ -193,6 +193,5 @@ set_option = click.option(
     "settings",
     type=SETTING,
     multiple=True,
-    help="Another value of a parameter or of a law's constant, such as crank=40mm or crank.speed=30rpm; "
-    "may be given again.",
+    help="Set a parameter or a law's constant, such as crank=40mm or crank.speed=30rpm. Repeat for several.",
 )

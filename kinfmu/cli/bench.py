@@ -1,4 +1,4 @@
-"""kinfmu bench: run time against error, and what a sample, a sweep, a step, a record, an import and chains cost."""
+"""kinfmu bench: run time against error; cost of a sample, a sweep, a step, a record, an import and chains."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
-TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench that tells them, and what it measures
+TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench, and the mechanisms it measures
     "sample": ("solve_sample", ()),
     "sweep": ("native_sweep", ()),
     "step": ("fmu_step", ("fourbar",)),
@@ -29,7 +29,7 @@ ALL = "all"
 
 
 class Named(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
-    """One of a few names; a wrong one is told with what comes near."""
+    """One of a few names; the message for an unknown name suggests the nearest."""
 
     def __init__(self, name: str, what: str, known: Callable[[], list[str]]) -> None:
         self.name = name
@@ -45,7 +45,7 @@ class Named(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
 
 
 def _with_reference() -> list[str]:
-    """Mechanisms of the gallery that have a reference.csv."""
+    """Return the mechanisms of the gallery that have a reference.csv."""
     return [name for name in gallery.names() if (gallery.folder() / name / "reference.csv").is_file()]
 
 
@@ -57,30 +57,30 @@ def _with_reference() -> list[str]:
     multiple=True,
     metavar="NAME",
     type=Named("NAME", "a mechanism of the gallery with a reference", _with_reference),
-    help="For accuracy: a mechanism of the gallery; may be given again. Five if nothing is said.",
+    help="For accuracy: a mechanism of the gallery. Repeat for several. Default: five.",
 )
-@click.option("--rounds", type=click.IntRange(1), help="Rounds in which all ways take their turn.")
+@click.option("--rounds", type=click.IntRange(1), help="Rounds of measurements; each round measures every engine once.")
 @click.option(
     "-o",
     "folder",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Where accuracy writes tables and charts; if nothing is said docs/ of a checkout, or the current folder where "
-    "there is none or with --mechanism.",
+    help="Where accuracy writes tables and charts. Default: docs/ of a checkout; the current folder without a checkout "
+    "or with --mechanism.",
 )
 def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None, folder: Path | None) -> None:
-    """Measure kinfmu on this machine, beside other ways.
+    """Measure kinfmu on this machine, compared with other solvers.
 
-    WHAT is one or more of these; accuracy if nothing is said.
+    WHAT is one or more of these. Default: accuracy.
 
     \b
-    accuracy  run time against error of every engine in every setting, and past
-              singular points: tables and charts as in docs/accuracy.md; minutes
-    sample    a sample of solve beside a dense numpy Newton
-    sweep     a sweep by the native engine beside closed forms by hand and pylinkage
-    step      a step of the FMU beside the smallest pythonfmu FMU
-    native    a step of the native FMU in a C host beside closed forms by hand
-    log       records of a million samples, written and read back, beside mcap's writer
-    import    `import kinfmu` beside bare Python
+    accuracy  run time against error of every engine in every setting, and through
+              singular points: the tables and charts of docs/accuracy.md; takes minutes
+    sample    a sample of solve, compared with a dense numpy Newton
+    sweep     a sweep by the native engine, compared with closed forms and pylinkage
+    step      a step of the FMU, compared with the smallest pythonfmu FMU
+    native    a step of the native FMU in a C host, compared with closed forms
+    log       writing and reading records of a million samples, compared with mcap
+    import    `import kinfmu`, compared with bare Python
     chains    chains of up to a thousand loops
     all       all of these
     """  # noqa: D301  click leaves lines behind a backspace as they are
@@ -95,12 +95,12 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
             _accuracy(mechanisms, given, folder or (Path() if mechanisms else default_folder()))
         else:
             module, mechanism = TEXTS[name]
-            measurement = import_module(f"kinfmu.bench.{module}")  # late: each needs other packages
+            measurement = import_module(f"kinfmu.bench.{module}")  # each needs other packages
             click.echo(measurement.run(*map(gallery.load, mechanism), **given))
 
 
 def default_folder() -> Path:
-    """Where accuracy.md is kept: docs/ of the checkout that this is run from, else the current folder."""
+    """Return the folder of accuracy.md: docs/ of the checkout that runs this, else the current folder."""
     checkout = gallery.folder().parent / "docs"
     return checkout if (checkout / "accuracy.md").is_file() else Path()
 
@@ -115,11 +115,11 @@ def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) 
     with Progress("measuring", 1) as show:
         done, all_steps = count(1), accuracy.steps(mechanisms, rounds) + singular.steps()
 
-        def tell(_: str) -> None:
+        def advance(_: str) -> None:
             show(min(next(done), all_steps), all_steps)
 
-        measured, absent = accuracy.measure(mechanisms, rounds, tell)
-        near, absent_too = singular.measure(rounds, tell)
+        measured, absent = accuracy.measure(mechanisms, rounds, advance)
+        near, absent_too = singular.measure(rounds, advance)
     for line in dict.fromkeys((*absent, *absent_too)):
         click.echo(f"left out: {line}", err=True)
     parts = page.parts(measured, near, rounds)

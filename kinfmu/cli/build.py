@@ -1,4 +1,4 @@
-"""kinfmu build: a mechanism as an FMU."""
+"""kinfmu build: write a mechanism as an FMU."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import click
 
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, names_in, set_option
-from kinfmu.cli.group import about, main
+from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import settled
+from kinfmu.cli.settings import checked_settings
 from kinfmu.errors import listed
 
 
@@ -21,36 +21,36 @@ from kinfmu.errors import listed
     "-o",
     "output",
     type=click.Path(path_type=Path),
-    help="The .fmu to write, or a folder for it. If nothing is said: <name>.fmu in the current folder; for a mechanism "
-    "of the gallery in fmus/<name>/ where the current folder has that.",
+    help="The .fmu to write, or its folder. Default: <name>.fmu in the current folder, or in its fmus/<name>/ for a "
+    "mechanism of the gallery.",
 )
 @click.option(
     "--flavour",
     type=click.Choice(["python", "native"]),
-    help="native: C, for every host; python: for hosts that are Python processes, such as fmpy. "
-    "Default: native where a C compiler is found, else python.",
+    help="native: C, for every host; python: for hosts that contain Python, such as fmpy. Default: native if there is "
+    "a C compiler, else python.",
 )
 @click.option(
     "--fmi",
     type=click.Choice(["2", "3"]),
     default="2",
     show_default=True,
-    help="Version of FMI; the python flavour has 2 only.",
+    help="Version of FMI; the python flavour supports 2 only.",
 )
 @click.option(
     "--platforms",
     type=click.Choice(["host", "all"]),
     default="host",
     show_default=True,
-    help="host: this machine's, by its own compiler; all: Linux, Windows and macOS, by zig; native flavour only.",
+    help="host: this machine, with its compiler; all: Linux, Windows and macOS, with zig. Native flavour only.",
 )
 @click.option(
     "--drive",
     type=click.Choice(["time", "inputs"]),
-    help="What moves the drivers at first: time, by the laws of the file, or inputs such as crank_angle; "
-    "time if nothing is said, unless a law is external. The FMU's parameter driven_by_time changes it.",
+    help="What moves the drivers: time, by the laws of the file, or inputs such as crank_angle. Default: time, or "
+    "inputs if a law is external. The FMU's parameter driven_by_time changes it.",
 )
-@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; what they do not need is not solved.")
+@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; only what they need is solved.")
 @set_option
 def build(
     mechanism: str,
@@ -64,7 +64,7 @@ def build(
 ) -> None:
     """Build the FMU of a mechanism.
 
-    It is for co-simulation; a native one for model exchange, too.
+    It supports co-simulation. A native FMU supports model exchange, too.
     """
     from kinfmu.fmu import build as built
     from kinfmu.fmu.build import default_drive, default_flavour, native_obstacle, platforms_of
@@ -72,10 +72,10 @@ def build(
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
-    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism()
+    mech = checked_settings(mechanism, gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
     chosen = flavour or default_flavour(int(fmi), platforms)
-    with about(mechanism), Progress("compiling for all platforms", least=2) as progress:
+    with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:
         path = built(
             mech,
             output or _place(mechanism, mech.name),
@@ -88,7 +88,7 @@ def build(
         )
     is_native = chosen == "native"
     kinds = "co-simulation and model exchange" if is_native else "co-simulation"
-    where = listed(platforms_of(path)) + ("" if is_native else " in hosts that hold Python")
+    where = listed(platforms_of(path)) + ("" if is_native else " in hosts that contain Python")
     size = f"{path.stat().st_size / 1000.0:.0f} kB"
     click.echo(f"{path}: {size}, {chosen} FMU for {where}, FMI {fmi}.0 {kinds}, driven by {drive}")
     obstacle = native_obstacle() if flavour is None and not is_native else ""
@@ -97,6 +97,6 @@ def build(
 
 
 def _place(given: str, name: str) -> Path:
-    """<name>.fmu here; in fmus/<name>/ of a checkout for a mechanism of the gallery, given by its name."""
+    """Return <name>.fmu, in fmus/<name>/ of a checkout for a mechanism given by its name in the gallery."""
     own = Path("fmus") / name
     return (own if given in gallery.names() and own.is_dir() else Path()) / f"{name}.fmu"

@@ -1,4 +1,4 @@
-"""kinfmu check: what a good colleague would say about a mechanism."""
+"""kinfmu check: report the properties and problems of a mechanism."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, driver_value, set_option
 from kinfmu.cli.files import OutputFile
-from kinfmu.cli.group import about, main
-from kinfmu.cli.settings import settled
+from kinfmu.cli.group import errors_of, main
+from kinfmu.cli.settings import checked_settings
 from kinfmu.errors import KinfmuError, listed
 
 if TYPE_CHECKING:
@@ -25,10 +25,10 @@ FIGURES = (".svg", ".png")
 @main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
 @click.argument("mechanism", type=MECHANISM, metavar="MECH")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
-@click.option("--matrices", is_flag=True, help="Print the Jacobians at the start pose and at singular points, too.")
-@click.option("--assemblies", is_flag=True, help="List the ways of putting it together, and how to choose one.")
+@click.option("--matrices", is_flag=True, help="Also print the Jacobians at the start pose and at singular points.")
+@click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")
 @click.option("--figure", "picture", type=OutputFile(*FIGURES), help="Draw the mechanism with its names: .svg or .png.")
-@click.option("--at", metavar="VALUE", help="Value of the driver at which --figure draws it, such as 45deg or 20mm.")
+@click.option("--at", metavar="VALUE", help="Driver value of the pose that --figure draws, such as 45deg or 20mm.")
 @set_option
 def check(
     mechanism: str,
@@ -39,15 +39,15 @@ def check(
     at: str | None,
     settings: tuple[tuple[str, str], ...],
 ) -> None:
-    """Check a mechanism and tell what it can do.
+    """Check a mechanism and report its properties.
 
-    Mobility, redundant and contradicting constraints, the order of solving, ranges of the drivers, singular points.
+    Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points.
     """
     from kinfmu.analysis import check as checked
 
-    mech = settled(mechanism, gallery.load(mechanism), settings).mechanism()
+    mech = checked_settings(mechanism, gallery.load(mechanism), settings).mechanism()
     value = _value(mech, mechanism, at, picture)
-    with about(mechanism):
+    with errors_of(mechanism):
         report = checked(mech)
     if as_json:
         findings = report.as_json()
@@ -64,7 +64,7 @@ def check(
         if matrices and report.problem is None:
             for matrix in report.matrices():
                 click.echo(f"\n{matrix}")
-    with about(mechanism):
+    with errors_of(mechanism):
         if picture is not None:
             from kinfmu.draw import figure
 
@@ -76,7 +76,7 @@ def check(
 
 
 def _assemblies(report: Report) -> Assemblies | None:
-    """The ways of putting a mechanism together; None where its problem, told at the end, leaves none."""
+    """Return the ways to assemble a mechanism; None where its problem, which is reported last, leaves none."""
     try:
         return report.assemblies()
     except KinfmuError:
@@ -86,11 +86,11 @@ def _assemblies(report: Report) -> Assemblies | None:
 
 
 def _value(mechanism: Mechanism, name: str, at: str | None, picture: Path | None) -> float | None:
-    """The value of --at [rad or length]; a UsageError for what is none, or where there is no picture or one driver."""
+    """Return the value of --at [rad or length]; raise a UsageError without --figure or with several drivers."""
     if at is None:
         return None
     if picture is None:
-        raise click.UsageError(f"--at {at} is the pose of --figure, which is not given")
+        raise click.UsageError(f"--at {at} needs --figure")
     if len(mechanism.drivers) != 1:
         names = listed(driver.name for driver in mechanism.drivers)
         raise click.UsageError(f"--at {at} is the value of one driver; {name} has {names}")

@@ -1,4 +1,4 @@
-"""The main job on the reference four-bar: check, FMU, simulation, comparison with the report, logs."""
+"""The demonstration on the reference four-bar: check, FMU, simulation, comparison with the report, logs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kinfmu.log import write_mcap, write_rrd
 from kinfmu.run import Run
 from kinfmu.solver.python.status import Status
 
-# The report's printed table (Alzaga 1999): t [s], then phi1, x2, y2, phi2, phi3 to four digits.
+# The printed table of the report (Alzaga 1999): t [s], then phi1, x2, y2, phi2, phi3 to four digits.
 PRINTED = (
     (30, (0.5236, 1.8660, 0.5000, 0.0, 0.5236)),
     (60, (1.0472, 1.5000, 0.8660, 0.0, 1.0472)),
@@ -28,7 +28,7 @@ EXACT = 1e-12  # largest difference from the closed form in q, qd, qdd
 
 
 def compare_with_report(run: Run) -> tuple[str, bool]:
-    """The report's table beside ours with percent errors, and whether all 25 numbers agree to their four digits."""
+    """Return the table of the report and ours with percent errors, and whether all 25 numbers agree to four digits."""
     lines = ["  t [s]" + "".join(f"{letter:>10}{'error %':>10}" for letter in LETTERS)]
     agree = True
     for t, printed in PRINTED:
@@ -43,7 +43,7 @@ def compare_with_report(run: Run) -> tuple[str, bool]:
 
 
 def compare_with_closed_form(run: Run) -> tuple[str, bool]:
-    """Largest differences from the closed form, and whether all are within EXACT."""
+    """Return the largest differences from the closed form, and whether all are within EXACT."""
     worst = [
         float(np.abs(ours - exact).max())
         for ours, exact in zip((run.q, run.qd, run.qdd), closed_form(run.t), strict=True)
@@ -53,7 +53,7 @@ def compare_with_closed_form(run: Run) -> tuple[str, bool]:
 
 
 def main() -> int:
-    """Run the job in the current folder; exit status 1 if a comparison fails."""
+    """Run the demonstration in the current folder; exit status 1 if a comparison fails."""
     mechanism = load("fourbar")
     print(check(mechanism))
 
@@ -64,28 +64,26 @@ def main() -> int:
     print(f"interpolated across the singular points (status bridged) at t = {bridged} s")
 
     table, agrees = compare_with_report(run)
-    print(
-        "\nours beside the table printed in R. A. Alzaga's report (1999), with the percent errors of its four digits:"
-    )
-    print("all 25 numbers agree" if agrees else "DIFFERENT")
+    print("\nour values compared with the table printed in R. A. Alzaga's report (1999), with its percent errors:")
+    print("all 25 numbers agree within the four printed digits" if agrees else "DIFFERENT")
     print(table)
     difference, exact = compare_with_closed_form(run)
-    print(f"\nlargest difference from the closed form: {difference} ({'fine' if exact else 'TOO LARGE'})")
+    print(f"\nlargest difference from the closed form: {difference} ({'within' if exact else 'MORE THAN'} {EXACT:g})")
 
     logs = Path("logs")
     logs.mkdir(exist_ok=True)
     write_mcap(run, logs / "fourbar.mcap")
     write_rrd(run, logs / "fourbar.rrd")
     print(
-        "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; look at them with\n"
+        "\nwrote logs/fourbar.mcap and logs/fourbar.rrd; to review them:\n"
         "  .venv/bin/kinfmu review logs/fourbar.mcap\n"
-        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (no screen: scripts/graphics, once)"
+        "  .venv/bin/kinfmu review logs/fourbar.mcap --screenshot fourbar.png    (after scripts/graphics; no screen)"
     )
     return 0 if agrees and exact and bool(run.good.all()) else 1
 
 
 def listed_times(run: Run, status: Status) -> str:
-    """Times of the samples of a status, such as '0, 1, 179, 180'."""
+    """Return the times of the samples with this status, such as '0, 1, 179, 180'."""
     return ", ".join(f"{t:g}" for t in run.t[run.status == status])
 
 

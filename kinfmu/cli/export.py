@@ -1,4 +1,4 @@
-"""kinfmu export: a run as a file for other programs, or for a page; the kind chosen by the file's ending."""
+"""kinfmu export: write a run as a table, plot or animation; the file's ending chooses which."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ WITH_COLUMNS = [suffix for suffix, write in FORMATS.items() if write is not _ani
 
 
 def _between(run: Run, start: str | None, stop: str | None) -> Run:
-    """The samples from start to stop on the axis of the run, both included; all where neither is given."""
+    """Return the samples from start to stop on the axis of the run, both included; all by default."""
     if start is None and stop is None:
         return run
     import numpy as np
@@ -69,8 +69,8 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
             asked = f"from {first:g}{unit} on"
         elif start is None:
             asked = f"up to {last:g}{unit}"
-        told = axis.range() or "none"
-        raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {told}")
+        available = axis.range() or "none"
+        raise RequestError(f"--start, --stop: the run has no samples {asked}; its samples: {available}")
     kept = run.t[rows]
     low, high = (first, last) if axis.is_time else (np.min(kept), np.max(kept))
     return run.part(rows, events=tuple(event for event in run.events if low <= event.t <= high))
@@ -88,24 +88,24 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 @click.option(
     "--columns",
     metavar="NAMES",
-    help="Columns of a table, named as simulate --channels names them: coupler.x, coupler.*, q, -error; else all. Time "
-    "and status are always there. Plots take the same names, for coordinates; else those of q.",
+    help="Columns of a table or coordinates of a plot, with the names of simulate --channels: coupler.x, coupler.*, q, "
+    "-error. A table always contains time and status. Default: all columns; for plots, all of q.",
 )
 @click.option(
-    "--start", metavar="VALUE", help="Only samples from then on [s]; of solve --angle from that value, 30deg."
+    "--start", metavar="VALUE", help="First sample: time [s], or driver value of solve --angle, such as 30deg."
 )
-@click.option("--stop", metavar="VALUE", help="Only samples until then [s]; of solve --angle to that value, 90deg.")
+@click.option("--stop", metavar="VALUE", help="Last sample: time [s], or driver value of solve --angle, such as 90deg.")
 def export(run: Path, output: Path, columns: str | None, start: str | None, stop: str | None) -> None:
-    """Write a run as a table, as plots, or as a moving picture.
+    """Write a run as a table, as plots or as an animation.
 
-    RUN is a record (.mcap) of simulate or solve. A table holds all columns, or those named; Parquet and npz
-    the units, too. Plots (.svg, .png) show coordinates, velocities and accelerations against time, or against the
-    driver of a solve --angle; a .gif shows the linkage move.
+    RUN is a record (.mcap) of simulate or solve. Tables in Parquet and npz contain the units. Plots (.svg, .png) show
+    coordinates, velocities and accelerations against time, or against the driver of a solve --angle. A .gif shows the
+    moving linkage.
     """
     from kinfmu.log import read
 
     suffix = suffix_of(output)
     if columns is not None and suffix not in WITH_COLUMNS:
-        raise click.UsageError(f"--columns {columns}: is for tables and plots, {listed(WITH_COLUMNS)}, not {suffix}")
+        raise click.UsageError(f"--columns {columns}: only for tables and plots, {listed(WITH_COLUMNS)}, not {suffix}")
     FORMATS[suffix](_between(read(run), start, stop), output, names_in(columns) or ())
     click.echo(f"written: {output}")

@@ -1,4 +1,4 @@
-"""Kinds of arguments that are files: one to read, which must be there, and one to write, whose folder must be."""
+"""Arguments that are files: one to read, which must exist, and one to write, whose folder must exist."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kinfmu.files.whole_file import suffix_of
 
 
 class InputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
-    """A file that is there; suffixes: how its name may end, in any way if there are none."""
+    """An existing file; suffixes: valid endings of its name; default: any."""
 
     def __init__(self, *suffixes: str) -> None:
         self.suffixes = suffixes
@@ -28,7 +28,7 @@ class InputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gen
 
 
 class OutputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
-    """A file to be written into a folder that is there; suffixes: how its name may end."""
+    """A file to write into an existing folder; suffixes: valid endings of its name."""
 
     def __init__(self, *suffixes: str) -> None:
         self.suffixes = suffixes
@@ -45,7 +45,7 @@ class OutputFile(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # ge
 
 
 def exists(path: Path) -> bool:
-    """True if something other than a folder is there; a name that no file can have is not there."""
+    """Return True for an existing path that is no folder; False for an invalid name."""
     try:
         return path.exists() and not path.is_dir()
     except (OSError, ValueError):
@@ -53,7 +53,7 @@ def exists(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """True if a folder is there; a name that no folder can have is not there."""
+    """Return True for an existing folder; False for an invalid name."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -61,17 +61,17 @@ def is_folder(path: Path) -> bool:
 
 
 def missing(path: Path) -> str:
-    """'runn.csv: there is no such file; did you mean 'run.csv'?': of its folder, by names that end alike."""
+    """Return 'runn.csv: there is no such file; did you mean 'run.csv'?', from names with the same ending."""
     if is_folder(path):
         return f"{path}: is a folder; the name of a file is needed"
     return f"{path}: there is no such file{suggestion(str(path), beside(path, suffix_of(path)))}"
 
 
 def beside(path: Path, suffix: str) -> list[str]:
-    """Files of a suffix in the folder of a path, by how they would be given in its place."""
+    """Return the files with this suffix in the folder of a path, as they would be written in its place."""
     try:
         return sorted(str(path.with_name(one.name)) for one in path.parent.iterdir() if suffix_of(one) == suffix)
-    except (OSError, ValueError):  # no folder, or no name that a folder could have
+    except (OSError, ValueError):  # no folder, or an invalid name
         return []
 
 

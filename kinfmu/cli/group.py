@@ -1,4 +1,4 @@
-"""The group of commands, and how what went wrong is told."""
+"""The group of commands, and how errors are reported."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any, NoReturn
 import click
 
 from kinfmu import VERSION
-from kinfmu.cli.tell import printable
+from kinfmu.cli.messages import printable
 from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
 
 ORDER = ("list", "new", "check", "solve", "build", "simulate", "review", "export", "recover", "schema", "bench")
 
 
 class _Command(click.Command):
-    """Tells what was asked for and is not there as wrong usage."""
+    """A command that reports a RequestError as wrong usage."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -28,33 +28,33 @@ class _Command(click.Command):
 
 
 class _Group(click.Group):
-    """Turns what kinfmu raises on purpose into one line on stderr and exit status 1."""
+    """A group that reports a KinfmuError as one line on stderr with exit status 1."""
 
     command_class = _Command
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Commands in the order of work; those that are not in it come last."""
+        """Return the commands in the order of work, others last."""
         return sorted(self.commands, key=lambda name: (ORDER.index(name) if name in ORDER else len(ORDER), name))
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with _ended_in_order():
+            with _signals_as_exceptions():
                 return super().invoke(ctx)
         except KinfmuError as error:
             click.echo(f"kinfmu: {one_line(error)}", err=True)
             ctx.exit(1)
         except MemoryError:
-            click.echo("kinfmu: there is not enough memory for so large a mechanism", err=True)
+            click.echo("kinfmu: not enough memory for a mechanism of this size", err=True)
             ctx.exit(1)
 
 
 @contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """SIGTERM and SIGHUP end this block as an exception does, so that no half-written file stays behind."""
+def _signals_as_exceptions() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end this block as an exception does, so that no half-written file remains."""
 
     def end(number: int, _frame: Any) -> NoReturn:
         click.echo(f"kinfmu: ended by {signal.Signals(number).name}", err=True)
-        raise SystemExit(128 + number)  # as shells count
+        raise SystemExit(128 + number)  # the exit status that shells use
 
     changed = []
     if threading.current_thread() is threading.main_thread():
@@ -73,30 +73,30 @@ def _ended_in_order() -> Iterator[None]:
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(VERSION, prog_name="kinfmu")
 def main() -> None:
-    """Planar kinematics: from a mechanism file to an FMU and logs that can be reviewed.
+    """Planar kinematics: from a mechanism file to an FMU and logs that you can review.
 
-    MECH is a name of the gallery (kinfmu list) or a mechanism file (.toml); FILE, RUN and FMU are files. Numbers may
-    carry a unit, as 90deg, 40mm, 30rpm and 10ms do; bare angles are in radians.
+    MECH is a name of the gallery (kinfmu list) or a mechanism file (.toml). FILE, RUN and FMU are files. Numbers may
+    have units: 90deg, 40mm, 30rpm, 10ms. Bare angles are in radians.
 
     \b
     A first tour:
-      kinfmu new fourbar mine.toml    a commented mechanism file to change
-      kinfmu check mine.toml          what it can do
-      kinfmu simulate mine.toml       its FMU, stepped and logged
-      kinfmu review logs/mine.mcap
+      kinfmu new fourbar mine.toml    write a commented mechanism file, to edit
+      kinfmu check mine.toml          report its properties
+      kinfmu simulate mine.toml       build and step its FMU, write logs
+      kinfmu review logs/mine.mcap    open the run in the viewer
 
-    Exit status: 0 fine, 1 the mechanism or the run is at fault, 2 wrong usage.
+    Exit status: 0 success, 1 error in the mechanism or the run, 2 wrong usage.
     """  # noqa: D301  click leaves lines behind a backspace as they are
 
 
 def one_line(error: KinfmuError) -> str:
-    """The message on a single line."""
+    """Return the message on a single line."""
     return printable(str(error))
 
 
 @contextmanager
-def about(mechanism: str) -> Iterator[None]:
-    """What is found wrong in a mechanism after its file was read is told with the file's name in front."""
+def errors_of(mechanism: str) -> Iterator[None]:
+    """Put the name of the mechanism's file before the messages of errors in this block."""
     try:
         yield
     except (RequestError, MechanismError, AssemblyError) as error:
@@ -104,8 +104,8 @@ def about(mechanism: str) -> Iterator[None]:
 
 
 @contextmanager
-def stopped(text: str) -> Iterator[None]:
-    """Ctrl-C in this block, or function, is told as `text`, with exit status 1 as everywhere."""
+def on_interrupt(text: str) -> Iterator[None]:
+    """Report Ctrl-C in this block, or function, as `text`, with exit status 1."""
     try:
         yield
     except KeyboardInterrupt:
@@ -113,8 +113,8 @@ def stopped(text: str) -> Iterator[None]:
 
 
 @contextmanager
-def instead(path: str, name: str) -> Iterator[None]:
-    """What is found wrong is told of what the user named, not of a file made on the way."""
+def errors_as(path: str, name: str) -> Iterator[None]:
+    """Report errors under the user's file name, not under that of a temporary file."""
     try:
         yield
     except KinfmuError as error:

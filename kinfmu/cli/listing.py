@@ -12,7 +12,7 @@ from kinfmu.cli.group import main
 def list_() -> None:
     """List the mechanisms of the gallery.
 
-    Their names stand for MECH in other commands.
+    Use their names as MECH in other commands.
     """
     names = gallery.names()
     width = max(map(len, names), default=0)

@@ -1,4 +1,4 @@
-"""kinfmu new: a mechanism file to start from."""
+"""kinfmu new: write a mechanism file to start from."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from kinfmu.files.whole_file import write_whole
 def new(mechanism: str, file: Path) -> None:
     """Write a commented mechanism file to start from.
 
-    FILE (.toml) becomes a copy of MECH.
+    FILE (.toml) is a copy of MECH.
     """
     if exists(file):
-        raise click.UsageError(f"{file}: is there already; nothing was written")
+        raise click.UsageError(f"{file}: exists already; nothing was written")
     source = gallery.folder() / mechanism / "mechanism.toml" if mechanism in gallery.names() else Path(mechanism)
     try:
-        if ":" in mechanism and gallery.has(mechanism):  # a chain, which no file holds
+        if ":" in mechanism and gallery.has(mechanism):  # a chain has no file
             gallery.save(gallery.load(mechanism), file)
         else:
             write_whole(file, source.read_bytes())

@@ -12,7 +12,7 @@ LONG_RUN = 2000  # samples from which a progress bar is worth a line
 
 
 class Progress:
-    """A progress bar on stderr for what has at least `least` steps, where somebody sees it."""
+    """A progress bar on stderr for at least `least` steps, if stderr is a terminal."""
 
     def __init__(self, label: str = "simulating", least: int = LONG_RUN) -> None:
         self.label = label

@@ -1,4 +1,4 @@
-"""kinfmu recover: what a killed run left, as a whole file."""
+"""kinfmu recover: write the samples of a killed run as a complete record."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from kinfmu.cli.group import main
     "-o",
     "output",
     type=OutputFile(".mcap"),
-    help="The record to write; <RUN>-recovered.mcap beside RUN if nothing is said.",
+    help="The record to write; default: <RUN>-recovered.mcap in the folder of RUN.",
 )
 def recover(run: Path, output: Path | None) -> None:
-    """Make a whole record of what a killed run left.
+    """Write the samples of a killed run as a complete record.
 
-    RUN is a record (.mcap) that was cut off or damaged, and stays as it is.
+    RUN is a truncated or damaged record (.mcap). It is not changed.
     """
-    from kinfmu.cli.tell import printable
+    from kinfmu.cli.messages import printable
     from kinfmu.cli.verdict import verdict
     from kinfmu.log import recover as recovered
     from kinfmu.run.axis import axis_of

@@ -1,4 +1,4 @@
-"""kinfmu schema: the JSON Schema of mechanism files."""
+"""kinfmu schema: write the JSON Schema of mechanism files."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kinfmu.files.whole_file import write_whole
 
 
 @main.command(epilog="Example: kinfmu schema -o mechanism.schema.json")
-@click.option("-o", "output", type=OutputFile(), help="The file to write; printed if nothing is said.")
+@click.option("-o", "output", type=OutputFile(), help="The file to write. Default: print it.")
 def schema(output: Path | None) -> None:
     """Write the JSON Schema of mechanism files.
 
-    Editors complete and check mechanism files by it.
+    Editors use it to complete and check mechanism files.
     """
     from kinfmu.mechanism.schema import schema_text
 

@@ -1,4 +1,4 @@
-"""What --set says: parameters of a mechanism, constants of its laws, and what belongs to a run alone."""
+"""Values of --set: parameters of a mechanism, constants of its laws, settings of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.tell import note
+from kinfmu.cli.messages import note
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
@@ -20,17 +20,17 @@ TOLERANCE = "solver.tolerance"
 DRIVEN_BY_TIME = "driven_by_time"
 RATES = "rates"
 _ELSEWHERE = {
-    TOLERANCE: "it belongs to a run: solve and simulate take it",
-    DRIVEN_BY_TIME: "it belongs to an FMU: simulate takes it, build --drive chooses its default",
-    RATES: "it belongs to an FMU: simulate takes it, as auto, estimated or wired",
+    TOLERANCE: "it belongs to a run; use solve or simulate",
+    DRIVEN_BY_TIME: "it belongs to an FMU; use simulate, or set its default with build --drive",
+    RATES: "it belongs to an FMU; use simulate, with auto, estimated or wired",
 }
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings by name, each where it belongs.
+    """Values of --set by name.
 
-    written: the mechanism as the file has it; parameters, constants: as they were set; of_run: what belongs to a run.
+    written: the mechanism as in its file; parameters, constants: their new values; of_run: settings of a run.
     """
 
     written: Mechanism
@@ -39,9 +39,9 @@ class Settings:
     of_run: Mapping[str, float | str | bool]
 
     def mechanism(self) -> Mechanism:
-        """Return the mechanism with its settings, in the pose to which the written one is followed.
+        """Return the mechanism with its settings, in the pose reached from that of the file by continuation.
 
-        A note on stderr says if that is not possible and it is assembled anew.
+        A note on stderr reports when this fails and the mechanism is assembled from its start poses.
         """
         from kinfmu.sweep.continued import continued
 
@@ -51,13 +51,20 @@ class Settings:
         return followed.mechanism
 
 
-def settled(
+def checked_settings(
     name: str, mechanism: Mechanism, settings: Sequence[tuple[str, str]], of_run: Sequence[str] = ()
 ) -> Settings:
-    """Settings of the command line, checked; the names of a mechanism are the same for every command.
+    """Return the settings of the command line after checking them.
 
-    name: as which the user knows the mechanism; of_run: names of a run that this command takes, too. Raises a
-    click.UsageError for what is not there, cannot be meant, or follows from something else.
+    Args:
+        name: Name or file of the mechanism, as the user gave it.
+        mechanism: The mechanism as in its file.
+        settings: Name and text of each --set.
+        of_run: Names of settings of a run that this command takes.
+
+    Raises:
+        click.UsageError: For an unknown name, an invalid value, or a value that follows from an expression.
+
     """
     constants = {constant.name: constant for constant in mechanism.law_constants}
     known = [*mechanism.parameters, *constants, *of_run]
@@ -66,13 +73,13 @@ def settled(
         driver, _, key = parameter.rpartition(".")
         expression = mechanism.expressions.get(("drivers", driver, "law", key))
         if expression is not None:
-            raise click.UsageError(f"{where}: it follows from '{expression.text}'; set what stands there")
+            raise click.UsageError(f"{where}: it follows from '{expression.text}'; set the parameters in it")
         if parameter not in known:
             elsewhere = _ELSEWHERE.get(parameter)
             hint = f"; {elsewhere}" if elsewhere else suggestion(parameter, known)
             raise click.UsageError(f"{where}: {name} has no parameter '{parameter}'{hint}; parameters: {listed(known)}")
         if parameter in constants and constants[parameter].quantity == Quantity("angle"):
-            _note_of_degrees(parameter, text)
+            _note_degrees(parameter, text)
         if parameter == TOLERANCE:
             value = _value(text)
             if not isinstance(value, float) or not 0.0 < value < math.inf:
@@ -91,27 +98,27 @@ def settled(
 
 
 def tolerance_of(settings: Settings) -> float:
-    """The tolerance of a solve: what --set says, else the usual one."""
+    """Return the tolerance of a solve: the value of --set, or the default."""
     from kinfmu.solver.python.solver import TOLERANCE as USUAL
 
     return float(settings.of_run.get(TOLERANCE, USUAL))
 
 
 def as_values(settings: Sequence[tuple[str, str]]) -> dict[str, float | str | bool]:
-    """Settings by name: true or false, a number, or text that says a unit."""
+    """Return settings by name: true or false, a number, or text with a unit."""
     truths = {"true": True, "false": False}
     return {name: truths.get(text.lower(), _value(text)) for name, text in settings}
 
 
 def _value(text: str) -> float | str:
-    """A number, or text that says its unit or its expression."""
+    """Return a number, or text with a unit or an expression."""
     try:
         return float(text)
     except ValueError:
         return text
 
 
-def _note_of_degrees(name: str, text: str) -> None:
+def _note_degrees(name: str, text: str) -> None:
     value = _value(text)
     if isinstance(value, float) and looks_like_degrees(value):
         note(f"{name} = {text} rad, {in_turns(value)}; write {name}={text}deg for degrees")

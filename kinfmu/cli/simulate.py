@@ -1,4 +1,4 @@
-"""kinfmu simulate: an FMU stepped, its run logged."""
+"""kinfmu simulate: step an FMU and write logs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MODEL, TIME, set_option
 from kinfmu.cli.files import InputFile, OutputFile
-from kinfmu.cli.group import about, instead, main, stopped
+from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
+from kinfmu.cli.messages import print_events
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, settled
-from kinfmu.cli.tell import tell_of
+from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, checked_settings
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.files.whole_file import suffix_of
@@ -25,34 +25,30 @@ LOGS = Path("logs")
 
 @main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
 @click.argument("model", metavar="FMU|MECH", type=MODEL)
-@click.option("--start", type=TIME, help="When it starts [s]; if nothing is said with --input, else as the model says.")
-@click.option("--stop", type=TIME, help="When it ends [s]; if nothing is said with --input, else as the model says.")
-@click.option("--step", type=TIME, help="Communication step [s]; if nothing is said as the model says.")
+@click.option("--start", type=TIME, help="Start time [s]. Default: first row of --input, else that of the model.")
+@click.option("--stop", type=TIME, help="Stop time [s]. Default: last row of --input, else that of the model.")
+@click.option("--step", type=TIME, help="Communication step [s]. Default: that of the model.")
 @click.option(
     "--input",
     "inputs",
     type=InputFile(),
-    help="A CSV that drives in place of time: columns time and inputs, such as crank_angle or 'crank_angle [deg]'; "
-    "straight from row to row.",
+    help="A CSV file that drives in place of the laws: columns time and inputs, such as crank_angle or "
+    "'crank_angle [deg]'; linear between rows.",
 )
-@click.option(
-    "--wrap", is_flag=True, help="Angles of --input were wrapped, from 360 to 0 deg, say: follow them the short way."
-)
+@click.option("--wrap", is_flag=True, help="Unwrap the angles of --input, such as a jump from 360 to 0 deg.")
 @set_option
+@click.option("--mcap", type=OutputFile(".mcap"), help="The record to write. Default: logs/<name of the file>.mcap.")
 @click.option(
-    "--mcap", type=OutputFile(".mcap"), help="The record to write; logs/<file given>.mcap if nothing is said."
-)
-@click.option(
-    "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write; beside the record if nothing is said."
+    "--rrd", type=OutputFile(".rrd"), help="The Rerun recording to write. Default: <record>.rrd in the same folder."
 )
 @click.option(
     "--channels",
     metavar="NAMES",
-    help="What to keep, with commas: q, qd, qdd, points, inputs, residual, iterations, margin, error, watch, columns "
-    "such as coupler.* and drawn, for viewers; -error,-margin: all but those; none: no logs. All if nothing is said.",
+    help="What to log, separated by commas: q, qd, qdd, points, inputs, residual, iterations, margin, error, watch, "
+    "drawn (for viewers), columns such as coupler.*; -error,-margin: all but these; none: no logs. Default: all.",
 )
-@click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to keep in a second of the run.")
-@stopped("stopped before the first sample: nothing was kept")
+@click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to log per second of the run.")
+@on_interrupt("stopped before the first sample: nothing was kept")
 def simulate(
     model: str,
     start: float | None,
@@ -66,10 +62,10 @@ def simulate(
     channels: str | None,
     rate: float | None,
 ) -> None:
-    """Step an FMU and log the run; of a MECH it is built first.
+    """Step an FMU and write logs; build it first from a MECH.
 
-    Steps an FMU that kinfmu built, with fmpy, and writes an MCAP record and a Rerun recording. The record grows with
-    the run: of one that is killed, kinfmu recover keeps all but the last moment.
+    Steps an FMU of kinfmu with fmpy and writes an MCAP record and a Rerun recording. The record grows during the run;
+    kinfmu recover restores that of a killed run.
     """
     from tempfile import TemporaryDirectory
 
@@ -78,18 +74,18 @@ def simulate(
     from kinfmu.run.channels import is_drawn
 
     if wrap and inputs is None:
-        raise click.UsageError("--wrap follows the angles of --input, which is not given")
+        raise click.UsageError("--wrap needs --input")
     names = None if channels is None else [name.strip() for name in channels.split(",")]
     is_logged = names != ["none"]
     for path in (mcap, rrd):
         if path is not None and not is_logged:
-            raise click.UsageError(f"--channels none keeps nothing to write to {path}")
+            raise click.UsageError(f"--channels none leaves nothing to write to {path}")
     with TemporaryDirectory(prefix="kinfmu_") as folder:
         fmu, parameters = _fmu(model, settings, Path(folder), has_inputs=inputs is not None)
         record, recording = _logs(model, mcap, rrd) if is_logged else (None, None)
         is_replaced = record is not None and record.exists()
-        needs_room = is_logged and mcap is None
-        with _room() if needs_room else nullcontext(), Progress() as progress, instead(str(fmu), model):
+        needs_folder = is_logged and mcap is None
+        with _logs_folder() if needs_folder else nullcontext(), Progress() as progress, errors_as(str(fmu), model):
             run = simulated(
                 fmu,
                 start=start,
@@ -104,38 +100,38 @@ def simulate(
                 progress=progress,
             )
     if recording:
-        with stopped(f"stopped before the recording was written; the run is in {record}"):
+        with on_interrupt(f"stopped before the recording was written; the run is in {record}"):
             write_rrd(run, recording)
-    tell_of(run)
+    print_events(run)
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
     click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}" if record else verdict(run))
     if record:
-        click.echo(f"to look at it: kinfmu review {quote(str(record))}")
+        click.echo(f"to review it: kinfmu review {quote(str(record))}")
     fail_if_failed(run)
 
 
 def _fmu(
     model: str, settings: Sequence[tuple[str, str]], folder: Path, *, has_inputs: bool
 ) -> tuple[Path, dict[str, float | str | bool]]:
-    """The FMU that is asked for, built in `folder` if a mechanism is, and the parameters to set in it."""
+    """Return the FMU, built in `folder` if `model` is a mechanism, and the parameters to set in it."""
     from kinfmu.fmu import build
     from kinfmu.fmu.build import default_drive
 
     if suffix_of(model) == ".fmu":
         return Path(model), as_values(settings)
     mech = gallery.load(model)
-    given = settled(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
-    with about(model):
+    given = checked_settings(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
+    with errors_of(model):
         mech = given.mechanism()
         drive = "inputs" if has_inputs else default_drive(mech)
-        fmu = build(mech, folder, flavour="python", drive=drive)  # stepped here and now: a compiler would take longer
+        fmu = build(mech, folder, flavour="python", drive=drive)  # compiling would take longer than this one run
     return fmu, dict(given.of_run)
 
 
 def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
-    """Where the logs go: into logs/, under the name of the file or of the gallery's mechanism, if nothing is said.
+    """Return the paths of record and recording; default: logs/ and the name of the file or of the gallery's mechanism.
 
-    The recording goes beside the record, so that two runs of one mechanism keep both of their files.
+    The recording has the path of the record with the ending .rrd, so that two runs of one mechanism keep all files.
     """
     file = Path(model.replace(":", "_"))
     name = file.stem if suffix_of(file) in (".toml", ".fmu") else file.name
@@ -144,9 +140,9 @@ def _logs(model: str, mcap: Path | None, rrd: Path | None) -> tuple[Path, Path]:
 
 
 @contextmanager
-def _room() -> Iterator[None]:
-    """The folder of logs is there in this block; one that was made for it goes again if nothing is kept."""
-    is_there = LOGS.is_dir()
+def _logs_folder() -> Iterator[None]:
+    """Make the folder of logs; remove a new one if the run leaves no file."""
+    existed = LOGS.is_dir()
     try:
         LOGS.mkdir(exist_ok=True)
     except OSError as error:
@@ -154,6 +150,6 @@ def _room() -> Iterator[None]:
     try:
         yield
     except (RequestError, KeyboardInterrupt):
-        if not is_there:
+        if not existed:
             LOGS.rmdir()
         raise

@@ -1,4 +1,4 @@
-"""kinfmu solve: a run as a table, or as a record."""
+"""kinfmu solve: solve a mechanism into a table or a record."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, is_bare, names_in, set_option
 from kinfmu.cli.files import OutputFile
-from kinfmu.cli.group import about, main, stopped
-from kinfmu.cli.settings import TOLERANCE, Settings, settled, tolerance_of
-from kinfmu.cli.tell import note, tell_of, warn
+from kinfmu.cli.group import errors_of, main, on_interrupt
+from kinfmu.cli.messages import note, print_events, warn
+from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, tolerance_of
 from kinfmu.cli.verdict import fail_if_failed, verdict
 from kinfmu.errors import listed
 from kinfmu.files.whole_file import suffix_of
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 TABLES = (".csv", ".parquet", ".npz")
 RECORD = ".mcap"
-HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn that was not meant
+HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrapped angle
 
 
 @main.command(epilog="Example: kinfmu solve fourbar -o run.csv --angle 0deg:360deg:361")
@@ -34,33 +34,33 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a turn t
     "output",
     type=OutputFile(*TABLES, RECORD),
     required=True,
-    help=f"The table to write: {listed(TABLES)}; or the record, {RECORD}, which review shows and export plots.",
+    help=f"The table to write: {listed(TABLES)}; or the record, {RECORD}, for review and export.",
 )
 @click.option(
     "--times",
     type=Range(Quantity("time"), "STEP"),
-    help="Times from A to B, such as 0:2:0.01 [s] or 0s:2s:10ms, at which the laws of the file drive; "
-    "the file's run if nothing is said.",
+    help="Times from A to B at which the laws of the file drive, such as 0:2:0.01 [s] or 0s:2s:10ms. Default: the "
+    "[run] of the file.",
 )
 @click.option(
     "--angle",
     "--position",
     "angle",
     metavar="A:B:N",
-    help="N values of the driver from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101; bare numbers "
-    "are rad, or the file's unit of length. Rates are derivatives by the driver; time counts the samples.",
+    help="N driver values from A to B in place of times, such as 0deg:360deg:361 or 0mm:50mm:101. Bare numbers are in "
+    "rad or in the file's unit of length. Rates are derivatives with respect to the driver; time counts the samples.",
 )
-@click.option("--wrap", is_flag=True, help="Follow --angle the short way: no step is more than half a turn.")
-@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; what they do not need is not solved.")
+@click.option("--wrap", is_flag=True, help="Unwrap --angle: no step is more than half a turn.")
+@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; only what they need is solved.")
 @click.option(
     "--engine",
     type=click.Choice(["auto", "python", "native"]),
     default="auto",
     show_default=True,
-    help="native: generated C, compiled first, for long sweeps; auto chooses by the number of samples.",
+    help="native: compiled C, for long sweeps; auto: chosen by the number of samples.",
 )
 @set_option
-@stopped("stopped before the run was whole: nothing was written")
+@on_interrupt("stopped before the run was complete: nothing was written")
 def solve(
     mechanism: str,
     output: Path,
@@ -71,10 +71,10 @@ def solve(
     outputs: str | None,
     engine: str,
 ) -> None:
-    """Solve a mechanism at times or driver values, into a table or a record.
+    """Solve a mechanism at times or driver values.
 
-    The table has a row for each sample: positions, velocities and accelerations of all outputs, status and error
-    estimates. A record (.mcap) holds the mechanism too, for review and export.
+    Writes a table with one row per sample (positions, velocities and accelerations of all outputs, status, error
+    estimates) or a record (.mcap), which also contains the mechanism, for review and export.
     """
     from kinfmu.log import write_mcap, write_table
     from kinfmu.mechanism import RunSettings
@@ -82,11 +82,11 @@ def solve(
     from kinfmu.sweep import solve as solved
 
     if times and angle:
-        raise click.UsageError("--times and --angle cannot both drive")
+        raise click.UsageError("--times and --angle exclude each other")
     if wrap and not angle:
-        raise click.UsageError("--wrap follows --angle the short way, which is not given")
+        raise click.UsageError("--wrap needs --angle")
     mech = gallery.load(mechanism)
-    given = settled(mechanism, mech, settings, (TOLERANCE,))
+    given = checked_settings(mechanism, mech, settings, (TOLERANCE,))
     t, samples = None, {}
     if angle:
         _check_one_driver(mechanism, given)
@@ -94,7 +94,7 @@ def solve(
     else:
         t = run_times(RunSettings(*times)) if times else None
         _warn_of_external(mech.drivers)
-    with about(mechanism):
+    with errors_of(mechanism):
         run = solved(
             mech,
             t,
@@ -109,13 +109,13 @@ def solve(
         write_mcap(run, output)
     else:
         write_table(run, output)
-    tell_of(run)
+    print_events(run)
     click.echo(f"{verdict(run)}; written to {output}")
     fail_if_failed(run, by_samples=angle is not None)
 
 
 def _check_one_driver(name: str, given: Settings) -> None:
-    """UsageError if --angle cannot drive the mechanism of that name alone, or --set changes the law it replaces."""
+    """Raise a UsageError for several drivers, or if --set changes the law that --angle replaces."""
     drivers = given.written.drivers
     if len(drivers) != 1:
         names = listed(driver.name for driver in drivers)
@@ -125,36 +125,37 @@ def _check_one_driver(name: str, given: Settings) -> None:
 
 
 def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> dict[str, Any]:
-    """The driver's input with its values: what their units may be is known once the mechanism is read."""
+    """Return the values of the driver's input; the mechanism gives their unit."""
     import numpy as np
 
     context = click.get_current_context()
     option = next(option for option in context.command.params if option.name == "angle")
     first, last, n = Range(driver.quantity, "N", length_unit).convert(text, option, context)
     if driver.quantity.kind == "angle":
-        _tell_of_angles(text, first, last, int(n), wrap)
+        _note_angles(text, first, last, int(n), wrap)
     return {driver.inputs()[0]: np.linspace(first, last, int(n))}
 
 
-def _tell_of_angles(text: str, first: float, last: float, n: int, wrap: bool) -> None:
-    """Say what bare numbers that look like degrees mean; warn of steps of more than half a turn."""
+def _note_angles(text: str, first: float, last: float, n: int, wrap: bool) -> None:
+    """Note bare numbers that look like degrees; warn of steps of more than half a turn."""
     a, b, _ = text.split(":")
     if is_bare(a) and is_bare(b) and (looks_like_degrees(first) or looks_like_degrees(last)):
         turns = in_turns(last - first)
         note(f"--angle {text}: {first:g} to {last:g} rad, {turns}; write {a}deg:{b}deg:{n} for degrees")
     elif n > 1 and not wrap and abs(last - first) / (n - 1) > HALF_TURN * (1.0 + 1e-9):
         step = abs(last - first) / (n - 1)
-        warn(f"--angle {text}: steps of {in_turns(step)} between samples; --wrap takes each the short way")
+        warn(f"--angle {text}: steps of {in_turns(step)} between samples; --wrap unwraps them")
 
 
 def _warn_of_external(drivers: tuple[Driver, ...]) -> None:
-    """Warn of drivers that time does not move."""
+    """Warn of drivers without a law, which time does not move."""
     from kinfmu.laws import External
 
-    still = [driver.name for driver in drivers if isinstance(driver.law, External)]
-    if still:
-        one = len(still) == 1
+    fixed = [driver.name for driver in drivers if isinstance(driver.law, External)]
+    if fixed:
+        one = len(fixed) == 1
         warn(
-            f"{'driver' if one else 'drivers'} {listed(still)} {'has' if one else 'have'} no law, so nothing moves "
-            f"{'it' if one else 'them'} by time; --angle drives a single one, simulate --input any number"
+            f"{'driver' if one else 'drivers'} {listed(fixed)} {'has' if one else 'have'} no law and "
+            f"{'does' if one else 'do'} not move with time; "
+            "use solve --angle for one driver, simulate --input for any number"
         )

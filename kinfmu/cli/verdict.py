@@ -1,4 +1,4 @@
-"""What is told of a run when it is done."""
+"""The summary of a finished run."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ if TYPE_CHECKING:
 
 
 def verdict(run: Run) -> str:
-    """'181 samples: 175 ok, 6 bridged; largest residual 1.1e-16'."""
+    """Return '181 samples: 175 ok, 6 bridged; largest residual 1.1e-16 of the size'."""
     from kinfmu.solver.python.status import Status
 
     counts = [(status, int((run.status == status).sum())) for status in Status]
-    said = listed(f"{count} {status.name.lower().replace('_', ' ')}" for status, count in counts if count)
+    summary = listed(f"{count} {status.name.lower().replace('_', ' ')}" for status, count in counts if count)
     residuals = run.residual[run.good & (run.residual == run.residual)]
     largest = f"; largest residual {residuals.max():.2g} of the size" if len(residuals) else ""
-    return f"{len(run)} samples: {said}{largest}"
+    return f"{len(run)} samples: {summary}{largest}"
 
 
 def fail_if_failed(run: Run, *, by_samples: bool = False) -> None:
-    """Raise a KinfmuError with the first event of level "error" and when that was, in [s]; by_samples: times of the run
-    count the samples, from 0.
+    """Raise a KinfmuError with the first event of level "error" and its time [s].
+
+    by_samples: the times of the run are sample numbers, from 0.
     """
     for event in run.events:
         if event.level == "error":
-            told = event.text.startswith("at t = ")  # an FMU says itself when
+            has_time = event.text.startswith("at t = ")  # an FMU writes the time itself
             when = f"sample {event.t:.0f}" if by_samples else f"at t = {event.t:g} s"
-            raise KinfmuError(event.text if told else f"{when}: {event.text}")
+            raise KinfmuError(event.text if has_time else f"{when}: {event.text}")

@@ -1,4 +1,4 @@
-"""Assemblies: all of them, told apart, chosen by start poses; start poses may be left out."""
+"""Assemblies: all are found, distinguished and chosen by start poses; start poses may be left out."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_every_assembly_is_found_and_its_start_poses_lead_to_it(mechanism: Mecha
 
 def test_one_start_angle_chooses_a_four_bar() -> None:
     text = str(found_for(fourbar(4, 1, 3.5, 3)))
-    assert "  assemblies  2 at crank = 1 rad (57.2957795 deg), told apart by coupler.phi" in text
+    assert "  assemblies  2 at crank = 1 rad (57.2957795 deg), distinguished by coupler.phi" in text
     assert "  * 1         coupler.phi 36.609 deg, the file's" in text
     assert '              choose it by [bodies.rocker] start.phi = "-129.9 deg"' in text
 
@@ -129,7 +129,7 @@ def test_assemblies_are_plain_data_too() -> None:
     assert found["found"][1]["start"]["rocker"]["phi"] == pytest.approx(math.radians(-129.9))
 
 
-def test_a_search_that_finds_very_many_says_so() -> None:
+def test_a_search_that_finds_very_many_reports_it() -> None:
     assemblies = found_for(chain(7))
     assert len(assemblies.found) == 64
     assert not assemblies.is_complete
@@ -208,10 +208,10 @@ def test_start_poses_left_out_give_an_assembly_that_is_listed(mechanism: Mechani
         short = started(mechanism, dict.fromkeys(left_out, Start()))
         try:
             plan = compile_plan(short)
-        except AssemblyError:  # rough zeros do not close: the ways of putting it together are still told
-            told = kinfmu.check(short).assemblies()
-            assert len(told.found) == len(full.found)
-            for one in told.found:
+        except AssemblyError:  # rough zeros do not close, but the assemblies are still reported
+            assemblies = kinfmu.check(short).assemblies()
+            assert len(assemblies.found) == len(full.found)
+            for one in assemblies.found:
                 assert compile_plan(started(short, dict(one.start)))
             continue
         if plan.anchor.u.tolist() == pytest.approx(list(full.drivers.values())):

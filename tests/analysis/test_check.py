@@ -15,7 +15,7 @@ from kinfmu.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
 
 
-def test_the_fourbar_is_told_with_its_redundant_row_and_why() -> None:
+def test_the_fourbar_is_reported_with_its_redundant_row_and_the_reason() -> None:
     text = str(kinfmu.check(reference_fourbar()))
     assert "mobility    1, driven by crank" in text
     assert "Gruebler's count gives 0" in text
@@ -118,7 +118,7 @@ def test_ranges_need_no_more_outputs_than_the_file_asks_for() -> None:
     assert len(report.assemblies().found) == 2
 
 
-def test_a_large_mechanism_is_told_in_short() -> None:
+def test_a_large_mechanism_has_a_short_report() -> None:
     report = kinfmu.check(fourbar_chain(80))
     assert report.range is not None
     assert report.range.turns == 1
@@ -131,7 +131,7 @@ def test_a_large_mechanism_is_told_in_short() -> None:
     assert len(text) < 10_000
 
 
-def test_a_contradiction_stands_in_the_report_and_does_not_raise() -> None:
+def test_a_contradiction_is_in_the_report_and_does_not_raise() -> None:
     report = kinfmu.check(reference_fourbar(bar=1.01))
     assert report.plan is None
     assert report.inconsistent[0].row.owner == "AB"
@@ -155,9 +155,9 @@ def test_matrices_are_the_reports() -> None:
     assert plain.rows == ("P.x", "P.y", "Q.x", "Q.y", "AB.length")
     assert plain.rank == 4
     assert matrices["Phi_q at crank = pi (180 deg), singular point"].rank == 4
-    beside = matrices["Phi_q at crank = 3.15904595 rad (181 deg), a small turn beside it"]
-    assert beside.rank == 5
-    np.testing.assert_array_equal(beside.reduced, np.eye(5))
+    near = matrices["Phi_q at crank = 3.15904595 rad (181 deg), after a small turn"]
+    assert near.rank == 5
+    np.testing.assert_array_equal(near.reduced, np.eye(5))
 
 
 def test_rank_is_lost_at_a_dead_centre_and_restored_beside_it() -> None:

@@ -97,20 +97,20 @@ def test_joints_that_hold_the_same_bodies_in_one_place_are_named() -> None:
 
 
 @pytest.mark.parametrize(("length", "is_told"), [("0.02", True), ("0.019", True), ("0.051", False), ("20", False)])
-def test_a_link_in_another_unit_is_told(length: str, is_told: bool) -> None:
+def test_a_link_in_another_unit_is_reported(length: str, is_told: bool) -> None:
     found = notes(("P = [20, 0] }", f"P = [{length}, 0] }}"), ("C = [40, 0]", "C = [60, 0]"))
-    told = [note for note in found if "are its points in another unit?" in note]
-    assert len(told) == is_told
+    message = [note for note in found if "are its points in another unit?" in note]
+    assert len(message) == is_told
     if is_told:
-        assert told[0].startswith(f"crank is {length} mm long between its joints, its neighbours at least 50 mm:")
+        assert message[0].startswith(f"crank is {length} mm long between its joints, its neighbours at least 50 mm:")
 
 
-def test_a_step_longer_than_the_run_is_told() -> None:
+def test_a_step_longer_than_the_run_is_reported() -> None:
     found = notes(('stop = "1 s"', 'stop = "1 s"\nstep = "2 s"'))
     assert found == ("[run] step = 2 s is longer than the run, 0 to 1 s: it has one sample",)
 
 
-def test_a_toggle_position_that_the_run_crosses_is_told_where_it_is() -> None:
+def test_a_toggle_position_that_the_run_crosses_is_reported_with_its_position() -> None:
     # Crank and coupler fall in line, stretched, where the rocker's pin Q is 20 + 50 from O.
     stretched = math.acos((70.0**2 + 40.0**2 - 50.0**2) / (2.0 * 70.0 * 40.0))
     (note,) = notes(('law = "constant_speed"\nspeed = "60 rpm"', BACK_AND_FORTH))
@@ -156,7 +156,7 @@ def toggles(text: str, start: str, rod: str) -> tuple[str, ...]:
     return kinfmu.check(parse(text.replace("START", start).replace("ROD", rod), "press.toml")).notes
 
 
-def test_a_crank_and_its_rod_in_line_are_told_where_they_are() -> None:
+def test_a_crank_and_its_rod_in_line_are_reported_with_their_position() -> None:
     # Stretched, the ram's pin is 20 + 30 from O, 5 above it.
     (note,) = toggles(SLIDER_CRANK + BY_CRANK, "20 deg", "-5 deg")
     assert note.startswith("the run crosses a toggle position: crank, rod fall in line at crank = ")
@@ -164,7 +164,7 @@ def test_a_crank_and_its_rod_in_line_are_told_where_they_are() -> None:
     assert toggles(SLIDER_CRANK + BY_CRANK, "80 deg", "-30 deg") == ()
 
 
-def test_a_rod_across_the_slide_of_its_driver_is_told_where_it_is() -> None:
+def test_a_rod_across_the_slide_of_its_driver_is_reported_with_its_position() -> None:
     # The rod points down from P to the slide at height 5: P is 35 above O, which a crank of 40 reaches.
     text = (SLIDER_CRANK + BY_RAM).replace("P = [20, 0]", "P = [40, 0]")
     (note,) = toggles(text, "58 deg", "-88 deg")

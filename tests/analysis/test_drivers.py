@@ -26,7 +26,7 @@ def with_arm(*drivers: kinfmu.AngleDriver) -> Mechanism:
     )
 
 
-def test_a_missing_driver_is_told_with_what_is_loose_and_what_could_be_driven() -> None:
+def test_a_missing_driver_is_reported_with_what_is_loose_and_what_could_be_driven() -> None:
     report = kinfmu.check(with_arm())
     assert report.advice is not None
     assert (report.advice.missing, report.advice.loose, report.advice.surplus) == (1, ("arm.phi",), ())
@@ -71,7 +71,7 @@ def test_a_driver_too_many_is_named_with_the_one_it_fights() -> None:
     assert report.as_json()["advice"]["surplus"] == [{"name": "two", "implied_by": ["crank"]}]
 
 
-def test_two_drivers_on_one_freedom_while_another_is_free_are_told() -> None:
+def test_two_drivers_on_one_freedom_while_another_is_free_are_reported() -> None:
     report = kinfmu.check(with_arm(AngleDriver("two", "rocker", ConstantSpeed(1.9, 1.0))))
     assert isinstance(report.problem, MobilityError)
     assert str(report.problem) == (
@@ -80,7 +80,7 @@ def test_two_drivers_on_one_freedom_while_another_is_free_are_told() -> None:
     )
 
 
-def test_a_driver_of_what_the_joints_hold_is_told() -> None:
+def test_a_driver_of_a_coordinate_that_a_joint_holds_is_reported() -> None:
     bodies = [Body("ground", {"G": (0, 0)}), Body("block", {"P": (0, 0)})]
     stuck = Mechanism("stuck", bodies, [Fixed("weld", ("ground.G", "block.P"))], [AngleDriver("turn", "block")])
     assert "  surplus     driver turn: the joints alone determine what it drives; remove it" in str(kinfmu.check(stuck))

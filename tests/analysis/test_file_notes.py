@@ -1,4 +1,4 @@
-"""What is hardly meant in a file is told by check, with the place."""
+"""Check reports probable mistakes in a file with their place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_the_gallery_gives_no_cause(name: str) -> None:
     assert list(file_notes(gallery.load(name))) == []
 
 
-def test_parameters_that_stand_nowhere_are_told() -> None:
+def test_parameters_that_are_used_nowhere_are_reported() -> None:
     text = CRANK_ROCKER.replace("crank = 1.0", 'crank = "2*half"\nhalf = 0.5\nrod = 3\nlong = "2*rod"', 1)
     mechanism = parse(text)
     assert mechanism.unused_parameters == ("rod", "long")
@@ -27,7 +27,7 @@ def test_parameters_that_stand_nowhere_are_told() -> None:
     assert note in str(report)
 
 
-def test_an_angle_that_looks_like_degrees_is_told() -> None:
+def test_an_angle_that_looks_like_degrees_is_reported() -> None:
     mechanism = parse(CRANK_ROCKER.replace('phi = "60 deg"', "phi = 60", 1))
     assert list(file_notes(mechanism)) == [
         "[bodies.crank] start.phi = 60 rad is 3437.75 deg, more than a turn: "
@@ -35,14 +35,14 @@ def test_an_angle_that_looks_like_degrees_is_told() -> None:
     ]
 
 
-def test_an_angle_of_a_law_that_looks_like_degrees_is_told_and_many_turns_are_not() -> None:
+def test_an_angle_of_a_law_that_looks_like_degrees_is_reported_and_many_turns_are_not() -> None:
     assert 'start = "60 deg"' in DRIVER
-    told = list(file_notes(parse(CRANK_ROCKER.replace('start = "60 deg"', "start = 60"))))
-    assert [note.partition(" rad is")[0] for note in told] == ["[drivers.crank] start = 60"]
+    message = list(file_notes(parse(CRANK_ROCKER.replace('start = "60 deg"', "start = 60"))))
+    assert [note.partition(" rad is")[0] for note in message] == ["[drivers.crank] start = 60"]
     assert list(file_notes(parse(CRANK_ROCKER.replace('start = "60 deg"', 'start = "3600 deg"')))) == []
 
 
-def test_a_driven_distance_below_zero_is_told() -> None:
+def test_a_driven_distance_below_zero_is_reported() -> None:
     cylinder = (
         'cylinder = { type = "distance", between = ["ground.O", "coupler.Q"], law = "constant_speed", start = -3 }'
     )
@@ -77,7 +77,7 @@ stop = 2
 """
 
 
-def test_a_cam_that_turns_on_where_its_lift_ends_is_told() -> None:
+def test_a_cam_that_turns_on_where_its_lift_ends_is_reported() -> None:
     note = "[joints.lift] law: its sequence does not repeat; set repeat = true; [run] turns cam by 720 deg"
     assert list(file_notes(parse(CAM))) == [note]
     assert note in check(parse(CAM)).notes
@@ -85,7 +85,7 @@ def test_a_cam_that_turns_on_where_its_lift_ends_is_told() -> None:
     assert list(file_notes(parse(CAM.replace("segments", "repeat = true\nsegments", 1)))) == []
 
 
-def test_notes_stand_in_the_report_of_a_mechanism_at_fault_too() -> None:
+def test_notes_are_in_the_report_of_an_invalid_mechanism_too() -> None:
     mechanism = parse(
         CRANK_ROCKER.replace("crank = 1.0", "crank = 1.0\nrod = 3", 1).replace("Q = [3.5, 0]", "Q = [9, 0]")
     )

@@ -116,7 +116,7 @@ def test_redundant_bars_make_no_four_bars_of_their_own() -> None:
         assert named.grashof.shape == "parallelogram"
 
 
-def test_a_six_bar_tells_of_its_four_bar_and_others_of_none() -> None:
+def test_a_six_bar_reports_its_four_bar_and_others_report_none() -> None:
     (named,) = kinfmu.check(six_bar()).loops
     assert named.loop.links == ("crank", "ternary", "rocker")
     assert kinfmu.check(five_bar()).loops == ()
@@ -132,7 +132,7 @@ def test_pins_of_three_bodies_count_however_they_are_joined() -> None:
     assert [loop.links for loop in four_bars] == [("crank", "coupler", "rocker")]
 
 
-def test_lengths_that_do_not_close_are_told() -> None:
+def test_lengths_that_do_not_close_are_reported() -> None:
     mechanism = fourbar(4, 1, 3.5, 3)
     rocker = Body("rocker", {"C": (0, 0), "Q": (0.2, 0)}, (4, 0, 1))
     report = kinfmu.check(replace(mechanism, bodies=(*mechanism.bodies[:3], rocker), drivers=mechanism.drivers))

@@ -44,7 +44,7 @@ def test_limits_of_four_bars_are_where_coupler_and_rocker_fall_in_line(lengths: 
     assert "coupler and rocker fall in line" in str(report)
 
 
-def test_the_position_at_a_limit_is_told() -> None:
+def test_the_position_at_a_limit_is_reported() -> None:
     report = kinfmu.check(fourbar(4.0, 3.0, 1.5, 1.0, start=0.2))
     assert report.range is not None
     assert report.range.highest is not None

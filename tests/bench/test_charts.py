@@ -73,7 +73,7 @@ def test_equal_numbers_give_equal_bytes_in_both_formats(tmp_path: Path) -> None:
         assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
 
 
-def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_written_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(FigureError, match=r"chart\.pdf: '\.pdf' is not a known format of figures; known: \.svg, \.png"):
         near_singular((tmp_path / "chart.svg", tmp_path / "chart.pdf"), [ROW], LOOKS)
     with pytest.raises(FigureError, match=r"cannot be written \(No such file or directory\)"):

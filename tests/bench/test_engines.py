@@ -59,7 +59,7 @@ def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> N
 @pytest.mark.parametrize(
     ("engine", "package", "name"), [(Casadi(), "casadi", "CasADi"), (Pylinkage(), "pylinkage", "pylinkage")]
 )
-def test_a_peer_that_is_not_installed_is_told_in_one_line(
+def test_a_peer_that_is_not_installed_is_reported_in_one_line(
     engine: Engine, package: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
@@ -73,7 +73,7 @@ def test_a_peer_that_is_not_installed_is_told_in_one_line(
     assert list(absent) == [message]
 
 
-def test_without_a_compiler_the_native_engine_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     def none_found(_: object) -> None:
         raise CompilerError("no C compiler is found")
 
@@ -158,7 +158,7 @@ def test_closed_forms_in_doubles_are_those_of_50_digits(u: float) -> None:
         assert largest_error(isosceles[order, columns], exact, modulo_turns=order == 0) <= 1e-15
 
 
-def test_without_mpmath_it_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_mpmath_it_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpmath", None)
     near, absent = singular.measure(1, engines=[Shipped()])
     assert absent == ("four-bar 4-1-3-2 at 180 deg: mpmath is not installed: pip install 'kinfmu[bench]'",)

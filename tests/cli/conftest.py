@@ -40,7 +40,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
 
 @pytest.fixture
 def fails(command: Command) -> Callable[..., str]:
-    """`fails("check", path)`: the one line that is told on stderr, with exit status 1."""
+    """`fails("check", path)`: the one line on stderr, with exit status 1."""
 
     def run(*arguments: object) -> str:
         result = command(*arguments)
@@ -54,15 +54,15 @@ def fails(command: Command) -> Callable[..., str]:
 
 @pytest.fixture
 def refuses(command: Command) -> Callable[..., str]:
-    """`refuses("check")`: what is told about wrong usage on stderr after the hint at --help, with exit status 2."""
+    """`refuses("check")`: the message of wrong usage on stderr, after the hint at --help, with exit status 2."""
 
     def run(*arguments: object) -> str:
         result = command(*arguments)
         assert result.exit_code == 2
         assert result.stdout == ""
-        *_, told = result.stderr.splitlines()
-        assert told.startswith("Error: ")
-        return told.removeprefix("Error: ")
+        *_, message = result.stderr.splitlines()
+        assert message.startswith("Error: ")
+        return message.removeprefix("Error: ")
 
     return run
 

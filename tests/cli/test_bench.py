@@ -1,4 +1,4 @@
-"""kinfmu bench: what is measured, where it is written, and what is told when something is missing or wrong."""
+"""kinfmu bench: what is measured, where it is written, and the messages when something is missing or wrong."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def only_what_comes_with_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def quick(command: Command, *more: object) -> tuple[str, str]:
-    """Output and messages of one round on one mechanism, written into the working folder if nothing is said."""
+    """Output and messages of one round on one mechanism, written into the working folder by default."""
     result = command("bench", "accuracy", "--mechanism", "slider_crank", "--rounds", 1, *(more or ("-o", ".")))
     assert result.exit_code == 0
     return result.stdout, result.stderr
@@ -62,7 +62,7 @@ def rows_of(table: str) -> dict[str, list[str]]:
     return {cells[0]: cells[1:] for cells in lines}
 
 
-def test_tables_and_charts_are_written_where_it_is_said(
+def test_tables_and_charts_are_written_in_the_requested_folder(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(case, "STEPS_BETWEEN", 1)
@@ -70,9 +70,9 @@ def test_tables_and_charts_are_written_where_it_is_said(
     stdout, stderr = quick(command, "-o", "there")
     files = sorted(path.name for path in (tmp_path / "there").iterdir())
     assert files == sorted([PAGE, SETTINGS_PAGE, *PICTURES])
-    *_, told = stdout.splitlines()
-    assert told.startswith("written: ")
-    assert set(re.findall(r"there/([\w.-]+)", told)) == set(files)
+    *_, message = stdout.splitlines()
+    assert message.startswith("written: ")
+    assert set(re.findall(r"there/([\w.-]+)", message)) == set(files)
     assert stderr.splitlines() == [
         "left out: CasADi is not installed: pip install 'kinfmu[bench]'",
     ]
@@ -114,7 +114,7 @@ def test_it_writes_into_docs_of_a_checkout_and_else_into_the_current_folder(
 
 
 @pytest.mark.usefixtures("once")
-def test_a_page_of_ones_own_keeps_what_stands_between_its_tables(command: Command, tmp_path: Path) -> None:
+def test_a_page_of_the_user_keeps_the_text_between_its_tables(command: Command, tmp_path: Path) -> None:
     marks = "\n".join(
         f"word {name}\n<!-- generated: {name} -->old<!-- end: {name} -->"
         for name in ("singular points", "engines", "conditions")
@@ -128,12 +128,12 @@ def test_a_page_of_ones_own_keeps_what_stands_between_its_tables(command: Comman
 
 def test_a_page_without_a_place_for_a_table_is_refused(fails: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / PAGE).write_text("<!-- generated: conditions --><!-- end: conditions -->", encoding="utf-8")
-    told = fails("bench", "accuracy", "-o", ".")
-    assert told == "accuracy.md: must have <!-- generated: engines --> and <!-- end: engines -->, once each"
+    message = fails("bench", "accuracy", "-o", ".")
+    assert message == "accuracy.md: must have <!-- generated: engines --> and <!-- end: engines -->, once each"
 
 
 @pytest.mark.usefixtures("once")
-def test_without_matplotlib_the_tables_are_written_and_it_is_told(
+def test_without_matplotlib_the_tables_are_written_and_the_reason_is_reported(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
@@ -156,7 +156,7 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (
             ("accurcy",),
@@ -174,9 +174,9 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
     ],
 )
 def test_wrong_words_are_refused_with_what_would_be_right(
-    arguments: tuple[str, ...], told: str, refuses: Callable[..., str], tmp_path: Path
+    arguments: tuple[str, ...], message: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    assert refuses("bench", *arguments).startswith(told)
+    assert refuses("bench", *arguments).startswith(message)
     assert not list(tmp_path.iterdir())
 
 
@@ -205,7 +205,7 @@ def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list
         assert re.search(r"\d+\.\d", line)
 
 
-def test_a_sweep_is_set_beside_the_closed_form(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_sweep_is_compared_with_the_closed_form(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     try:
         compiler.command()
     except CompilerError as error:
@@ -236,7 +236,7 @@ def test_the_closed_form_by_hand_is_right(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert oracle.largest_error(columns[[10, 13, 14]].T, exact.qdd) < 1e-13
 
 
-def test_chains_tell_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chains_report_the_exponent(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chains, "LOOPS", (1, 2, 3, 4))
     stdout = command("bench", "chains", "--rounds", 2).stdout
     assert [line.split()[0] for line in stdout.splitlines()[2:6]] == ["1", "2", "3", "4"]
@@ -251,7 +251,7 @@ def test_the_engine_that_is_shipped_comes_first(command: Command, tmp_path: Path
     assert first.startswith(f"| **{Shipped().name}** | velocity and acceleration | full | round-off |")
 
 
-def test_logs_are_measured_beside_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_logs_are_compared_with_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:
     table = log_files.run(rounds=1, samples=5000, steps=500)
     assert re.search(r"^the record by the package mcap .* us/row +1\.0 +\d+\.\d B/row$", table, re.MULTILINE)
     sizes = [float(size) for size in re.findall(r"^MCAP: .* ([\d.]+) B/row$", table, re.MULTILINE)]

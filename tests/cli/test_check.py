@@ -1,4 +1,4 @@
-"""kinfmu check: findings as text, as JSON and as matrices; a mechanism at fault is told and exits with 1."""
+"""kinfmu check: findings as text, as JSON and as matrices; an invalid mechanism is reported and exits with 1."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kinfmu import gallery
 from tests.cli.conftest import Command
 
 
-def test_the_check_of_the_fourbar_says_what_a_colleague_would(command: Command) -> None:
+def test_the_check_of_the_fourbar_reports_its_properties(command: Command) -> None:
     result = command("check", "fourbar")
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -53,12 +53,12 @@ def test_the_check_as_json_has_the_findings_by_name(command: Command) -> None:
     assert "matrices" not in found
 
 
-def test_matrices_are_told_plain_and_row_reduced(command: Command) -> None:
+def test_matrices_are_printed_plain_and_row_reduced(command: Command) -> None:
     result = command("check", "fourbar", "--matrices")
     assert result.exit_code == 0
     assert "Phi_K,q at crank = pi/3 (60 deg): 5 x 5, rank 4" in result.stdout
     assert "singular point: 5 x 5, rank 4" in result.stdout
-    assert "a small turn beside it: 5 x 5, rank 5" in result.stdout
+    assert "after a small turn: 5 x 5, rank 5" in result.stdout
     assert result.stdout.count("\nrow-reduced\n") == result.stdout.count(", rank ") == 6
 
 
@@ -90,9 +90,9 @@ def test_the_matrices_at_sixty_degrees_are_those_of_the_report(command: Command)
 
 
 def test_assemblies_are_listed_with_the_start_angle_that_chooses_each(command: Command) -> None:
-    told = command("check", "double_pendulum", "--assemblies").stdout
-    assert "assemblies  2 at crank = 5 pi/3 (300 deg), told apart by lower.phi" in told
-    assert '              choose it by [bodies.lower] start.phi = "-172.3 deg"' in told
+    message = command("check", "double_pendulum", "--assemblies").stdout
+    assert "assemblies  2 at crank = 5 pi/3 (300 deg), distinguished by lower.phi" in message
+    assert '              choose it by [bodies.lower] start.phi = "-172.3 deg"' in message
     found = json.loads(command("check", "double_pendulum", "--assemblies", "--json").stdout)["assemblies"]
     assert [one["chosen"] for one in found["found"]] == [True, False]
     assert "assemblies" not in json.loads(command("check", "double_pendulum", "--json").stdout)
@@ -106,17 +106,17 @@ def test_a_mechanism_at_fault_has_no_assemblies_to_list(
     assert json.loads(command("check", path, "--assemblies", "--json").stdout)["assemblies"] is None
 
 
-def test_a_bar_of_a_wrong_length_is_told_by_name_and_gap(
+def test_a_bar_of_a_wrong_length_is_reported_by_name_and_gap(
     command: Command, fails: Callable[..., str], fourbar_file: Callable[..., Path]
 ) -> None:
     path = fourbar_file("length = 1\n", "length = 1.01\n")
-    told = fails("check", path)
-    assert told.startswith(f"{path}: [joints.AB] contradicts the other joints: with O, P, C, Q closed, ")
-    assert ": gap 0.01 m" in told
+    message = fails("check", path)
+    assert message.startswith(f"{path}: [joints.AB] contradicts the other joints: with O, P, C, Q closed, ")
+    assert ": gap 0.01 m" in message
     assert "contradicts AB" in command("check", path).stdout
     found = json.loads(command("check", path, "--json").stdout)
     assert [(row["name"], round(abs(row["gap"]), 12)) for row in found["inconsistent"]] == [("AB", 0.01)]
-    assert f"{path}: {found['problem']}" == told
+    assert f"{path}: {found['problem']}" == message
 
 
 @pytest.mark.parametrize("arguments", [("solve", "-o", "run.csv"), ("build", "-o", "mine.fmu"), ("simulate",)])
@@ -129,7 +129,7 @@ def test_every_command_names_the_file_whose_bar_is_wrong(
     assert not [made.name for made in tmp_path.iterdir() if made.suffix in (".csv", ".fmu")]
 
 
-def test_a_driver_too_many_or_too_few_is_told(fails: Callable[..., str], fourbar_file: Callable[..., Path]) -> None:
+def test_a_driver_too_many_or_too_few_is_reported(fails: Callable[..., str], fourbar_file: Callable[..., Path]) -> None:
     second = '[drivers.two]\ntype = "angle"\nof = "rocker"\nlaw = "constant_speed"\n[points]'
     path = fourbar_file("[points]", second)
     assert fails("check", path) == f"{path}: [drivers] mobility is 1 but there are 2 drivers (crank, two): remove 1"
@@ -141,12 +141,12 @@ def test_a_driver_too_many_or_too_few_is_told(fails: Callable[..., str], fourbar
     )
 
 
-def test_a_mistake_in_the_file_is_told_with_its_place(
+def test_a_mistake_in_the_file_is_reported_with_its_place(
     fails: Callable[..., str], fourbar_file: Callable[..., Path]
 ) -> None:
     path = fourbar_file("length = 1\n", "lenght = 1\n")
-    told = fails("check", path)
-    assert told.startswith(f"{path}: [joints.AB] lenght: unknown key; did you mean 'length'?")
+    message = fails("check", path)
+    assert message.startswith(f"{path}: [joints.AB] lenght: unknown key; did you mean 'length'?")
 
 
 def test_a_name_that_is_nowhere_is_wrong_usage(refuses: Callable[..., str]) -> None:

@@ -57,7 +57,7 @@ def test_new_writes_a_commented_file_that_checks(name: str, command: Command, tm
     assert command("check", "mine.toml").exit_code == 0
 
 
-def test_new_starts_from_a_file_of_ones_own(
+def test_new_starts_from_a_file_of_the_user(
     command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
 ) -> None:
     source = fourbar_file("stop = 180", "stop = 90")
@@ -67,11 +67,11 @@ def test_new_starts_from_a_file_of_ones_own(
 
 def test_new_does_not_overwrite(refuses: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("precious")
-    assert refuses("new", "fourbar", "mine.toml") == "mine.toml: is there already; nothing was written"
+    assert refuses("new", "fourbar", "mine.toml") == "mine.toml: exists already; nothing was written"
     assert (tmp_path / "mine.toml").read_text() == "precious"
 
 
-def test_new_tells_what_it_cannot_write(fails: Callable[..., str], refuses: Callable[..., str]) -> None:
+def test_new_reports_a_file_that_cannot_be_written(fails: Callable[..., str], refuses: Callable[..., str]) -> None:
     assert refuses("new", "fourbar", "none/mine.toml").endswith("none/mine.toml: there is no folder 'none'")
     assert fails("new", "fourbar", "n" * 300 + ".toml").endswith(": cannot be written (File name too long)")
     assert refuses("new", "fourbar", "mine.txt").endswith("mine.txt: its name must end in .toml")
@@ -82,14 +82,14 @@ def test_build_and_simulate_step_an_fmu_into_logs(command: Command, tmp_path: Pa
     built = command("build", "fourbar", "-o", "four.fmu")
     assert built.exit_code == 0
     assert re.fullmatch(
-        r"four\.fmu: \d+ kB, python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, "
+        r"four\.fmu: \d+ kB, python FMU for x86_64-linux, x86_64-windows in hosts that contain Python, "
         r"FMI 2\.0 co-simulation, driven by time\n",
         built.stdout,
     )
     logs = ("--mcap", "four.mcap", "--rrd", "four.rrd")
     result = command("simulate", "four.fmu", "--start", "20", "--stop", "30", "--step", "5", *logs)
     assert result.exit_code == 0
-    assert result.stdout.splitlines()[1:] == ["to look at it: kinfmu review four.mcap"]
+    assert result.stdout.splitlines()[1:] == ["to review it: kinfmu review four.mcap"]
     assert result.stdout.startswith("3 samples: 3 ok; largest residual ")
     run = log.read(tmp_path / "four.mcap")
     assert run.t.tolist() == [20.0, 25.0, 30.0]
@@ -98,7 +98,7 @@ def test_build_and_simulate_step_an_fmu_into_logs(command: Command, tmp_path: Pa
     assert not (tmp_path / "logs").exists()
 
 
-def test_simulate_builds_a_mechanism_first_and_logs_beside_it(
+def test_simulate_builds_a_mechanism_first_and_logs_into_logs(
     command: Command, fourbar_file: Callable[..., Path], tmp_path: Path
 ) -> None:
     result = command("simulate", fourbar_file(), "--stop", "2", "--set", "crank.speed=0.5", "--set", "crank.start=0.25")
@@ -123,7 +123,7 @@ def test_an_fmu_is_named_after_the_mechanism_and_logs_after_the_file_given(
         assert 'name = "press"' in str(table["kinfmu.mechanism"])
 
 
-def test_the_recording_goes_beside_the_record(command: Command, tmp_path: Path) -> None:
+def test_the_recording_is_written_into_the_folder_of_the_record(command: Command, tmp_path: Path) -> None:
     result = command("simulate", "fourbar", "--stop", "2", "--mcap", "one.mcap")
     assert result.stdout.splitlines()[0].endswith("written to one.mcap and one.rrd")
     assert (tmp_path / "one.rrd").stat().st_size > 0
@@ -136,17 +136,17 @@ def test_simulate_takes_inputs_from_a_csv(command: Command, tmp_path: Path) -> N
     assert log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"] == pytest.approx([0.5, 1.0, 1.5])
 
 
-def test_simulate_follows_wrapped_angles_the_short_way_if_told(
+def test_simulate_follows_wrapped_angles_the_short_way_with_wrap(
     command: Command, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
     (tmp_path / "inputs.csv").write_text("time,crank_angle [deg]\n0,350\n2,10\n")
     assert command("simulate", "fourbar", "--stop", "2", "--input", "inputs.csv", "--wrap").exit_code == 0
     angles = log.read(tmp_path / "logs" / "fourbar.mcap")["crank.phi"]
     assert angles == pytest.approx([math.radians(350), math.tau, math.radians(370)])
-    assert refuses("simulate", "fourbar", "--wrap") == "--wrap follows the angles of --input, which is not given"
+    assert refuses("simulate", "fourbar", "--wrap") == "--wrap needs --input"
 
 
-def test_simulate_tells_a_limit_and_keeps_what_was_reached(command: Command, tmp_path: Path) -> None:
+def test_simulate_reports_a_limit_and_keeps_what_was_reached(command: Command, tmp_path: Path) -> None:
     result = command("simulate", "double_pendulum", "--stop", "3", "--step", "0.5")
     assert result.exit_code == 1
     assert result.stderr.startswith("kinfmu: at t = 2.5 s: crank")
@@ -156,7 +156,7 @@ def test_simulate_tells_a_limit_and_keeps_what_was_reached(command: Command, tmp
     assert run.good[:5].all()
 
 
-def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str]) -> None:
+def test_simulate_and_build_report_wrong_usage(refuses: Callable[..., str]) -> None:
     assert refuses("simulate", "none.fmu").endswith("none.fmu: there is no such file")
     assert "'forbar' is not in the gallery" in refuses("simulate", "forbar")
     assert "none.csv: there is no such file" in refuses("simulate", "fourbar", "--input", "none.csv")
@@ -166,7 +166,7 @@ def test_simulate_and_build_tell_wrong_usage(refuses: Callable[..., str]) -> Non
     )
 
 
-def test_simulate_tells_of_the_mechanism_and_not_of_an_fmu_on_the_way(refuses: Callable[..., str]) -> None:
+def test_simulate_names_the_mechanism_and_not_a_temporary_fmu(refuses: Callable[..., str]) -> None:
     assert refuses("simulate", "fourbar", "--set", "crank.sped=1") == (
         "--set crank.sped=1: fourbar has no parameter 'crank.sped'; did you mean 'crank.speed'?; "
         "parameters: crank.start, crank.speed, solver.tolerance, driven_by_time, rates"
@@ -180,24 +180,24 @@ def test_simulate_tells_of_the_mechanism_and_not_of_an_fmu_on_the_way(refuses: C
 def test_a_log_of_another_kind_is_wrong_usage(
     option: str, suffix: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    told = refuses("simulate", "fourbar", option, "run.txt")
-    assert told == f"Invalid value for '{option}': run.txt: its name must end in {suffix}"
+    message = refuses("simulate", "fourbar", option, "run.txt")
+    assert message == f"Invalid value for '{option}': run.txt: its name must end in {suffix}"
     assert not list(tmp_path.iterdir())
 
 
-def test_a_file_that_is_no_fmu_is_told(fails: Callable[..., str], tmp_path: Path) -> None:
+def test_a_file_that_is_no_fmu_is_reported(fails: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("no archive")
     assert "text.fmu" in fails("simulate", "text.fmu")
 
 
-def test_what_simulate_takes_is_said_where_a_file_is_neither(refuses: Callable[..., str]) -> None:
+def test_what_simulate_takes_is_in_the_message_for_another_file(refuses: Callable[..., str]) -> None:
     assert refuses("simulate", "motion.csv").endswith("files end in .toml or .fmu")
 
 
-def test_review_of_a_run_that_is_missing_is_told(refuses: Callable[..., str], tmp_path: Path) -> None:
+def test_review_of_a_run_that_is_missing_is_reported(refuses: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "fourbar.mcap").touch()
-    told = refuses("review", "forbar.mcap", "--save", "none.rrd")
-    assert told.endswith("forbar.mcap: there is no such file; did you mean 'fourbar.mcap'?")
+    message = refuses("review", "forbar.mcap", "--save", "none.rrd")
+    assert message.endswith("forbar.mcap: there is no such file; did you mean 'fourbar.mcap'?")
 
 
 def test_review_says_what_two_runs_have_in_common(command: Command, tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ def test_review_says_what_two_runs_have_in_common(command: Command, tmp_path: Pa
     log.write_mcap(run, tmp_path / "a.mcap")
     log.write_mcap(replace(run, outputs=tuple(f"b_{name}" for name in run.outputs)), tmp_path / "b.mcap")
     result = command("review", "a.mcap", "b.mcap", "--save", "both.rrd")
-    assert (result.exit_code, result.stdout) == (0, "made both.rrd\n")
+    assert (result.exit_code, result.stdout) == (0, "written: both.rrd\n")
     assert result.stderr == (
         "kinfmu: note: a.mcap and b.mcap have no coordinates in common, so there are no differences to show\n"
     )
@@ -214,9 +214,9 @@ def test_review_says_what_two_runs_have_in_common(command: Command, tmp_path: Pa
 
 def test_every_command_explains_itself(command: Command) -> None:
     assert command("--version").stdout == f"kinfmu, version {kinfmu.VERSION}\n"
-    told = command("-h").stdout
+    message = command("-h").stdout
     for name, one in main.commands.items():
-        assert f"  {name} " in told
+        assert f"  {name} " in message
         explained = command(name, "--help")
         assert explained.exit_code == 0
         assert (one.help or "").split("\n")[0][:60] in " ".join(explained.stdout.split())
@@ -225,8 +225,8 @@ def test_every_command_explains_itself(command: Command) -> None:
 
 
 def test_commands_are_listed_in_the_order_of_work(command: Command) -> None:
-    told = re.findall(r"^  (\w+)  ", command("-h").stdout.split("Commands:\n")[1], re.MULTILINE)
-    assert told == [name for name in ORDER if name in main.commands]
+    message = re.findall(r"^  (\w+)  ", command("-h").stdout.split("Commands:\n")[1], re.MULTILINE)
+    assert message == [name for name in ORDER if name in main.commands]
 
 
 @pytest.mark.parametrize("name", [name for name in main.commands if name != "bench"])
@@ -254,7 +254,7 @@ def test_the_package_is_a_program_too(tmp_path: Path) -> None:
     assert done.stdout.endswith(f", version {kinfmu.VERSION}\n")
 
 
-def test_the_program_tells_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: Callable[..., Path]) -> None:
+def test_the_program_reports_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: Callable[..., Path]) -> None:
     path = fourbar_file("length = 1\n", "length = 1.01\n")
     done = program("solve", path.name, "-o", "run.csv", cwd=tmp_path)
     assert done.returncode == 1
@@ -262,7 +262,7 @@ def test_the_program_tells_a_wrong_bar_on_stderr(tmp_path: Path, fourbar_file: C
     assert re.fullmatch(r"kinfmu: mine\.toml: \[joints\.AB\] contradicts .*: gap 0\.01 m.*\n", done.stderr)
 
 
-def test_the_program_tells_wrong_usage_with_status_two(tmp_path: Path) -> None:
+def test_the_program_reports_wrong_usage_with_status_two(tmp_path: Path) -> None:
     done = program("solve", "fourbar", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -325,44 +325,47 @@ def test_a_law_constant_that_follows_from_parameters_is_not_set_itself(
     slider.write_text(slider.read_text().replace("law = ", 'speed = "crank*1 rad/s/(1 m)", law = '))
     for command, *options in (("check",), ("build",), ("solve", "-o", "run.csv"), ("simulate",)):
         assert refuses(command, slider, *options, "--set", "crank.speed=2") == (
-            "--set crank.speed=2: it follows from 'crank*1 rad/s/(1 m)'; set what stands there"
+            "--set crank.speed=2: it follows from 'crank*1 rad/s/(1 m)'; set the parameters in it"
         )
 
 
 @pytest.mark.parametrize("call", [("check",), ("build",), ("solve", "-o", "run.csv"), ("simulate",)])
-def test_what_cannot_be_set_is_told_by_every_command_alike(
+def test_what_cannot_be_set_is_reported_equally_by_every_command(
     call: tuple[str, ...], slider: Path, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    def told(setting: str) -> str:
+    def message(setting: str) -> str:
         return refuses(call[0], slider, *call[1:], "--set", setting)
 
     known = "crank, rod, crank.start, crank.speed"
-    assert told("crnk=2").startswith(
+    assert message("crnk=2").startswith(
         f"--set crnk=2: {slider} has no parameter 'crnk'; did you mean 'crank'?; parameters: {known}"
     )
-    assert "did you mean 'crank.speed'?" in told("crank.sped=2")
-    assert told("crank").endswith("must be NAME=VALUE, such as crank.speed=30rpm")
-    assert told("crank=2 deg").startswith("--set: [parameters] crank = '2 deg': unit 'deg' must be one of m, mm")
-    assert told("crank=rod") == "--set: [parameters] crank needs itself: crank -> rod -> crank"
-    assert told("crank=nan") == "--set: [parameters] crank = nan must be a finite number"
-    assert told("crank.speed=nan") == "--set: crank.speed = nan must be a finite number"
-    assert told("crank.speed=fast").startswith("--set: crank.speed = 'fast' must be a number, alone or with a unit: ")
-    assert told("crank.start=3mm") == "--set: crank.start = '3mm': unit 'mm' must be one of rad, deg, rev"
+    assert "did you mean 'crank.speed'?" in message("crank.sped=2")
+    assert message("crank").endswith("must be NAME=VALUE, such as crank.speed=30rpm")
+    assert message("crank=2 deg").startswith("--set: [parameters] crank = '2 deg': unit 'deg' must be one of m, mm")
+    assert message("crank=rod") == "--set: [parameters] crank needs itself: crank -> rod -> crank"
+    assert message("crank=nan") == "--set: [parameters] crank = nan must be a finite number"
+    assert message("crank.speed=nan") == "--set: crank.speed = nan must be a finite number"
+    expected = "--set: crank.speed = 'fast' must be a number, alone or with a unit: "
+    assert message("crank.speed=fast").startswith(expected)
+    assert message("crank.start=3mm") == "--set: crank.start = '3mm': unit 'mm' must be one of rad, deg, rev"
     assert [path.name for path in tmp_path.iterdir()] == [slider.name]
 
 
 def test_what_belongs_to_a_run_is_not_set_elsewhere(slider: Path, refuses: Callable[..., str]) -> None:
     assert refuses("check", slider, "--set", "solver.tolerance=1e-6").startswith(
-        f"--set solver.tolerance=1e-6: {slider} has no parameter 'solver.tolerance'; it belongs to a run: solve and "
-        "simulate take it; parameters: crank"
+        f"--set solver.tolerance=1e-6: {slider} has no parameter 'solver.tolerance'; it belongs to a run; use solve "
+        "or simulate; parameters: crank"
     )
-    assert "simulate takes it, build --drive chooses" in refuses("build", slider, "--set", "driven_by_time=false")
-    assert "simulate takes it, as auto, estimated or wired" in refuses("check", slider, "--set", "rates=wired")
+    assert "use simulate, or set its default with build --drive" in refuses(
+        "build", slider, "--set", "driven_by_time=false"
+    )
+    assert "use simulate, with auto, estimated or wired" in refuses("check", slider, "--set", "rates=wired")
     assert "rates = 'wire' must be auto, estimated or wired" in refuses("simulate", slider, "--set", "rates=wire")
     for call in (("solve", slider, "-o", "run.csv"), ("simulate", slider)):
         for value in ("fine", "-1", "nan"):
-            told = refuses(*call, "--set", f"solver.tolerance={value}")
-            assert told == f"--set solver.tolerance={value}: it must be a positive number"
+            message = refuses(*call, "--set", f"solver.tolerance={value}")
+            assert message == f"--set solver.tolerance={value}: it must be a positive number"
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])

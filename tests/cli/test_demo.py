@@ -15,7 +15,7 @@ def test_the_demo_does_the_main_job(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert demo.main() == 0
-    told = capsys.readouterr().out
+    message = capsys.readouterr().out
     for finding in (
         "mobility    1",
         "redundant   AB (row AB.length)",
@@ -24,7 +24,7 @@ def test_the_demo_does_the_main_job(
         "181 samples",
         "kinfmu review logs/fourbar.mcap",
     ):
-        assert finding in told
+        assert finding in message
     kept = kinfmu.log.read(tmp_path / "logs" / "fourbar.mcap")
     assert (kept.t[0], kept.t[-1], len(kept)) == (0.0, 180.0, 181)
     assert (tmp_path / "logs" / "fourbar.rrd").is_file()

@@ -1,4 +1,4 @@
-"""Exit status of every command, and what is told: 1 the mechanism or the run is at fault, 2 wrong usage."""
+"""Exit status of every command, and its message: 1 error in the mechanism or the run, 2 wrong usage."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FILES = {
     "past.csv": "time,crank_angle [deg]\n0,300\n2,380\n",
 }
 
-# arguments, and words of what is told
+# arguments, and words of the message
 WRONG_USAGE = [
     ("list fourbar", "unexpected extra argument"),
     ("check", "Missing argument 'MECH'"),
@@ -42,7 +42,7 @@ WRONG_USAGE = [
     ("check fourbar --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),
     ("new forbar mine.toml", "did you mean 'fourbar'?"),
     ("new fourbar mine.txt", "mine.txt: its name must end in .toml"),
-    ("new fourbar broken.toml", "broken.toml: is there already"),
+    ("new fourbar broken.toml", "broken.toml: exists already"),
     ("new fourbar none/mine.toml", "there is no folder 'none'"),
     ("schema -o none/schema.json", "there is no folder 'none'"),
     ("solve fourbar", "Missing option '-o'"),
@@ -52,7 +52,7 @@ WRONG_USAGE = [
     ("solve fourbar -o run.csv --set crank.sped=1", "did you mean 'crank.speed'?"),
     ("solve fourbar -o run.csv --outputs roker.phi", "did you mean 'rocker.phi'?"),
     ("solve fourbar -o run.csv --times 0:1", "must be A:B:STEP"),
-    ("solve fourbar -o run.csv --angle 0:1:2 --times 0:1:1", "cannot both drive"),
+    ("solve fourbar -o run.csv --angle 0:1:2 --times 0:1:1", "exclude each other"),
     ("solve five_bar -o run.csv --angle 0:1:2", "five_bar has left, right; simulate --input drives them"),
     ("solve fourbar -o run.csv --angle 0:1:2 --set crank.speed=2", "--set crank.speed changes the law, which --angle"),
     ("solve fourbar -o run.csv --engine nativ", "'nativ' is not one of"),
@@ -72,14 +72,14 @@ WRONG_USAGE = [
     ("simulate fourbar.fmu --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),
     ("simulate fourbar --step 0", "a positive step"),
     ("simulate fourbar --start 3 --stop 1", "start <= stop"),
-    ("simulate fourbar --wrap", "--wrap follows the angles of --input"),
+    ("simulate fourbar --wrap", "--wrap needs --input"),
     ("simulate fourbar --input short.csv --stop 2", "holds 0 to 1 s, the run goes from 0 to 2 s"),
     ("review none.mcap", "none.mcap: there is no such file"),
     ("review short.csv", "short.csv: its name must end in one of .mcap, .rrd"),
     ("review damaged.mcap none.mcap", "none.mcap: there is no such file"),
     ("review picture.rrd --save run.rrd", "picture.rrd: a recording cannot be saved as another; give the run's .mcap"),
     ("review picture.rrd damaged.mcap", "picture.rrd: a recording cannot be compared"),
-    ("review damaged.mcap --at 3", "--at is the time of --screenshot"),
+    ("review damaged.mcap --at 3", "--at needs --screenshot"),
     ("review whole.mcap --screenshot run.png --at 5", "at = 5 s is outside the run, t = 0 to 2 s"),
     ("review damaged.mcap --save run.txt", "run.txt: its name must end in .rrd"),
     ("review damaged.mcap --screenshot run.jpg", "run.jpg: its name must end in .png"),
@@ -140,25 +140,25 @@ def folder(tmp_path: Path, made: dict[str, bytes]) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(("arguments", "told"), WRONG_USAGE, ids=[arguments for arguments, _ in WRONG_USAGE])
-def test_wrong_usage_is_told_with_status_two_and_leaves_nothing_behind(
-    arguments: str, told: str, refuses: Callable[..., str], folder: Path
+@pytest.mark.parametrize(("arguments", "message"), WRONG_USAGE, ids=[arguments for arguments, _ in WRONG_USAGE])
+def test_wrong_usage_is_reported_with_status_two_and_leaves_nothing_behind(
+    arguments: str, message: str, refuses: Callable[..., str], folder: Path
 ) -> None:
     before = sorted(folder.iterdir())
-    assert told in refuses(*arguments.split())
+    assert message in refuses(*arguments.split())
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize(("arguments", "told"), AT_FAULT, ids=[arguments for arguments, _ in AT_FAULT])
-def test_a_fault_of_the_mechanism_or_of_the_run_is_told_with_status_one(
-    arguments: str, told: str, command: Command, folder: Path
+@pytest.mark.parametrize(("arguments", "message"), AT_FAULT, ids=[arguments for arguments, _ in AT_FAULT])
+def test_a_fault_of_the_mechanism_or_of_the_run_is_reported_with_status_one(
+    arguments: str, message: str, command: Command, folder: Path
 ) -> None:
     assert folder.is_dir()
     result = command(*arguments.split())
     assert result.exit_code == 1
     *_, last = result.stderr.splitlines()
     assert last.startswith("kinfmu: ")
-    assert told in last
+    assert message in last
 
 
 def test_every_command_that_can_be_at_fault_is_in_the_tables() -> None:

@@ -44,7 +44,9 @@ def test_every_format_says_where_it_cannot_be_written(suffix: str, record: Path,
     assert refuses("export", record, "-o", f"none/run{suffix}").endswith(f"none/run{suffix}: there is no folder 'none'")
 
 
-def test_what_cannot_be_exported_is_told(record: Path, refuses: Callable[..., str], fails: Callable[..., str]) -> None:
+def test_what_cannot_be_exported_is_reported(
+    record: Path, refuses: Callable[..., str], fails: Callable[..., str]
+) -> None:
     assert "run.xls: its name must end in one of .csv, .parquet" in refuses("export", record, "-o", "run.xls")
     assert "none.mcap: there is no such file" in refuses("export", "none.mcap", "-o", "run.csv")
     record.write_text("no record")
@@ -100,14 +102,16 @@ def test_chosen_columns_go_into_every_table_with_their_units(record: Path, comma
     assert table.column_names == ["time", "coupler.vx", "solver.status"]
 
 
-def test_a_column_that_is_not_there_is_told(record: Path, refuses: Callable[..., str], tmp_path: Path) -> None:
-    told = refuses("export", record, "-o", "run.csv", "--columns", "q,cupler.x")
-    assert told.startswith("channel 'cupler.x' is not known; did you mean 'coupler.x'?; channels: all, none, inputs, q")
+def test_a_column_that_is_not_there_is_reported(record: Path, refuses: Callable[..., str], tmp_path: Path) -> None:
+    message = refuses("export", record, "-o", "run.csv", "--columns", "q,cupler.x")
+    expected = "channel 'cupler.x' is not known; did you mean 'coupler.x'?; channels: all, none, inputs, q"
+    assert message.startswith(expected)
     assert not (tmp_path / "run.csv").exists()
-    told = refuses("export", record, "-o", "run.gif", "--columns", "coupler.x")
-    assert told == "--columns coupler.x: is for tables and plots, .csv, .parquet, .npz, .svg, .png, not .gif"
-    told = refuses("export", record, "-o", "run.svg", "--columns", "cupler.x")
-    assert told.startswith("the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?; coordinates: crank.phi, ")
+    message = refuses("export", record, "-o", "run.gif", "--columns", "coupler.x")
+    assert message == "--columns coupler.x: only for tables and plots, .csv, .parquet, .npz, .svg, .png, not .gif"
+    message = refuses("export", record, "-o", "run.svg", "--columns", "cupler.x")
+    expected = "the run has no coordinate 'cupler.x'; did you mean 'coupler.x'?; coordinates: crank.phi, "
+    assert message.startswith(expected)
 
 
 def test_a_part_of_a_run_is_exported(
@@ -117,8 +121,8 @@ def test_a_part_of_a_run_is_exported(
     assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(30, 61))
     assert command("export", record, "-o", "run.csv", "--start", "175").exit_code == 0
     assert read_csv(tmp_path / "run.csv")["time"].tolist() == list(range(175, 181))
-    told = refuses("export", record, "-o", "run.csv", "--start", "181")
-    assert "the run has no samples from 181 s on; its samples: t = 0 to 180 s" in told
+    message = refuses("export", record, "-o", "run.csv", "--start", "181")
+    assert "the run has no samples from 181 s on; its samples: t = 0 to 180 s" in message
     assert "no samples up to -1 s; its" in refuses("export", record, "-o", "run.csv", "--stop", "-1")
-    told = refuses("export", record, "-o", "run.csv", "--start", "0.2", "--stop", "0.4")
-    assert "no samples from 0.2 to 0.4 s; its" in told
+    message = refuses("export", record, "-o", "run.csv", "--start", "0.2", "--stop", "0.4")
+    assert "no samples from 0.2 to 0.4 s; its" in message

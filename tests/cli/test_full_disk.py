@@ -13,9 +13,9 @@ PROGRAM = """
 import resource, signal, sys
 from kinfmu.cli import main
 
-room, *arguments = sys.argv[1:]
+limit, *arguments = sys.argv[1:]
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(room), int(room)))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
 main(arguments)
 """
 COMMANDS = {
@@ -26,14 +26,14 @@ COMMANDS = {
 }
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the limit on the size of a file stands in for a full disk")
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit on the size of files simulates a full disk")
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_file_that_finds_no_room_is_one_line_and_no_file(name: str, tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_in_one_line_and_leaves_no_file(name: str, tmp_path: Path) -> None:
     arguments, out = COMMANDS[name]
-    is_there = name != "new"  # which never replaces a file
-    if is_there:
+    existed = name != "new"  # new never replaces a file
+    if existed:
         (tmp_path / out).write_text("older")
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", PROGRAM, "400", *arguments],
         capture_output=True,
         text=True,
@@ -41,9 +41,9 @@ def test_a_file_that_finds_no_room_is_one_line_and_no_file(name: str, tmp_path: 
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
     )
-    assert told.returncode == 1
-    *_, line = told.stderr.splitlines()  # before it, matplotlib may tell that it finds no room for its cache
+    assert done.returncode == 1
+    *_, line = done.stderr.splitlines()  # before it, matplotlib may report that its cache cannot be written
     assert line == f"kinfmu: {out}: cannot be written (File too large)"
-    assert [path.name for path in tmp_path.iterdir()] == ([out] if is_there else [])
-    if is_there:
+    assert [path.name for path in tmp_path.iterdir()] == ([out] if existed else [])
+    if existed:
         assert (tmp_path / out).read_text() == "older"

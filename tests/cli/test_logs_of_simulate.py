@@ -33,8 +33,8 @@ def test_none_leaves_no_logs(command: Command, refuses: Callable[..., str], tmp_
     assert "nan" not in result.stdout
     assert "written" not in result.stdout
     assert not list(tmp_path.iterdir())
-    told = refuses("simulate", "fourbar", "--channels", "none", "--mcap", "run.mcap")
-    assert told == "--channels none keeps nothing to write to run.mcap"
+    message = refuses("simulate", "fourbar", "--channels", "none", "--mcap", "run.mcap")
+    assert message == "--channels none leaves nothing to write to run.mcap"
 
 
 def test_wrong_channels_and_rates_are_wrong_usage(refuses: Callable[..., str]) -> None:

@@ -1,4 +1,4 @@
-"""What is told beside results: notes of what was understood, warnings of what is probably not meant."""
+"""Notes on how inputs were understood, warnings of probable mistakes."""
 
 from __future__ import annotations
 
@@ -56,27 +56,27 @@ def test_an_fmu_driven_by_inputs_says_that_it_stands_still_and_how_to_drive_it(
     notes: Callable[..., list[str]], tmp_path: Path
 ) -> None:
     kinfmu.build(kinfmu.load("five_bar"), tmp_path / "five.fmu", drive="inputs")
-    (told,) = notes("simulate", "five.fmu")
+    (message,) = notes("simulate", "five.fmu")
     start = {driver.name: driver.law.at(0.0) for driver in kinfmu.load("five_bar").drivers}
     values = ", ".join(f"{name}_angle stays at {value:.6g} rad" for name, value in start.items())
     names = ", ".join(f"{name}_angle" for name in start)
-    assert told == (f"warning: no inputs are given: {values}; a CSV with the columns time, {names} drives (--input)")
+    assert message == (f"warning: no inputs are given: {values}; a CSV with the columns time, {names} drives (--input)")
     first, second = names.split(", ")
     (tmp_path / "one.csv").write_text(f"time,{first}\n0,{start['left']}\n0.1,{start['left'] + 0.01}\n")
-    *_, told = notes("simulate", "five.fmu", "--input", "one.csv", "--stop", "0.1", "--start", "0")
-    assert told.startswith(f"warning: one.csv does not drive all inputs: {second} stays at ")
+    *_, message = notes("simulate", "five.fmu", "--input", "one.csv", "--stop", "0.1", "--start", "0")
+    assert message.startswith(f"warning: one.csv does not drive all inputs: {second} stays at ")
 
 
-def test_a_mechanism_without_a_law_is_driven_by_inputs_and_says_so(
+def test_a_mechanism_without_a_law_is_driven_by_inputs_and_reports_it(
     notes: Callable[..., list[str]], fourbar_file: Callable[..., Path]
 ) -> None:
     path = fourbar_file('law = "constant_speed"\nstart = 0\nspeed = "1 deg/s"', 'law = "external"\nstart = "60 deg"')
-    (told,) = notes("simulate", path)
-    assert told.startswith("warning: no inputs are given: crank_angle stays at 1.0472 rad; a CSV")
-    (told,) = notes("solve", path, "-o", "run.csv")
-    assert told == (
-        "warning: driver crank has no law, so nothing moves it by time; --angle drives a single one, simulate --input "
-        "any number"
+    (message,) = notes("simulate", path)
+    assert message.startswith("warning: no inputs are given: crank_angle stays at 1.0472 rad; a CSV")
+    (message,) = notes("solve", path, "-o", "run.csv")
+    assert message == (
+        "warning: driver crank has no law and does not move with time; use solve --angle for one driver, simulate "
+        "--input for any number"
     )
     assert notes("solve", path, "-o", "run.csv", "--angle", "0:1:3") == []
 
@@ -97,13 +97,13 @@ def test_an_input_that_jumps_by_a_turn_is_warned_of_unless_wrap_follows_it(
 
 def test_every_jump_is_counted_and_half_a_turn_is_none(notes: Callable[..., list[str]], tmp_path: Path) -> None:
     (tmp_path / "in.csv").write_text("time,crank_angle [deg]\n0,0\n60,180\n120,361\n180,0\n")
-    (told,) = notes("simulate", "fourbar", "--input", "in.csv")
-    assert told.startswith(
+    (message,) = notes("simulate", "fourbar", "--input", "in.csv")
+    assert message.startswith(
         "warning: in.csv: crank_angle jumps by 181 deg from 60 to 120 s, and 1 more such jump; used as given"
     )
 
 
-def test_angles_of_an_input_without_unit_that_look_like_degrees_are_told(
+def test_angles_of_an_input_without_unit_that_look_like_degrees_are_reported(
     notes: Callable[..., list[str]], tmp_path: Path
 ) -> None:
     (tmp_path / "in.csv").write_text("time,crank_angle\n0,0\n180,360\n")
@@ -114,34 +114,34 @@ def test_angles_of_an_input_without_unit_that_look_like_degrees_are_told(
 
 
 @pytest.mark.parametrize(
-    ("angle", "told"),
+    ("angle", "message"),
     [
         ("0:360:3", "note: --angle 0:360:3: 0 to 360 rad, 57.3 turns; write 0deg:360deg:3 for degrees"),
         ("-45:30:2", "note: --angle -45:30:2: -45 to 30 rad, 11.9 turns; write -45deg:30deg:2 for degrees"),
-        ("0deg:720deg:3", "warning: --angle 0deg:720deg:3: steps of 1 turns between samples; --wrap takes each the"),
+        ("0deg:720deg:3", "warning: --angle 0deg:720deg:3: steps of 1 turns between samples; --wrap unwraps"),
         ("0deg:360deg:3", None),
         ("0:6.3:7", None),
         ("0deg:360:361", None),
     ],
 )
-def test_driver_values_that_are_hardly_meant_are_told(
-    angle: str, told: str | None, notes: Callable[..., list[str]], tmp_path: Path
+def test_driver_values_that_are_probably_wrong_are_reported(
+    angle: str, message: str | None, notes: Callable[..., list[str]], tmp_path: Path
 ) -> None:
     lines = notes("solve", "crank_rocker", "-o", "run.csv", "--angle", angle)
-    assert len(lines) == (told is not None)
-    assert all(line.startswith(str(told)) for line in lines)
+    assert len(lines) == (message is not None)
+    assert all(line.startswith(str(message)) for line in lines)
     assert read_csv(tmp_path / "run.csv")["solver.status"].max() < 3
 
 
-def test_a_name_of_the_gallery_that_is_a_file_here_too_is_told(
+def test_a_name_of_the_gallery_that_is_a_file_here_too_is_reported(
     notes: Callable[..., list[str]], fourbar_file: Callable[..., Path]
 ) -> None:
     fourbar_file(name="fourbar.toml")
-    assert notes("check", "fourbar") == ["note: fourbar is that of the gallery; the file here is fourbar.toml"]
+    assert notes("check", "fourbar") == ["note: fourbar is the gallery's; the file in this folder is fourbar.toml"]
     assert notes("check", "fourbar.toml") == []
 
 
-def test_a_constant_of_an_angle_that_looks_like_degrees_is_told(notes: Callable[..., list[str]]) -> None:
+def test_a_constant_of_an_angle_that_looks_like_degrees_is_reported(notes: Callable[..., list[str]]) -> None:
     call = ("solve", "fourbar", "-o", "run.csv", "--times", "0:1:1")
     assert notes(*call, "--set", "crank.start=90") == [
         "note: crank.start = 90 rad, 14.3 turns; write crank.start=90deg for degrees"

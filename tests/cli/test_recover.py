@@ -22,7 +22,7 @@ def cut(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_cut_record_is_made_whole_beside_it(cut: Path, command: Command, tmp_path: Path) -> None:
+def test_a_cut_record_is_completed_in_its_folder(cut: Path, command: Command, tmp_path: Path) -> None:
     left = cut.read_bytes()
     result = command("recover", "run.mcap")
     assert result.exit_code == 0
@@ -47,7 +47,7 @@ def test_other_commands_name_recover(cut: Path, fails: Callable[..., str]) -> No
         assert fails(*arguments).endswith(f"; kinfmu recover {cut} keeps what is left")
 
 
-def test_what_cannot_be_recovered_is_told(
+def test_what_cannot_be_recovered_is_reported(
     cut: Path, refuses: Callable[..., str], fails: Callable[..., str], tmp_path: Path
 ) -> None:
     assert "none.mcap: there is no such file" in refuses("recover", "none.mcap")

@@ -1,4 +1,4 @@
-"""kinfmu solve: tables of times, driver values, settings and outputs; wrong ones are told."""
+"""kinfmu solve: tables of times, driver values, settings and outputs; invalid ones are reported."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_driver_values_may_be_followed_the_short_way(
 ) -> None:
     assert command("solve", "fourbar", "-o", "run.csv", "--angle", "0deg:700deg:3", "--wrap").exit_code == 0
     assert np.degrees(read_csv(tmp_path / "run.csv")["crank.phi"]) == pytest.approx([0.0, -10.0, -20.0])
-    assert "--wrap follows --angle the short way" in refuses("solve", "fourbar", "-o", "run.csv", "--wrap")
+    assert "--wrap needs --angle" in refuses("solve", "fourbar", "-o", "run.csv", "--wrap")
 
 
 def test_driver_values_without_units_are_radians(command: Command, tmp_path: Path) -> None:
@@ -65,8 +65,8 @@ def test_a_parquet_table_has_the_columns_of_the_csv(command: Command, tmp_path: 
 def test_a_solved_run_is_recorded_for_plots_and_the_viewer(command: Command, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     angles = ("--angle", "0deg:360deg:37")
-    told = command("solve", "fourbar", "-o", "run.mcap", *angles).stdout
-    assert told.endswith("written to run.mcap\n")
+    message = command("solve", "fourbar", "-o", "run.mcap", *angles).stdout
+    assert message.endswith("written to run.mcap\n")
     run = read(tmp_path / "run.mcap")
     solved = kinfmu.solve(kinfmu.load("fourbar"), crank_angle=np.radians(np.linspace(0.0, 360.0, 37)))
     np.testing.assert_allclose(run.values, solved.values, atol=1e-12)
@@ -97,7 +97,7 @@ def test_constants_of_laws_may_carry_their_units(command: Command, tmp_path: Pat
     assert read_csv(tmp_path / "run.csv")["crank.phi"] == pytest.approx(np.array([0.25, 0.75]) * np.pi)
 
 
-def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command, tmp_path: Path) -> None:
+def test_a_run_past_a_limit_is_written_reported_and_exits_with_one(command: Command, tmp_path: Path) -> None:
     result = command("solve", "double_pendulum", "-o", "run.csv", "--times", "0:3:0.5")
     assert result.exit_code == 1
     assert "4 ok, 1 near singular, 2 outside" in result.stdout
@@ -109,19 +109,19 @@ def test_a_run_past_a_limit_is_written_told_and_exits_with_one(command: Command,
     assert table["solver.status"].tolist() == [0.0] * 4 + [1.0] + [3.0] * 2
 
 
-def test_a_run_over_driver_values_tells_the_sample_and_its_value_and_no_time(
+def test_a_run_over_driver_values_reports_the_sample_and_its_value_and_no_time(
     fails: Callable[..., str], tmp_path: Path
 ) -> None:
-    told = fails("solve", "double_pendulum", "-o", "run.csv", "--angle", "5:7:8")
+    message = fails("solve", "double_pendulum", "-o", "run.csv", "--angle", "5:7:8")
     asked = "crank = 6.428571 rad (368.33 deg) cannot be reached"
-    assert told.startswith(f"sample 5: {asked}: the limit is crank = 6.283185307")
+    assert message.startswith(f"sample 5: {asked}: the limit is crank = 6.283185307")
     table = read_csv(tmp_path / "run.csv")
     assert table["time"][5] == 5
     assert np.isnan(table["lower.phi"]).tolist() == [False] * 5 + [True] * 3
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (
             ("--set", "crank.sped=1"),
@@ -136,23 +136,23 @@ def test_a_run_over_driver_values_tells_the_sample_and_its_value_and_no_time(
         ),
     ],
 )
-def test_a_name_or_number_that_the_mechanism_has_not_is_told(
-    arguments: tuple[str, ...], told: str, refuses: Callable[..., str]
+def test_a_name_or_number_that_the_mechanism_does_not_have_is_reported(
+    arguments: tuple[str, ...], message: str, refuses: Callable[..., str]
 ) -> None:
-    assert refuses("solve", "fourbar", "-o", "run.csv", *arguments).startswith(told)
+    assert refuses("solve", "fourbar", "-o", "run.csv", *arguments).startswith(message)
 
 
-def test_a_folder_that_is_missing_is_told(refuses: Callable[..., str]) -> None:
-    told = refuses("solve", "fourbar", "-o", "none/run.csv", "--times", "0:1:1")
-    assert told == "Invalid value for '-o': none/run.csv: there is no folder 'none'"
+def test_a_folder_that_is_missing_is_reported(refuses: Callable[..., str]) -> None:
+    message = refuses("solve", "fourbar", "-o", "none/run.csv", "--times", "0:1:1")
+    assert message == "Invalid value for '-o': none/run.csv: there is no folder 'none'"
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "told"),
+    ("option", "value", "message"),
     [
         ("--times", "0:1", "'0:1' must be A:B:STEP, such as 0:1.5:0.01"),
-        ("--times", "1:0:1", "'1:0:1' must run forwards with a positive step"),
-        ("--times", "0:1:0", "'0:1:0' must run forwards with a positive step"),
+        ("--times", "1:0:1", "'1:0:1' must increase, with a positive step"),
+        ("--times", "0:1:0", "'0:1:0' must increase, with a positive step"),
         ("--times", "0:1:1deg", "'1deg' is not a number (units: s, ms, min, h)"),
         ("--times", "0:inf:1", "'inf' is not a finite number"),
         ("--times", "0:1:1e-18", "'0:1:1e-18' asks for more than 10000000 samples"),
@@ -164,39 +164,39 @@ def test_a_folder_that_is_missing_is_told(refuses: Callable[..., str]) -> None:
         ("--set", "crank.speed", "'crank.speed' must be NAME=VALUE, such as crank.speed=30rpm"),
     ],
 )
-def test_a_value_of_an_option_that_cannot_be_meant_is_wrong_usage(
-    option: str, value: str, told: str, refuses: Callable[..., str], tmp_path: Path
+def test_a_value_of_an_option_that_is_invalid_is_wrong_usage(
+    option: str, value: str, message: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
     called = "'--angle' / '--position'" if option == "--angle" else f"'{option}'"
-    assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for {called}: {told}"
+    assert refuses("solve", "fourbar", "-o", "run.csv", option, value) == f"Invalid value for {called}: {message}"
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ((), "Missing option '-o'."),
         (("-o", "run.xyz"), "Invalid value for '-o': run.xyz: its name must end in one of .csv, .parquet, .npz, .mcap"),
         (("-o", "run"), "Invalid value for '-o': run: its name must end in one of .csv, .parquet, .npz, .mcap"),
-        (("-o", "run.csv", "--times", "0:1:1", "--angle", "0:1:2"), "--times and --angle cannot both drive"),
+        (("-o", "run.csv", "--times", "0:1:1", "--angle", "0:1:2"), "--times and --angle exclude each other"),
     ],
 )
 def test_options_that_do_not_fit_are_wrong_usage_and_nothing_is_written(
-    arguments: tuple[str, ...], told: str, refuses: Callable[..., str], tmp_path: Path
+    arguments: tuple[str, ...], message: str, refuses: Callable[..., str], tmp_path: Path
 ) -> None:
-    assert refuses("solve", "fourbar", *arguments) == told
+    assert refuses("solve", "fourbar", *arguments) == message
     assert not list(tmp_path.iterdir())
 
 
-def test_an_engine_that_is_not_there_is_told(refuses: Callable[..., str]) -> None:
+def test_an_engine_that_is_not_there_is_reported(refuses: Callable[..., str]) -> None:
     assert "'magic' is not one of" in refuses("solve", "fourbar", "-o", "run.csv", "--engine", "magic")
 
 
-def test_a_run_of_too_many_samples_in_the_file_is_told(
+def test_a_run_of_too_many_samples_in_the_file_is_reported(
     fails: Callable[..., str], fourbar_file: Callable[..., Path]
 ) -> None:
-    told = fails("solve", fourbar_file("step = 1\n", "step = 1e-9\n"), "-o", "run.csv")
-    assert told == "[run] 0 to 180 s in steps of 1e-09 s: more than 10000000 samples"
+    message = fails("solve", fourbar_file("step = 1\n", "step = 1e-9\n"), "-o", "run.csv")
+    assert message == "[run] 0 to 180 s in steps of 1e-09 s: more than 10000000 samples"
 
 
 def test_driver_values_are_lengths_where_a_length_is_driven(

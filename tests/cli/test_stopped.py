@@ -1,4 +1,4 @@
-"""Ctrl-C: what is told, with exit status 1, and what is left."""
+"""Ctrl-C: the message, exit status 1, and the files that remain."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def test_simulate_that_is_stopped_while_the_recording_is_written_says_where_the_
     fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("kinfmu.log.write_rrd", press)
-    told = fails("simulate", "fourbar", "--mcap", "run.mcap")
-    assert told == "stopped before the recording was written; the run is in run.mcap"
+    message = fails("simulate", "fourbar", "--mcap", "run.mcap")
+    assert message == "stopped before the recording was written; the run is in run.mcap"
     assert len(log.read(tmp_path / "run.mcap")) == 181
 
 
@@ -38,6 +38,6 @@ def test_solve_that_is_stopped_says_that_nothing_was_written(
     early: str, fails: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(early, press)
-    told = fails("solve", "fourbar", "-o", "run.csv")
-    assert told == "stopped before the run was whole: nothing was written"
+    message = fails("solve", "fourbar", "-o", "run.csv")
+    assert message == "stopped before the run was complete: nothing was written"
     assert list(tmp_path.iterdir()) == []

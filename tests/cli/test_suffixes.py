@@ -61,8 +61,8 @@ def test_a_mechanism_file_is_checked_solved_built_and_simulated(
 
 
 def test_runs_are_reviewed(record: Path, command: Command, refuses: Callable[..., str]) -> None:
-    assert command("review", record, "--save", "R.RRD").stdout == "made R.RRD\n"
-    assert command("review", record, record, "--save", "BOTH.RRD").stdout == "made BOTH.RRD\n"
-    told = refuses("review", "R.RRD", "--save", "again.rrd")
-    assert told == "R.RRD: a recording cannot be saved as another; give the run's .mcap file"
+    assert command("review", record, "--save", "R.RRD").stdout == "written: R.RRD\n"
+    assert command("review", record, record, "--save", "BOTH.RRD").stdout == "written: BOTH.RRD\n"
+    message = refuses("review", "R.RRD", "--save", "again.rrd")
+    assert message == "R.RRD: a recording cannot be saved as another; give the run's .mcap file"
     assert "did you mean 'RUN.MCAP'?" in refuses("review", "RUNS.MCAp")

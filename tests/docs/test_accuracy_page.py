@@ -1,4 +1,4 @@
-"""docs/accuracy.md: what it names is there, its tolerances are those of the code, its tables are whole and say so."""
+"""docs/accuracy.md: the files it names exist, its tolerances are those of the code, its tables are complete."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROOT = DOCS.parent
 PAGE = (DOCS / "accuracy.md").read_text(encoding="utf-8")
 SETTINGS = (DOCS / SETTINGS_PAGE).read_text(encoding="utf-8")
 PEERS = ("CasADi", "pylinkage")  # rows of theirs are there if they were installed
-ANEW = "kinfmu bench writes it anew"
+ANEW = "kinfmu bench writes it again"
 
 
 def part(name: str) -> str:
@@ -37,7 +37,7 @@ def rows(table: str) -> Iterator[list[str]]:
             yield [cell.strip() for cell in line.strip("|").split("|")]
 
 
-def test_every_test_file_and_command_that_is_named_is_there() -> None:
+def test_every_file_and_command_of_the_page_exists() -> None:
     files = re.findall(r"`((?:tests|kinfmu|scripts)/[\w/.]+)", PAGE)
     assert len(files) > 10
     for name in files:
@@ -46,13 +46,13 @@ def test_every_test_file_and_command_that_is_named_is_there() -> None:
         assert command in main.commands
 
 
-def test_every_promise_names_what_shows_it() -> None:
-    (table,) = re.findall(r"## What is promised\n\n(.*?)\n\n", PAGE, re.DOTALL)
-    head, *promises = rows(table)
+def test_every_guarantee_names_its_test_or_command() -> None:
+    (table,) = re.findall(r"## Guarantees\n\n(.*?)\n\n", PAGE, re.DOTALL)
+    head, *guarantees = rows(table)
     assert head == ["", "within", "shown by"]
-    assert len(promises) > 6
-    for promise in promises:
-        assert re.search(r"`(tests|scripts)/|`kinfmu ", promise[2]), promise[0]
+    assert len(guarantees) > 6
+    for guarantee in guarantees:
+        assert re.search(r"`(tests|scripts)/|`kinfmu ", guarantee[2]), guarantee[0]
 
 
 def test_the_tolerances_are_those_of_the_code() -> None:
@@ -78,7 +78,7 @@ def test_the_tables_of_the_page_hold_every_engine_and_point() -> None:
     assert "median of" in part("conditions")
 
 
-def test_kinfmu_is_as_exact_in_the_tables_as_is_promised() -> None:
+def test_kinfmu_is_as_exact_in_the_tables_as_guaranteed() -> None:
     (ours,) = (line[1:] for line in rows(part("engines")) if line[0] == "kinfmu")
     assert max(float(cell.split(", ")[1]) for cell in ours) <= 1e-11
     of_points = [line[1:-1] for line in rows(part("singular points")) if line[0] == "kinfmu"]
@@ -98,7 +98,7 @@ def test_the_page_of_settings_holds_every_setting_of_every_engine(name: str) -> 
         assert found == expected or (engine.name in PEERS and not found), ANEW
 
 
-def test_the_charts_lie_beside_the_page_with_text_as_text() -> None:
+def test_the_charts_are_in_the_folder_of_the_page_with_text_as_text() -> None:
     for chart in (WORK_PRECISION, NEAR_SINGULAR):
         for suffix in SUFFIXES:
             assert (DOCS / f"{chart}{suffix}").is_file(), ANEW

@@ -32,15 +32,15 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     joint, export = blocks("python")
     (named,) = re.findall(r"`kinfmu/joints/(opposed\.py)`:", PAGE)
     (copy / "kinfmu" / "joints" / named).write_text(joint, encoding="utf-8")
-    room = copy / "kinfmu" / "joints" / "__init__.py"
-    text = room.read_text(encoding="utf-8")
+    package = copy / "kinfmu" / "joints" / "__init__.py"
+    text = package.read_text(encoding="utf-8")
     text = text.replace(
         "from kinfmu.joints.point_on_line import", f"{export}from kinfmu.joints.point_on_line import", 1
     )
     text = text.replace("\n)\n\n__all__", "\n    Opposed,\n)\n\n__all__", 1)
     text = text.replace('    "PointOnLine",\n', '    "Opposed",\n    "PointOnLine",\n', 1)
     assert text.count("Opposed") == 3
-    room.write_text(text, encoding="utf-8")
+    package.write_text(text, encoding="utf-8")
     return copy
 
 
@@ -73,7 +73,7 @@ def test_the_mechanism_of_the_page_solves_as_the_page_says(project: Path) -> Non
     assert {float(row["right_jaw.vx"]) for row in rows} == {-1.0}
 
 
-def test_a_wrong_value_is_told_in_one_line(project: Path) -> None:
+def test_a_wrong_value_is_reported_in_one_line(project: Path) -> None:
     (mechanism,) = blocks("toml")
     (project / "wrong.toml").write_text(
         mechanism.replace('other = "right_jaw.P"', 'other = "ground.O"'), encoding="utf-8"

@@ -63,7 +63,7 @@ def test_topics_and_metadata_are_those_of_a_file(record: Path) -> None:
     assert (sample["unit.coupler_vx"], sample["column.coupler_vx"]) == ("m/s", "coupler.vx")
 
 
-def test_a_run_that_ends_at_a_limit_says_so_as_its_outcome(tmp_path: Path) -> None:
+def test_a_run_that_ends_at_a_limit_has_it_as_its_outcome(tmp_path: Path) -> None:
     fmu = kinfmu.build(kinfmu.load("double_pendulum"), tmp_path / "pendulum.fmu")
     run = kinfmu.simulate(fmu, stop=3.0, step=0.5, sink=McapLog(tmp_path / "run.mcap"))
     with (tmp_path / "run.mcap").open("rb") as file:
@@ -74,10 +74,10 @@ def test_a_run_that_ends_at_a_limit_says_so_as_its_outcome(tmp_path: Path) -> No
 
 def test_every_channel_is_on_the_page() -> None:
     run = kinfmu.solve(kinfmu.load("fourbar"), [0.0])
-    with pytest.raises(RequestError) as told:
+    with pytest.raises(RequestError) as caught:
         absent_columns(run, ["nothing"])
-    known = re.findall(r"channels: (.*), or columns", str(told.value))[0].split(", ")
-    section = PAGE[PAGE.index("## Channels") : PAGE.index("## When")]
+    known = re.findall(r"channels: (.*), or columns", str(caught.value))[0].split(", ")
+    section = PAGE[PAGE.index("## Channels") : PAGE.index("## Failures")]
     assert {name for name in known if f"`{name}`" not in section} == {"all", "none", "status"}
 
 

@@ -57,7 +57,7 @@ def test_with_a_compiler_it_is_native_and_the_command_states_the_platforms(tmp_p
 def test_without_a_compiler_it_is_python_and_the_command_states_why(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["build", "fourbar"])
     assert result.exit_code == 0, result.output
-    assert ", python FMU for x86_64-linux, x86_64-windows in hosts that hold Python, " in result.stdout
+    assert ", python FMU for x86_64-linux, x86_64-windows in hosts that contain Python, " in result.stdout
     assert result.stderr == (
         "a native FMU, which every host can load, is not possible here: "
         "no C compiler: cc, gcc and clang are not found\n"

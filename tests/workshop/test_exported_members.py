@@ -1,4 +1,4 @@
-"""Public names: all of them are in `__all__`, can be had, and say what they are."""
+"""Public names: all are in `__all__`, exist and are documented."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_every_public_name_of_a_package_is_in_all(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_every_exported_name_is_there_and_documented(name: str) -> None:
+def test_every_exported_name_exists_and_is_documented(name: str) -> None:
     package = importlib.import_module(name)
     for member in getattr(package, "__all__", []):
         value = getattr(package, member)
@@ -47,7 +47,7 @@ def test_every_exported_name_is_there_and_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_every_module_or_the_class_it_is_named_after_says_what_it_is(name: str) -> None:
+def test_every_module_or_the_class_it_is_named_after_is_documented(name: str) -> None:
     module = importlib.import_module(name)
     namesake = name.rpartition(".")[2].replace("_", "")
     classes = [value for key, value in vars(module).items() if inspect.isclass(value) and key.lower() == namesake]

@@ -1,4 +1,4 @@
-"""The scripts: setting up once, telling what is wrong, passing arguments on. No environment is really made here."""
+"""The scripts: set-up once, messages, arguments passed unchanged. No environment is really made here."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_a_moved_checkout_gets_a_new_environment(miniature: Miniature) -> None:
     assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.[dev]"]
 
 
-def test_a_failed_installation_is_said_and_begun_again(miniature: Miniature) -> None:
+def test_a_failed_installation_is_reported_and_started_again(miniature: Miniature) -> None:
     status, said = miniature.run("demo", PIP_FAILS="1")
     assert status == 1
     assert said.splitlines()[-1] == "kinfmu: installing into .venv failed, see above"
@@ -73,7 +73,7 @@ def test_an_interrupted_update_is_begun_again(miniature: Miniature) -> None:
     assert miniature.asked == [f"python3 -m venv {miniature.root}/.venv", f"{INSTALL}.", "python -m kinfmu.cli.demo"]
 
 
-def test_a_broken_environment_is_made_anew(miniature: Miniature) -> None:
+def test_a_broken_environment_is_made_again(miniature: Miniature) -> None:
     miniature.run("demo")
     (miniature.root / ".venv" / "bin" / "python").unlink()
     assert miniature.run("demo")[0] == 0
@@ -90,7 +90,7 @@ def test_an_environment_that_somebody_made_by_hand_is_kept(miniature: Miniature)
     assert (tools / "theirs").exists()
 
 
-def test_no_python_at_all_is_said_in_one_line(miniature: Miniature) -> None:
+def test_no_python_at_all_is_reported_in_one_line(miniature: Miniature) -> None:
     miniature.python.unlink()
     status, said = miniature.run("demo")
     assert status == 1
@@ -107,7 +107,7 @@ def test_a_python_that_is_too_old_is_named(miniature: Miniature) -> None:
     assert miniature.asked == []
 
 
-def test_a_python_without_venv_is_told_what_to_install(miniature: Miniature) -> None:
+def test_a_python_without_venv_is_reported_with_what_to_install(miniature: Miniature) -> None:
     status, said = miniature.run("demo", NO_VENV="1")
     assert status == 1
     assert said.endswith("python3 is 3.11 without venv (Debian: apt-get install python3.11-venv)\n")

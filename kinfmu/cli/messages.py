@@ -1,4 +1,4 @@
-"""What is told beside results: one line each, on stderr."""
+"""Notes and warnings on stderr, one line each."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ if TYPE_CHECKING:
 
 
 def printable(text: str) -> str:
-    """Return the text on one line, with control characters as escapes: texts of files may hold codes of terminals."""
+    """Return the text on one line, with control characters escaped: files may contain terminal codes."""
     line = " ".join(text.splitlines())
     return "".join(f"\\x{ord(c):02x}" if unicodedata.category(c) == "Cc" else c for c in line)
 
 
 def note(text: str) -> None:
-    """Tell what was understood, or what was chosen where nothing was said."""
+    """Print how an input was understood, or which default was chosen."""
     click.echo(f"kinfmu: note: {printable(text)}", err=True)
 
 
 def warn(text: str) -> None:
-    """Tell what is probably not meant."""
+    """Print a warning of a probable mistake."""
     click.echo(f"kinfmu: warning: {printable(text)}", err=True)
 
 
-def tell_of(run: Run) -> None:
-    """Tell notes and warnings of a run, each once; errors are for `fail_if_failed`."""
-    tellers = {"info": note, "warning": warn}
+def print_events(run: Run) -> None:
+    """Print the notes and warnings of a run, each once; `fail_if_failed` reports errors."""
+    printers = {"info": note, "warning": warn}
     for level, text in dict.fromkeys((event.level, event.text) for event in run.events):
-        if level in tellers:
-            tellers[level](text)
+        if level in printers:
+            printers[level](text)
