@@ -1,4 +1,4 @@
-"""What `check` tells: mobility, redundancy, drivers, plan, loops, ranges, assemblies, the matrices of the method."""
+"""The report of `check`: mobility, redundancy, drivers, plan, loops, ranges, assemblies, the matrices of the method."""
 
 from __future__ import annotations
 

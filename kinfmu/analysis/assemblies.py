@@ -1,4 +1,4 @@
-"""Assemblies: the distinct ways in which a mechanism can be put together at its start driver values."""
+"""Assemblies: the distinct closed poses of a mechanism at its start driver values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.analysis.written import degrees, written
+from kinfmu.analysis.values import degrees, value_text
 from kinfmu.codegen.python import load_model
 from kinfmu.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
 from kinfmu.equations.closing import CLOSED, close
@@ -22,24 +22,24 @@ from kinfmu.plan.anchor import find_anchor
 
 MOST = 64  # assemblies after which the search ends
 _SEED = 1989
-_TRIES = 20_000  # of Newton's method from random unknowns, at most
-_IN_VAIN = 300  # tries that close without finding anything new, after which all is taken for found
-_STARTS = 60  # random poses from which a mechanism without a plan is put together
-_LARGE = 150  # coordinates beyond which that takes minutes
-_SAME = 1e-6  # [rad, sizes]; poses closer than this are one
-_APART = 1e-3  # [rad, sizes]; what tells assemblies apart for people
-_SPREAD = 2.0  # sizes to either side over which bodies are thrown
-_STEPS = 4  # in which a pose is moved to driver values near by
-_ADVISED = 8  # assemblies for which a short choice of start poses is sought
+_TRIES = 20_000  # most runs of Newton's method from random unknowns
+_IN_VAIN = 300  # tries without a new pose after which the search counts as complete
+_STARTS = 60  # random poses from which a mechanism without a plan is assembled
+_LARGE = 150  # coordinates; more take minutes
+_SAME = 1e-6  # [rad, sizes]; poses closer than this count as one
+_APART = 1e-3  # [rad, sizes]; smallest difference that distinguishes assemblies in the report
+_SPREAD = 2.0  # [sizes] to either side, range of random positions
+_STEPS = 4  # in which a pose is moved to nearby driver values
+_ADVISED = 8  # assemblies for which few start poses are searched
 _SINGLE = 3  # bodies that are tried alone
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """One way of putting the mechanism together.
+    """One assembly of the mechanism.
 
     coordinates: all of them by name, in the world [length, rad], angles within half a turn; is_chosen: the one that the
-    file's start poses lead to; start: start poses that lead to it, by body, to be put in place of the file's.
+    file's start poses lead to; start: start poses by body that lead to it, in place of the file's.
     """
 
     coordinates: Mapping[str, float] = field(hash=False)
@@ -49,24 +49,24 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Assemblies:
-    """All that were found at these driver values, the file's first.
+    """All assemblies found at these driver values, the file's first.
 
-    drivers: values by name [rad or length]; told_apart_by: names of coordinates of which one at least differs between
+    drivers: values by name [rad or length]; distinguished_by: coordinates of which at least one differs between
     any two; is_complete: False if the search was ended because there are so many.
     """
 
     mechanism: Mechanism
     drivers: Mapping[str, float] = field(hash=False)
     found: tuple[Assembly, ...]
-    told_apart_by: tuple[str, ...]
+    distinguished_by: tuple[str, ...]
     is_complete: bool
 
     def as_json(self) -> dict[str, Any]:
-        """As plain data: drivers, complete, told_apart_by, found: chosen, coordinates, start (x, y, phi by body)."""
+        """As plain data: drivers, complete, distinguished_by, found: chosen, coordinates, start (x, y, phi by body)."""
         return {
             "drivers": dict(self.drivers),
             "complete": self.is_complete,
-            "told_apart_by": list(self.told_apart_by),
+            "distinguished_by": list(self.distinguished_by),
             "found": [
                 {
                     "chosen": one.is_chosen,
@@ -82,11 +82,15 @@ class Assemblies:
 
 
 def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Assemblies:
-    """Every way of putting a mechanism together at its start driver values, whatever its start poses say.
+    """Return all assemblies of a mechanism at its start driver values, independent of its start poses.
 
-    plan: that of the mechanism, None if it has none because its start poses do not close or leave several branches.
-    Newton's method from random unknowns of each block, seeded; what differs by whole turns is one. Raises the
-    KinfmuError of a mechanism that cannot be planned at all, an AssemblyError if none is found.
+    plan: that of the mechanism; None if its start poses do not close or leave several branches.
+    Newton's method from random unknowns of each block, seeded; poses that differ by whole turns count as one.
+
+    Raises:
+        KinfmuError: If the mechanism cannot be planned.
+        AssemblyError: If no assembly is found.
+
     """
     whole = replace(mechanism, coordinates="all", points={})
     chosen = None
@@ -100,7 +104,7 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
     is_chosen = [chosen is not None and _distance(planned, chosen, pose) <= _SAME for pose in poses]
     order = sorted(range(len(poses)), key=lambda k: (not is_chosen[k], [round(c, 6) for c in poses[k].tolist()]))
     poses, is_chosen = [poses[k] for k in order], [is_chosen[k] for k in order]
-    apart = _told_apart_by(planned, poses)
+    apart = _distinguishing(planned, poses)
     undecided = _undecided(planned, poses, is_at_start=chosen is not None or _is_at_start(mechanism, planned))
     is_quick = not planned.watches  # with redundant rows each try takes seconds
     found = []
@@ -113,10 +117,10 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
 
 
 def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
-    """Poses of all coordinates as the plan's own origin sees them, and whether the search came to its end.
+    """Return poses of all coordinates relative to the plan's origin, and whether the search is complete.
 
-    Half of the tries throw all unknowns, half those of one block of a pose that is known: with many blocks all at once
-    rarely close.
+    Half of the tries start from random values of all unknowns, half from those of one block of a known pose: with many
+    blocks, random values of all at once rarely close.
     """
     model, rng = load_model(plan), np.random.default_rng(_SEED)
     u, anchor = model.ANCHOR
@@ -129,15 +133,15 @@ def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
     for trial in range(_TRIES):
         if not anchor or in_vain >= _IN_VAIN or len(poses) >= MOST:
             break
-        thrown = np.where(is_angle, math.pi, _SPREAD * scales) * rng.uniform(-1.0, 1.0, len(anchor))
-        thrown += np.where(is_angle, 0.0, known[0])
+        trial_q = np.where(is_angle, math.pi, _SPREAD * scales) * rng.uniform(-1.0, 1.0, len(anchor))
+        trial_q += np.where(is_angle, 0.0, known[0])
         if trial % 2:
             start, end = model.BLOCKS[rng.integers(len(model.BLOCKS))]
             kept = known[rng.integers(len(known))].copy()
-            kept[start:end] = thrown[start:end]
-            thrown = kept
+            kept[start:end] = trial_q[start:end]
+            trial_q = kept
         try:
-            found = model.position(u, tuple(thrown.tolist()), rest, rest, -0.0)
+            found = model.position(u, tuple(trial_q.tolist()), rest, rest, -0.0)
         except (ArithmeticError, ValueError):  # singular, or diverged
             continue
         if not (found[3] <= CLOSED and found[6] <= CLOSED and found[2] > SINGULAR):
@@ -153,7 +157,7 @@ def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
 
 
 def _pose(plan: SolvePlan, model: Any, values: tuple[float, ...]) -> FloatArray:
-    """All coordinates in the mechanism's order, as the plan's own origin sees them, angles within half a turn."""
+    """Return all coordinates in the mechanism's order, relative to the plan's origin, angles within half a turn."""
     at = {**plan.fixed, **dict(zip(plan.outputs, model.outputs(values), strict=True))}
     offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
     names = plan.mechanism.coordinate_names
@@ -162,13 +166,13 @@ def _pose(plan: SolvePlan, model: Any, values: tuple[float, ...]) -> FloatArray:
 
 
 def _reduced(names: Sequence[str], q: FloatArray) -> FloatArray:
-    """The same pose with angles within half a turn."""
+    """Return the pose with angles within half a turn."""
     turned = [name.endswith(".phi") for name in names]
     return np.where(turned, np.remainder(q + math.pi, math.tau) - math.pi, q)
 
 
 def _apart(plan: SolvePlan, a: FloatArray, b: FloatArray) -> FloatArray:
-    """How far two poses lie apart in each coordinate, but for whole turns [rad, sizes], (n,)."""
+    """Return the distance of two poses in each coordinate, modulo whole turns [rad, sizes], (n,)."""
     turned = np.array([name.endswith(".phi") for name in plan.mechanism.coordinate_names])
     around = np.abs(np.remainder(b - a + math.pi, math.tau) - math.pi)
     return np.where(turned, around, np.abs(b - a) / plan.size)
@@ -178,25 +182,27 @@ def _distance(plan: SolvePlan, a: FloatArray, b: FloatArray) -> float:
     return float(_apart(plan, a, b).max(initial=0.0))
 
 
-def _told_apart_by(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[str, ...]:
-    """Few coordinates, angles first, of which at least one differs between any two poses."""
+def _distinguishing(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[str, ...]:
+    """Return few coordinates, angles first, of which at least one differs between any two poses."""
     names = plan.mechanism.coordinate_names
     open_pairs = [_apart(plan, a, b) for k, a in enumerate(poses) for b in poses[k + 1 :]]
     order = sorted(range(len(names)), key=lambda k: not names[k].endswith(".phi"))
-    told: list[str] = []
+    chosen: list[str] = []
     while open_pairs:
         seen = {k: sum(float(pair[k]) > _APART for pair in open_pairs) for k in order}
         best = max(order, key=lambda k: seen[k])
         if not seen[best]:
             break
-        told.append(names[best])
+        chosen.append(names[best])
         open_pairs = [pair for pair in open_pairs if pair[best] <= _APART]
-    return tuple(told)
+    return tuple(chosen)
 
 
 def _undecided(plan: SolvePlan, poses: Sequence[FloatArray], *, is_at_start: bool) -> NDArray[np.bool_]:
-    """Coordinates that start poses have a say in, (bodies, 3): all that no joint fixes, and of those, if the drivers
-    stand where the start poses put them, the ones in which poses differ.
+    """Return the coordinates that start poses influence, (bodies, 3).
+
+    These are the ones that no joint fixes; if the drivers are where the start poses put them, only those in which poses
+    differ.
     """
     undecided: NDArray[np.bool_] = np.array([name not in plan.fixed for name in plan.mechanism.coordinate_names])
     if is_at_start and len(poses) > 1:
@@ -205,7 +211,7 @@ def _undecided(plan: SolvePlan, poses: Sequence[FloatArray], *, is_at_start: boo
 
 
 def _is_at_start(mechanism: Mechanism, plan: SolvePlan) -> bool:
-    """True if a plan's drivers stand where the start poses of the mechanism put them, or its laws."""
+    """Return True if the plan's drivers are where the start poses or the laws of the mechanism put them."""
     targets = start_values(System(localized(mechanism)[0])).u
     return bool(np.abs(plan.anchor.u - targets).max(initial=0.0) <= _SAME)
 
@@ -219,11 +225,10 @@ def _choice(
     *,
     is_advised: bool,
 ) -> dict[str, Start]:
-    """Few start poses, rounded, that lead to a pose if put in place of the file's; all of those that are elsewhere, if
-    nothing less does.
+    """Return few rounded start poses that lead to a pose in place of the file's; if few do not, all that differ.
 
-    instead_of: the pose that the file's start poses lead to; undecided: whether start poses have a say in x, y, phi of
-    each moving body, (bodies, 3). Where they have none, they stay as the file says.
+    instead_of: the pose that the file's start poses lead to; undecided: whether start poses influence x, y, phi of
+    each moving body, (bodies, 3). Others stay as in the file.
     """
     named = _named(plan, pose)
     moved = undecided
@@ -244,9 +249,9 @@ def _choice(
 def _shorter_choices(
     mechanism: Mechanism, elsewhere: Mapping[str, Start], moved: NDArray[np.bool_]
 ) -> Iterator[dict[str, Start]]:
-    """The angle of one body that only turns; the angles of all that are elsewhere, with and without their places.
+    """Yield the angle of one body that only turns; the angles of all that differ; these with their positions.
 
-    moved: whether x, y, phi of each moving body are elsewhere, (bodies, 3).
+    moved: whether x, y, phi of each moving body differ, (bodies, 3).
     """
     bodies = mechanism.moving_bodies
     only_turns = [body.name for body, where in zip(bodies, moved, strict=True) if where[2] and not where[:2].any()]
@@ -264,7 +269,7 @@ def _shorter_choices(
 
 
 def _leads_to(mechanism: Mechanism, plan: SolvePlan, start: Mapping[str, Start], pose: FloatArray) -> bool:
-    """True if the mechanism with these start poses assembles in a pose, at the same driver values."""
+    """Return True if the mechanism with these start poses assembles in `pose`, at the same driver values."""
     bodies = [replace(body, start=start.get(body.name, body.start)) for body in mechanism.bodies]
     system = System(localized(replace(mechanism, bodies=tuple(bodies)))[0])
     try:
@@ -278,15 +283,15 @@ def _leads_to(mechanism: Mechanism, plan: SolvePlan, start: Mapping[str, Start],
 
 
 def _moved_to(system: System, assembled: Assembled, u: FloatArray) -> FloatArray:
-    """The assembled pose at other driver values, in small steps: a nearly singular start is left by a little."""
-    q, way = assembled.q, u - assembled.u
-    for k in range(1, _STEPS + 1) if np.abs(way).max(initial=0.0) > 0.0 else ():
-        q, _ = close(system, q, assembled.u + way * (k / _STEPS))
+    """Return the assembled pose moved to driver values `u` in small steps."""
+    q, change = assembled.q, u - assembled.u
+    for k in range(1, _STEPS + 1) if np.abs(change).max(initial=0.0) > 0.0 else ():
+        q, _ = close(system, q, assembled.u + change * (k / _STEPS))
     return q
 
 
 def _named(plan: SolvePlan, pose: FloatArray) -> dict[str, float]:
-    """All coordinates by name, in the world."""
+    """Return all coordinates by name, in the world."""
     offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
     names = plan.mechanism.coordinate_names
     reduced = _reduced(names, pose).tolist()
@@ -294,27 +299,27 @@ def _named(plan: SolvePlan, pose: FloatArray) -> dict[str, float]:
 
 
 def _rounded(named: Mapping[str, float], body: str) -> Start:
-    """A start pose with few digits: to a tenth of a degree and four digits of a length."""
+    """Return a start pose rounded to a tenth of a degree and four digits of a length."""
     x, y = (float(f"{named[f'{body}.{axis}']:.4g}") for axis in ("x", "y"))
     return Start(x, y, math.radians(round(math.degrees(named[f"{body}.phi"]), 1)))
 
 
 def _started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
-    """The mechanism with a pose of all coordinates, in the world, as its start."""
+    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
     poses = iter(pose.reshape(-1, 3).tolist())
     bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
     return replace(mechanism, bodies=tuple(bodies))
 
 
 def _some_pose(mechanism: Mechanism) -> FloatArray:
-    """A pose in which a mechanism closes, in the world: beside a singular start pose, or from random ones."""
+    """Return a closed pose in the world: near a singular start pose, or from random start poses."""
     try:
         return _in_world(mechanism, compile_plan(mechanism).anchor.q)
     except AmbiguousStartError as error:
         branches: list[FloatArray] = error.data["branches"]  # type: ignore[assignment]  # data are objects
         return _in_world(mechanism, branches[0])
     except AssemblyError as error:
-        found = _thrown_together(mechanism)
+        found = _assemble_from_random_starts(mechanism)
         if found is None:
             raise error from None
         return found
@@ -325,8 +330,8 @@ def _in_world(mechanism: Mechanism, q: FloatArray) -> FloatArray:
     return np.asarray(q + np.tile([origin.x, origin.y, 0.0], len(q) // 3))
 
 
-def _thrown_together(mechanism: Mechanism) -> FloatArray | None:
-    """A closed pose at the start driver values, from seeded random poses; None if there is none or too much to try."""
+def _assemble_from_random_starts(mechanism: Mechanism) -> FloatArray | None:
+    """Return a closed pose at the start driver values, from seeded random poses; None if not found."""
     system = System(localized(mechanism)[0])
     if len(system.coordinates) > _LARGE:
         return None
@@ -349,16 +354,18 @@ def _given(start: Start) -> dict[str, float]:
 def _lines(assemblies: Assemblies) -> Iterator[str]:
     mechanism = assemblies.mechanism
     kinds = {driver.name: driver.quantity.kind for driver in mechanism.drivers}
-    at = listed(f"{name} = {written(u, mechanism.length_unit, kinds[name])}" for name, u in assemblies.drivers.items())
+    at = listed(
+        f"{name} = {value_text(u, mechanism.length_unit, kinds[name])}" for name, u in assemblies.drivers.items()
+    )
     given = {body.name: body.start for body in mechanism.bodies}
     many = f"{len(assemblies.found)}" if assemblies.is_complete else f"at least {len(assemblies.found)}"
-    apart = f", told apart by {listed(assemblies.told_apart_by)}" if assemblies.told_apart_by else ""
+    apart = f", distinguished by {listed(assemblies.distinguished_by)}" if assemblies.distinguished_by else ""
     yield f"  assemblies  {many} at {at}{apart}"
     for k, one in enumerate(assemblies.found, start=1):
-        said = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.told_apart_by]
+        values = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.distinguished_by]
         if one.is_chosen:
-            said.append("the file's")
-        yield f"  {'*' if one.is_chosen else ' '} {k:<8}  {listed(said)}"
+            values.append("the file's")
+        yield f"  {'*' if one.is_chosen else ' '} {k:<8}  {listed(values)}"
         for number, (body, start) in enumerate(one.start.items()):
             how = "and by" if number else "choose it by"
             yield f"              {how} [bodies.{body}] start{_start(given[body], start)}"
@@ -369,7 +376,7 @@ def _value(name: str, value: float, unit: str) -> str:
 
 
 def _start(given: Start, start: Start) -> str:
-    """What a file would say for a start pose: one coordinate alone where that is all that changes."""
+    """Return the text of a start pose in a file; one coordinate alone where only that changes."""
     said = {key: f"{value:.6g}" for key, value in (("x", start.x), ("y", start.y)) if value is not None}
     if start.phi is not None:
         said["phi"] = f'"{degrees(start.phi)}"'

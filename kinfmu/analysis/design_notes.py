@@ -1,4 +1,4 @@
-"""What a designer would see in a mechanism: parts without use or motion, links out of proportion, toggle positions."""
+"""Notes on the design: unused or fixed parts, links of improbable length, toggle positions."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import fields
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
+from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
-from kinfmu.analysis.named import NamedLoop
-from kinfmu.analysis.way import Way
-from kinfmu.analysis.written import written
+from kinfmu.analysis.named_loops import NamedLoop
+from kinfmu.analysis.values import value_text
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
@@ -21,17 +21,15 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.solver.python import Pose
 
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
-_STILL = 1e-9  # [rad, sizes] that a body which does not move goes at most
-_SAME = 1e-9  # of the size; points nearer than that are one place
-_LOOKS = 201  # times of the run at which a driver is looked at
+_STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
+_SAME = 1e-9  # of the size; points closer than this coincide
+_LOOKS = 201  # times of the run at which a driver is evaluated
 _HALVINGS = 40
-_EDGE = 1e-6  # of the run's way; what lies nearer to its ends is not crossed
+_EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 
 def part_notes(mechanism: Mechanism) -> Iterator[str]:
-    """Yield one line for each unused point, for joints in one place, for a link that is much too short, and for a
-    step longer than the run.
-    """
+    """Yield lines for unused points, coinciding joints, links much too short, and a step longer than the run."""
     yield from _unused_points(mechanism)
     yield from _joints_in_one_place(mechanism)
     yield from _short_links(mechanism)
@@ -43,15 +41,15 @@ def part_notes(mechanism: Mechanism) -> Iterator[str]:
         )
 
 
-def motion_notes(mechanism: Mechanism, ways: Sequence[Way], loops: Sequence[NamedLoop]) -> Iterator[str]:
+def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath], loops: Sequence[NamedLoop]) -> Iterator[str]:
     """Yield one line on bodies that no driver moves, and one for each toggle position that the run crosses.
 
-    ways: of all drivers, one each.
+    paths: of all drivers, one each.
     """
-    if len(ways) == len(mechanism.drivers):
-        yield from _still_bodies(mechanism, ways)
-    for way in ways:
-        yield from _toggles(mechanism, way, loops)
+    if len(paths) == len(mechanism.drivers):
+        yield from _still_bodies(mechanism, paths)
+    for path in paths:
+        yield from _toggles(mechanism, path, loops)
 
 
 def _unused_points(mechanism: Mechanism) -> Iterator[str]:
@@ -70,18 +68,18 @@ def _unused_points(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _joints_in_one_place(mechanism: Mechanism) -> Iterator[str]:
-    """Joints that hold the same two bodies at the same points."""
+    """Yield a line for joints that connect the same two bodies at the same points."""
     near, points = _SAME * size_of(mechanism), mechanism.body_points
     pinned = [joint for joint in mechanism.joints if isinstance(joint, Revolute | Fixed)]
     for first, second in combinations(pinned, 2):
         ends = {body_of(point): points[point] for point in first.between}
         others = {body_of(point): points[point] for point in second.between}
         if ends.keys() == others.keys() and all(math.dist(ends[body], others[body]) <= near for body in ends):
-            yield f"joints {first.name}, {second.name} hold {listed(ends)} in one place: one of them is enough"
+            yield f"joints {first.name}, {second.name} connect {listed(ends)} at the same point: one of them is enough"
 
 
 def _short_links(mechanism: Mechanism) -> Iterator[str]:
-    """Moving bodies that are much shorter between their joints than every neighbour."""
+    """Yield a line for moving bodies that are much shorter between their joints than every neighbour."""
     held: dict[str, list[str]] = {}
     neighbours: dict[str, set[str]] = {}
     for joint in mechanism.joints:
@@ -92,12 +90,12 @@ def _short_links(mechanism: Mechanism) -> Iterator[str]:
             neighbours.setdefault(body, set()).update(joint.bodies())
     lengths = {body: _longest(mechanism.body_points, names) for body, names in held.items()}
     for body, length in lengths.items():
-        beside = [lengths.get(other, 0.0) for other in neighbours[body] - {body}]
-        beside = [other for other in beside if other > 0.0]
-        if body != GROUND_NAME and length > 0.0 and beside and length <= TOO_SHORT * min(beside):
+        others = [lengths.get(other, 0.0) for other in neighbours[body] - {body}]
+        others = [other for other in others if other > 0.0]
+        if body != GROUND_NAME and length > 0.0 and others and length <= TOO_SHORT * min(others):
             unit = mechanism.length_unit
             yield (
-                f"{body} is {length:.4g} {unit} long between its joints, its neighbours at least {min(beside):.4g} "
+                f"{body} is {length:.4g} {unit} long between its joints, its neighbours at least {min(others):.4g} "
                 f"{unit}: are its points in another unit?"
             )
 
@@ -106,14 +104,14 @@ def _longest(points: Mapping[str, tuple[float, float]], names: Sequence[str]) ->
     return max((math.dist(points[a], points[b]) for a, b in combinations(names, 2)), default=0.0)
 
 
-def _still_bodies(mechanism: Mechanism, ways: Sequence[Way]) -> Iterator[str]:
-    """Bodies that no driver moves, but for those that are welded to the ground."""
+def _still_bodies(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator[str]:
+    """Yield a line for bodies that no driver moves, except those welded to the ground."""
     size = size_of(mechanism)
     moves: set[str] = set()
-    for way in ways:
-        first = way.coordinates(way.poses[0])
-        for pose in way.poses[1:]:
-            now = way.coordinates(pose)
+    for path in paths:
+        first = path.coordinates(path.poses[0])
+        for pose in path.poses[1:]:
+            now = path.coordinates(pose)
             moves |= {
                 name.rpartition(".")[0]
                 for name, value in now.items()
@@ -124,7 +122,7 @@ def _still_bodies(mechanism: Mechanism, ways: Sequence[Way]) -> Iterator[str]:
     if still:
         one = len(still) == 1
         yield (
-            f"{listed(still)} {'does' if one else 'do'} not move with any driver: look at the points of "
+            f"{listed(still)} {'does' if one else 'do'} not move with any driver: check the points of "
             f"{'its' if one else 'their'} joints, or weld {'it' if one else 'them'} to the ground (type 'fixed')"
         )
 
@@ -140,34 +138,33 @@ def _welded(mechanism: Mechanism) -> set[str]:
     return found
 
 
-def _toggles(mechanism: Mechanism, way: Way, loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """Positions within the run where two links of a loop fall in line, or a rod stands across its slide, and the motion
-    goes on.
+def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop]) -> Iterator[str]:
+    """Yield a line for each toggle position that the run crosses: two links in line, or a rod perpendicular to its slide.
 
-    A run of a whole turn takes every crank over them, which is what it is for.
+    A run of a full turn moves every crank through them as intended, so there are no lines for it.
     """
-    driver = next(one for one in mechanism.drivers if one.name == way.name)
+    driver = next(one for one in mechanism.drivers if one.name == path.name)
     run = mechanism.run
     values = [float(driver.law.at(run.start + (run.stop - run.start) * k / (_LOOKS - 1))) for k in range(_LOOKS)]
     low, high = min(values), max(values)
-    if way.kind == "angle" and high - low >= math.tau * (1.0 - 1e-9):
+    if path.kind == "angle" and high - low >= math.tau * (1.0 - 1e-9):
         return
     edge = _EDGE * (high - low)
     for named in loops:
         for toggle in _toggles_of(named.loop):
-            for before, after in pairwise(way.poses):
-                if _sine(way, before, toggle) * _sine(way, after, toggle) < 0.0:
-                    at = _within(way, _crossing(way, toggle, before, after), low)
+            for before, after in pairwise(path.poses):
+                if _sine(path, before, toggle) * _sine(path, after, toggle) < 0.0:
+                    at = _within(path, _crossing(path, toggle, before, after), low)
                     if low + edge < at < high - edge:
-                        value = written(at, mechanism.length_unit, way.kind)
-                        yield f"the run crosses a toggle position: {toggle.happens} at {way.name} = {value}"
+                        value = value_text(at, mechanism.length_unit, path.kind)
+                        yield f"the run crosses a toggle position: {toggle.happens} at {path.name} = {value}"
 
 
 class _Toggle(NamedTuple):
-    """What falls in line in a toggle position.
+    """A toggle position.
 
-    places: of three pins, or of a rod's two pins, the second of which slides; across: direction at right angles to the
-    slide [rad], along which the rod lies then; happens: the position in words.
+    places: of three pins, or of a rod's two pins, the second of which slides; across: direction perpendicular to the
+    slide [rad], which is then that of the rod; happens: the position in words.
     """
 
     places: tuple[Place, ...]
@@ -180,21 +177,21 @@ def _toggles_of(loop: FourBar | SliderCrank) -> tuple[_Toggle, _Toggle]:
     in_line = _Toggle(loop.pins[:3], 0.0, f"{first}, {second} fall in line")
     if isinstance(loop, SliderCrank):
         rod = loop.rod.name
-        return in_line, _Toggle(loop.pins[1:], loop.direction + math.pi / 2.0, f"{rod} stands across the slide")
+        return in_line, _Toggle(loop.pins[1:], loop.direction + math.pi / 2.0, f"{rod} is perpendicular to the slide")
     return in_line, _Toggle(loop.pins[1:], 0.0, f"{second}, {last[0]} fall in line")
 
 
-def _within(way: Way, u: float, low: float) -> float:
-    """A driver value moved by whole periods, where the mechanism comes back, to the first one from `low` on."""
-    if way.turns is None:
+def _within(path: DriverPath, u: float, low: float) -> float:
+    """Return a driver value moved by whole periods of the mechanism to the first one from `low` on."""
+    if path.turns is None:
         return u
-    period = way.turns * math.tau
+    period = path.turns * math.tau
     return low + (u - low) % period
 
 
-def _sine(way: Way, pose: Pose, toggle: _Toggle) -> float:
-    """Sine of the angle between the two links, or between the rod and what is across its slide."""
-    q = way.coordinates(pose)
+def _sine(path: DriverPath, pose: Pose, toggle: _Toggle) -> float:
+    """Return the sine of the angle between the two links, or between the rod and the normal of its slide."""
+    q = path.coordinates(pose)
     (ax, ay), (bx, by), *third = (_world(place, q) for place in toggle.places)
     cx, cy = third[0] if third else (bx + math.cos(toggle.across), by + math.sin(toggle.across))
     return ((bx - ax) * (cy - by) - (by - ay) * (cx - bx)) / (
@@ -202,14 +199,14 @@ def _sine(way: Way, pose: Pose, toggle: _Toggle) -> float:
     )
 
 
-def _crossing(way: Way, toggle: _Toggle, low: Pose, high: Pose) -> float:
-    """The driver value between two poses where a sine vanishes, by bisection."""
-    at_low = _sine(way, low, toggle)
+def _crossing(path: DriverPath, toggle: _Toggle, low: Pose, high: Pose) -> float:
+    """Return the driver value between two poses where a sine vanishes, by bisection."""
+    at_low = _sine(path, low, toggle)
     for _ in range(_HALVINGS):
-        middle = way.solver.solve(low, (0.5 * (low.u[0] + high.u[0]),))
+        middle = path.solver.solve(low, (0.5 * (low.u[0] + high.u[0]),))
         if not middle.good or middle.u[0] in (low.u[0], high.u[0]):
             break
-        if (_sine(way, middle, toggle) < 0.0) == (at_low < 0.0):
+        if (_sine(path, middle, toggle) < 0.0) == (at_low < 0.0):
             low = middle
         else:
             high = middle
@@ -217,7 +214,7 @@ def _crossing(way: Way, toggle: _Toggle, low: Pose, high: Pose) -> float:
 
 
 def _world(place: Place, q: Mapping[str, float]) -> tuple[float, float]:
-    """World coordinates of a place."""
+    """Return the world coordinates of a place."""
     if place.body == GROUND_NAME:
         return place.x, place.y
     x, y, phi = (q[f"{place.body}.{axis}"] for axis in ("x", "y", "phi"))

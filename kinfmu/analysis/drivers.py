@@ -1,4 +1,4 @@
-"""Drivers against degrees of freedom: what is loose and could be driven, which drivers drive nothing of their own."""
+"""Drivers compared with degrees of freedom: coordinates without a driver, surplus drivers."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
-_SAMPLES = 4  # poses of the motion that the joints leave; a row that depends at all of them depends
-_IN_SPAN = 1e-7  # part of a gradient outside the span of the others that counts as zero
-_MOVES = 1e-6  # part of a free direction from which a coordinate counts as moving
+_SAMPLES = 4  # poses of the motion that the joints allow; a row dependent at all of them is dependent
+_IN_SPAN = 1e-7  # part of a gradient outside the span of the others; smaller counts as zero
+_MOVES = 1e-6  # part of a free direction; a coordinate with more counts as moving
 _LARGE = 600  # coordinates; the null space of more takes too long
 
 
 class SurplusDriver(NamedTuple):
-    """A driver whose quantity the joints and the drivers before it determine already.
+    """A driver whose quantity the joints and the drivers before it already determine.
 
-    implied_by: names of those drivers; none if the joints alone hold it.
+    implied_by: names of those drivers; none if the joints alone determine it.
     """
 
     name: str
@@ -41,15 +41,15 @@ class Suggestion(NamedTuple):
     keys: dict[str, Any]
 
     def __str__(self) -> str:
-        said = ", ".join(f"{key} = {_toml(value)}" for key, value in self.keys.items())
-        return f"[drivers] {self.name} = {{ {said} }}"
+        keys = ", ".join(f"{key} = {_toml(value)}" for key, value in self.keys.items())
+        return f"[drivers] {self.name} = {{ {keys} }}"
 
 
 @dataclass(frozen=True)
 class DriverAdvice:
-    """What the drivers leave free, at generic poses of the motion that the joints leave.
+    """Motion that the drivers leave free, at generic poses.
 
-    missing: drivers needed besides those that count; surplus: drivers that drive nothing of their own; loose: names of
+    missing: number of further drivers needed; surplus: drivers of quantities already determined; loose: names of
     coordinates that joints and drivers leave free; suggestions: drivers that, added together, would determine
     the motion.
     """
@@ -66,9 +66,9 @@ class DriverAdvice:
 
 
 def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None:
-    """Which drivers are surplus, what is loose, and what could be driven instead.
+    """Return which drivers are surplus, which coordinates are loose, and which drivers would determine them.
 
-    None where all is well, where the joints do not close, or where the mechanism is too large to tell.
+    None if drivers and degrees of freedom match, if the joints do not close, or if the mechanism is too large.
     """
     if len(system.coordinates) > _LARGE:
         return None
@@ -76,20 +76,20 @@ def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None
     if not poses:
         return None
     gradients = [system.scaled_jacobian(pose) for pose in poses]
-    rows, surplus = _sorted_out(system, gradients, list(redundancy.kept))
+    rows, surplus = _independent_rows(system, gradients, list(redundancy.kept))
     free = null_space(gradients[-1][rows])  # (n, free directions)
     if free.shape[1] == 0 and not surplus:
         return None
     loose = tuple(
-        name for name, way in zip(system.coordinates, free, strict=True) if np.abs(way).max(initial=0.0) > _MOVES
+        name for name, part in zip(system.coordinates, free, strict=True) if np.abs(part).max(initial=0.0) > _MOVES
     )
     return DriverAdvice(free.shape[1], tuple(surplus), loose, tuple(_suggestions(system, poses[-1], free)))
 
 
-def _sorted_out(
+def _independent_rows(
     system: System, gradients: Sequence[FloatArray], rows: list[int]
 ) -> tuple[list[int], list[SurplusDriver]]:
-    """The rows of joints and of the drivers that count, in file order, and the drivers that do not."""
+    """Return the rows of joints and independent drivers in file order, and the surplus drivers."""
     surplus = []
     counted: list[int] = []
     for index in range(system.joint_row_count, len(system.rows)):
@@ -111,12 +111,12 @@ def _sorted_out(
 
 
 def _suggestions(system: System, pose: FloatArray, free: FloatArray) -> Iterator[Suggestion]:
-    """Drivers that take up the free directions one by one, the most natural first."""
+    """Yield drivers for the free directions one by one, the most natural first."""
     taken = {driver.name for driver in system.mechanism.drivers}
     for driver in _candidates(system.mechanism):
         if free.shape[1] == 0:
             return
-        gradient = _gradient(system, driver, pose) @ free  # what the driver sees of each free direction
+        gradient = _gradient(system, driver, pose) @ free  # component along each free direction
         if np.linalg.norm(gradient) <= 1e-3:
             continue
         name = driver.name
@@ -128,7 +128,7 @@ def _suggestions(system: System, pose: FloatArray, free: FloatArray) -> Iterator
 
 
 def _candidates(mechanism: Mechanism) -> Iterator[Driver]:
-    """Drivers that an engineer would think of: motors on the ground, slides, motors between bodies, then any."""
+    """Yield drivers in order of preference: motors on the ground, slides, motors between bodies, then any."""
     pinned = [joint for joint in mechanism.joints if isinstance(joint, Revolute)]
     slides = [joint for joint in mechanism.joints if isinstance(joint, Translational)]
     slots = [joint for joint in mechanism.joints if isinstance(joint, PointOnLine)]
@@ -156,7 +156,7 @@ def _candidates(mechanism: Mechanism) -> Iterator[Driver]:
 
 
 def _gradient(system: System, driver: Driver, pose: FloatArray) -> FloatArray:
-    """Gradient of what a driver moves, by the scaled coordinates, (n,)."""
+    """Return the gradient of the driven quantity with respect to the scaled coordinates, (n,)."""
     probe = System(replace(system.mechanism, joints=(), drivers=(driver,)))
     gradient = probe.jacobian(pose)[0] * system.column_scales
     length = float(np.linalg.norm(gradient))
@@ -164,9 +164,9 @@ def _gradient(system: System, driver: Driver, pose: FloatArray) -> FloatArray:
 
 
 def _keys(driver: Driver) -> dict[str, Any]:
-    """The keys of a driver's table, with the simplest law and without what may be left out."""
+    """Return the keys of a driver's table, with the simplest law and without defaults."""
     keys: dict[str, Any] = {"type": driver.type}
-    for field in fields(driver):  # type: ignore[arg-type]  # every leaf is a dataclass; the contract cannot say so
+    for field in fields(driver):  # type: ignore[arg-type]  # every leaf is a dataclass, unknown to the contract
         value = getattr(driver, field.name)
         if field.name not in ("name", "law") and value != field.default:
             keys[field.name] = list(value) if isinstance(value, tuple) else value
@@ -175,23 +175,23 @@ def _keys(driver: Driver) -> dict[str, Any]:
 
 
 def _toml(value: Any) -> str:
-    """A key's value as a mechanism file has it."""
+    """Return a key's value as in a mechanism file."""
     if isinstance(value, list):
         return f"[{listed(map(_toml, value))}]"
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-def better_told(problem: KinfmuError, redundancy: Redundancy, advice: DriverAdvice | None) -> KinfmuError:
-    """The problem; or, where as many drivers as degrees of freedom fight over some of them, that they do."""
+def clearer_problem(problem: KinfmuError, redundancy: Redundancy, advice: DriverAdvice | None) -> KinfmuError:
+    """Return the problem, or one that names drivers of one degree of freedom while another is free."""
     if advice is None or not advice.surplus or redundancy.inconsistent or not advice.loose:
         return problem
-    fights = [
+    conflicts = [
         f"[drivers.{surplus.name}] drives what "
         + (f"{listed(surplus.implied_by)} and the joints determine" if surplus.implied_by else "the joints hold")
         for surplus in advice.surplus
     ]
     instead = f"; drive, for example, {advice.suggestions[0]}" if advice.suggestions else ""
     return MobilityError(
-        f"{listed(fights)}, while {listed(advice.loose_bodies)} can still move{instead}",
+        f"{listed(conflicts)}, while {listed(advice.loose_bodies)} can still move{instead}",
         mobility=redundancy.mobility,
     )

@@ -1,4 +1,4 @@
-"""Notes of what in a mechanism file is hardly meant: in its numbers, in the run it asks for, in its start poses."""
+"""Notes on probable mistakes in a mechanism file: in its numbers, its run, its start poses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.analysis.written import written
+from kinfmu.analysis.values import value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, start_from_poses
 from kinfmu.equations.system import System
@@ -21,14 +21,14 @@ from kinfmu.plan import SolvePlan
 from kinfmu.sweep import solve
 from kinfmu.units import Quantity, looks_like_degrees
 
-_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a whole turn may be meant
-_LOOKS = 201  # times of a run at which a driver is looked at
+_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a full turn is plausible
+_LOOKS = 201  # times of a run at which a driver is evaluated
 
 
 def file_notes(mechanism: Mechanism) -> Iterator[str]:
-    """One line about parameters that stand nowhere, and one for each angle that looks like degrees without a unit.
+    """Yield a line for unused parameters and one for each angle that looks like degrees without a unit.
 
-    And one for each driven distance that begins below 0, and for each cam that the run turns on where its lift ends.
+    Also one for each driven distance that starts below 0, and for each cam that turns beyond the end of its lift.
     """
     unused = mechanism.unused_parameters
     if unused:
@@ -39,13 +39,13 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
         if isinstance(driver, DistanceDriver) and first < 0.0:
             yield (
                 f"[drivers.{driver.name}] the distance is {first:.6g} {mechanism.length_unit} at the start of the run: "
-                "it counts without its sign, and shrinks as the value grows"
+                "its magnitude counts, and decreases as the value increases"
             )
     yield from _cams(mechanism)
     large: list[tuple[NumberPath, float]] = []
 
     def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
-        is_turns = "law" in place or place[0] == "drivers"  # they go on for many turns; whole fifteens are degrees
+        is_turns = "law" in place or place[0] == "drivers"  # may be many turns; multiples of 15 are probably degrees
         if quantity == Quantity("angle") and abs(value) > _TURN and (not is_turns or looks_like_degrees(value)):
             large.append((place, float(value)))
         return value
@@ -59,7 +59,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _cams(mechanism: Mechanism) -> Iterator[str]:
-    """One line for each cam that a driver turns by more than a turn, although its lift does not come again."""
+    """Yield a line for each cam that a driver turns by more than a turn, although its lift is not periodic."""
     run = mechanism.run
     times = [run.start + (run.stop - run.start) * k / (_LOOKS - 1) for k in range(_LOOKS)]
     drivers = {driver.of: driver for driver in mechanism.drivers if isinstance(driver, AngleDriver)}
@@ -75,11 +75,11 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
             )
 
 
-_LARGE = 600  # coordinates of a mechanism whose run with several drivers is left unlooked at
+_LARGE = 600  # coordinates; runs of larger mechanisms with several drivers are not evaluated
 
 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
-    """One line where the file's run takes its driver past a limit, or several drivers where the mechanism cannot go."""
+    """Yield a line if the file's run exceeds the range of its driver, or if several drivers leave the reachable poses."""
     mechanism = plan.mechanism
     times = np.linspace(mechanism.run.start, mechanism.run.stop, _LOOKS)
     if len(mechanism.drivers) == 1 and ranges:
@@ -90,8 +90,8 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
         )
         if min(values) < low or max(values) > high:
             ends = (values[0], values[-1])
-            way = ends if {min(values), max(values)} == set(ends) else (min(values), max(values))
-            asked = " to ".join(written(u, mechanism.length_unit, driver.quantity.kind) for u in way)
+            extent = ends if {min(values), max(values)} == set(ends) else (min(values), max(values))
+            asked = " to ".join(value_text(u, mechanism.length_unit, driver.quantity.kind) for u in extent)
             yield f"[run] takes {driver.name} from {asked}: beyond the range"
     elif len(mechanism.drivers) > 1 and len(mechanism.coordinate_names) <= _LARGE:
         for event in solve(plan, times).events[:1]:
@@ -104,7 +104,7 @@ def start_notes(system: System, values: StartValues) -> Iterator[str]:
         return
     given, unit = start_from_poses(system).u, system.mechanism.length_unit
     changed = [
-        (driver.name, written(there, unit, driver.quantity.kind), written(start, unit, driver.quantity.kind))
+        (driver.name, value_text(there, unit, driver.quantity.kind), value_text(start, unit, driver.quantity.kind))
         for driver, there, start in zip(system.mechanism.drivers, given.tolist(), values.u.tolist(), strict=True)
         if there != start
     ]

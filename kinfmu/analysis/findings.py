@@ -10,27 +10,27 @@ from kinfmu.equations.redundancy import DependentRow
 
 if TYPE_CHECKING:
     from kinfmu.analysis.drivers import DriverAdvice
-    from kinfmu.analysis.named import NamedLoop
+    from kinfmu.analysis.named_loops import NamedLoop
     from kinfmu.analysis.report import Report
 
 
 def as_json(report: Report) -> dict[str, Any]:
-    """The findings as plain data. Angles in radians, lengths in the mechanism's unit; what is not known is null.
+    """Return the findings as plain data. Angles in radians, lengths in the mechanism's unit; unknown values are null.
 
-    name, length_unit, bodies (names of the moving ones), rows (of all joints), mobility, gruebler (Gruebler's count),
+    name, length_unit, bodies (names of the moving bodies), rows (of all joints), mobility, gruebler (Gruebler's count),
     drivers, coordinates (q), outputs: names; fixed: value by coordinate.
     redundant, inconsistent: name (joint), row, implied_by (joints), implied_by_rows, gap, tolerance.
     blocks: unknowns, rows, determinant (a short formula or null).
-    start: driver values by name from which the run starts; assembled: those from which runs are followed.
+    start: driver values by name at the start of the run; assembled: those of the assembled pose.
     singular: driver, value, kind ('change point' or 'limit'), block.
     ranges: driver, kind ('angle' or 'length'), low, high, turns (after which the mechanism repeats), reach (values
-    looked at), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
-    while the driver stands still), coordinates.
+    evaluated), stopped, limits: value, kind ('dead centre', 'change point' or 'end'), bodies (that can move there
+    while the driver is fixed), coordinates.
     loops: kind ('four-bar' or 'slider-crank'), links, lengths (by link; 'ground' too), offset (slider-cranks), class,
     shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
     advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
     (coordinates), suggestions (name, and the keys of the driver's table).
-    notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies where they are asked for.
+    notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.
     """
     plan, mechanism = report.plan, report.mechanism
     return {
@@ -97,15 +97,15 @@ def _limit(limit: LimitPosition) -> dict[str, Any]:
 
 def _loop(named: NamedLoop) -> dict[str, Any]:
     loop, kind = named.loop, named.grashof
-    said: dict[str, Any] = {"kind": "four-bar" if isinstance(loop, FourBar) else "slider-crank"}
-    said["links"] = list(loop.links)
+    data: dict[str, Any] = {"kind": "four-bar" if isinstance(loop, FourBar) else "slider-crank"}
+    data["links"] = list(loop.links)
     if isinstance(loop, FourBar):
-        said["lengths"] = dict(zip(("ground", *loop.links), loop.lengths, strict=True))
+        data["lengths"] = dict(zip(("ground", *loop.links), loop.lengths, strict=True))
     else:
-        said["lengths"] = {loop.crank.name: loop.crank.length, loop.rod.name: loop.rod.length}
-        said["offset"] = loop.offset
-    said |= {"class": kind.name, "shape": kind.shape or None, "sums": [kind.small, kind.large]}
-    said["transmission"] = [
+        data["lengths"] = {loop.crank.name: loop.crank.length, loop.rod.name: loop.rod.length}
+        data["offset"] = loop.offset
+    data |= {"class": kind.name, "shape": kind.shape or None, "sums": [kind.small, kind.large]}
+    data["transmission"] = [
         {
             "driver": angle.driver,
             "coupler": angle.coupler,
@@ -118,7 +118,7 @@ def _loop(named: NamedLoop) -> dict[str, Any]:
         }
         for angle in named.transmission
     ]
-    return said
+    return data
 
 
 def _advice(advice: DriverAdvice) -> dict[str, Any]:

@@ -1,10 +1,10 @@
-"""Grashof's class: which links of a four-bar or slider-crank turn all the way round, by lengths alone."""
+"""Grashof's class: which links of a four-bar or slider-crank can make a full turn, from lengths alone."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-SAME_LENGTH = 1e-12  # of the lengths' sum; sums that differ by less are equal: 0.7 + 0.1 and 0.5 + 0.3
+SAME_LENGTH = 1e-12  # of the sum of lengths; sums that differ by less are equal, such as 0.7 + 0.1 and 0.5 + 0.3
 
 
 @dataclass(frozen=True)
@@ -14,7 +14,7 @@ class Grashof:
     name: 'crank-rocker', 'double crank', 'rocker-crank', 'double rocker', 'triple rocker', 'change point' or 'does not
     close' (four-bars); 'crank turns', 'rod turns', 'nothing turns', 'change point' or 'does not close' (slider-cranks).
     shape: of a change point, 'parallelogram', 'kite' or '', else ''; small, large: the two sides of the
-    inequality, small <= large where a link turns all the way round [length].
+    inequality, small <= large where a link can make a full turn [length].
     """
 
     name: str
@@ -24,11 +24,11 @@ class Grashof:
 
 
 def four_bar_class(ground: float, first: float, coupler: float, last: float) -> Grashof:
-    """Grashof's class of a four-bar, first being the driven link.
+    """Return Grashof's class of a four-bar; first is the driven link.
 
         s + l <= p + q        s, l: shortest and longest; p, q: the others
 
-    holds where a link turns all the way round: the shortest against all others. It turns (crank) where it is first or
+    holds where a link can make a full turn: the shortest, relative to all others. It turns (crank) where it is first or
     last, both its neighbours turn where it is the ground (double crank), and it turns between two that rock where it is
     the coupler (double rocker). Equality is a change point. No loop closes where l > s + p + q.
     """
@@ -59,7 +59,7 @@ def _shape(lengths: tuple[float, float, float, float], same: float) -> str:
 
 
 def slider_crank_class(crank: float, rod: float, offset: float) -> Grashof:
-    """Which link of a slider-crank turns all the way round.
+    """Return which link of a slider-crank can make a full turn.
 
         crank + |offset| <= rod     the crank
         rod + |offset| <= crank     the rod, and the crank rocks

@@ -15,11 +15,11 @@ from kinfmu.plan import SolvePlan, compile_plan
 
 @dataclass(frozen=True)
 class HeldDriver(Held):
-    """What a driver moves, held at a value.
+    """The quantity of a driver, held at a value.
 
-        Phi = measure - value, or what the measure has in its place        (1 row)
+        Phi = measure - value, or the row that the measure defines in its place        (1 row)
 
-    Only `check` makes it: the range of one driver is told with the others at their start values.
+    Only `check` uses it: the range of one driver is found with the others at their start values.
     """
 
     type: ClassVar[str] = "held_driver"
@@ -40,10 +40,10 @@ class HeldDriver(Held):
 
 
 def alone(plan: SolvePlan, number: int) -> SolvePlan:
-    """The plan of one driver alone, by its number, with all coordinates among its outputs.
+    """Return the plan of one driver alone, by its number, with all coordinates as outputs.
 
-    The others stand where the plan's anchor has them, and it starts from the anchor's pose. The plan itself where there
-    is nothing to hold.
+    The other drivers keep their values in the plan's anchor, and it starts from the anchor's pose. Returns the plan
+    itself if there is nothing to hold.
     """
     mechanism = plan.mechanism
     if len(mechanism.drivers) == 1 and isinstance(mechanism.coordinates, str):

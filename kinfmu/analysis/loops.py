@@ -13,7 +13,7 @@ from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
-_SAME = 1e-12  # of the size; points of a body that are closer than this are one
+_SAME = 1e-12  # of the size; points of a body closer than this coincide
 
 
 class Place(NamedTuple):
@@ -25,7 +25,7 @@ class Place(NamedTuple):
 
 
 class Link(NamedTuple):
-    """What keeps two pins of a loop apart: a body, or a distance joint."""
+    """The connection of two pins of a loop: a body, or a distance joint."""
 
     name: str
     length: float
@@ -36,7 +36,7 @@ class FourBar:
     """Ground and three moving links in one loop of four pins.
 
     frame: distance of the pins on the ground [length]; first and last are pinned to it, the coupler joins them. pins:
-    where O, P, Q, C lie, in the order of the loop (ground-first, first-coupler, coupler-last, last-ground).
+    the places O, P, Q, C, in the order of the loop (ground-first, first-coupler, coupler-last, last-ground).
     """
 
     frame: float
@@ -55,7 +55,7 @@ class FourBar:
         return self.first.name, self.coupler.name, self.last.name
 
     def turned_round(self) -> FourBar:
-        """The same loop read from its other end."""
+        """Return the same loop read from its other end."""
         return FourBar(self.frame, self.last, self.coupler, self.first, self.pins[::-1])
 
 
@@ -64,7 +64,7 @@ class SliderCrank:
     """A crank pinned to the ground, and a rod whose other end is guided along a line fixed in the ground.
 
     offset: of the line from the crank's pivot, to the left of its direction [length]; direction: of the line [rad];
-    pins: where O, P, S lie; guide: name of the joint that guides; slider: the body that it guides, or the rod's name.
+    pins: the places O, P, S; guide: name of the guiding joint; slider: the body that it guides, or the rod's name.
     """
 
     crank: Link
@@ -98,10 +98,10 @@ class _Edge(NamedTuple):
 def named_loops(
     mechanism: Mechanism, without: Iterable[str] = ()
 ) -> tuple[tuple[FourBar, ...], tuple[SliderCrank, ...]]:
-    """The four-bars and slider-cranks of a mechanism, in the order of its ground pins and joints.
+    """Return the four-bars and slider-cranks of a mechanism, in the order of its ground pins and joints.
 
     A revolute joint counts as a pin, and so do two held coordinates of a point; a distance joint is a link of its own.
-    without: names of joints that are left out, such as redundant ones.
+    without: names of joints to ignore, such as redundant ones.
     """
     net = _Net(mechanism, set(without))
     return tuple(net.four_bars()), tuple(net.slider_cranks())
@@ -144,7 +144,7 @@ class _Net:
                     self._join(Link(body, _distance(at_a, at_b)), a, b)
 
     def four_bars(self) -> Iterator[FourBar]:
-        """Each loop once, from the end that comes first."""
+        """Yield each loop once, from its first end."""
         seen: set[frozenset[object]] = set()
         for o in self.ground:
             for first, p in self._moving_edges(o):
@@ -174,13 +174,13 @@ class _Net:
                         yield SliderCrank(crank, rod, offset, guide.direction, pins, guide.joint, slider)
 
     def _moving_edges(self, pin: int) -> Iterator[_Edge]:
-        """Links from a pin to others that are not on the ground."""
+        """Yield links from a pin to others that are not on the ground."""
         for edge in self.edges.get(pin, ()):
             if edge.end not in self.ground and edge.link.length > self.grid:
                 yield edge
 
     def _on(self, pin: int, *wanted: Link | str | None) -> Place:
-        """A pin as a point of the first link among those wanted that is a body, else of any."""
+        """Return a pin as a point of the first of the wanted links that is a body, else of any."""
         names = [link.name if isinstance(link, Link) else link for link in wanted]
         return next((place for name in names for place in self.places[pin] if place.body == name), self.places[pin][0])
 
@@ -189,7 +189,7 @@ class _Net:
         return Place(body_of(point), float(x), float(y))
 
     def _number(self, place: Place) -> int:
-        """The pin at a place; a new one if there is none."""
+        """Return the number of the pin at a place; add one if there is none."""
         key = self._key(place)
         if key not in self._pin:
             self._pin[key] = len(self.places)
@@ -212,7 +212,7 @@ class _Net:
         self.edges.setdefault(b, []).append(_Edge(link, a))
 
     def _held_coordinates(self) -> dict[tuple[str, str], tuple[float, str]]:
-        """Value and joint of each held coordinate of a point, by point and axis."""
+        """Return value and joint of each held coordinate of a point, by point and axis."""
         return {
             (joint.of, joint.axis): (float(joint.value), joint.name)
             for joint in self.joints
@@ -220,7 +220,7 @@ class _Net:
         }
 
     def _guided(self) -> dict[int, list[_Guide]]:
-        """Lines along which pins are guided, by pin."""
+        """Return the lines along which pins are guided, by pin."""
         held = self._held_coordinates()
         turns = {joint.of: float(joint.value) for joint in self.joints if isinstance(joint, Angle)}
         guides: dict[int, list[_Guide]] = {}
@@ -251,7 +251,7 @@ class _Net:
             self._guide_body(guides, _Guide(fixed.x, fixed.y, axis, joint.name, moving.body), moving, turn)
 
     def _guide_body(self, guides: dict[int, list[_Guide]], guide: _Guide, at: Place, turn: float) -> None:
-        """Every pin of a body that cannot turn moves along a line; that of the place `at` is known."""
+        """Add a line for every pin of a body that cannot turn; the line of the place `at` is known."""
         c, s = math.cos(turn), math.sin(turn)
         for pin, places in enumerate(self.places):
             for place in places:

@@ -1,4 +1,4 @@
-"""The matrices of the method, as a course report prints them: Jacobians, plain and row-reduced."""
+"""The matrices of the method: Jacobians, plain and row-reduced."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.equations.system import FloatArray, System
 
-_ZERO = 1e-7  # part of the largest entry that counts as zero: a dead centre is a double root, known to half the digits
+_ZERO = 1e-7  # part of the largest entry; smaller counts as zero: a dead centre, a double root, has half the digits
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Matrix:
         return int(np.any(np.abs(self.reduced) > 0.0, axis=1).sum())
 
     def as_json(self) -> dict[str, Any]:
-        """The matrix as plain data."""
+        """Return the matrix as plain data."""
         return {
             "title": self.title,
             "rows": list(self.rows),
@@ -49,7 +49,7 @@ class Matrix:
 
 
 def moving_jacobian(system: System, q: FloatArray, rows: Sequence[int], columns: Sequence[str], title: str) -> Matrix:
-    """Phi_q of the chosen rows over the chosen coordinates, without rows that do not meet them."""
+    """Return Phi_q of the chosen rows and coordinates, without rows that do not depend on them."""
     places = [system.coordinates.index(name) for name in columns]
     entries = system.jacobian(q)[np.ix_(list(rows), places)]
     meets = [k for k, row in enumerate(entries) if np.abs(row).max(initial=0.0) > 0.0]
@@ -58,7 +58,7 @@ def moving_jacobian(system: System, q: FloatArray, rows: Sequence[int], columns:
 
 
 def row_reduced(matrix: FloatArray) -> FloatArray:
-    """Reduced row echelon form by Gauss-Jordan with partial pivoting; what rounding leaves of a zero is a zero."""
+    """Return the reduced row echelon form by Gauss-Jordan with partial pivoting; rounding errors become zero."""
     a = np.array(matrix, dtype=float)
     small = _ZERO * np.abs(a).max(initial=0.0)
     top = 0

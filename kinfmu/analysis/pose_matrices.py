@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.analysis.matrices import Matrix, moving_jacobian
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.analysis.written import written
+from kinfmu.analysis.values import value_text
 from kinfmu.equations.assembly import assemble
 from kinfmu.equations.closing import close
 from kinfmu.equations.redundancy import Redundancy
@@ -49,7 +49,7 @@ def pose_matrices(plan: SolvePlan, redundancy: Redundancy, reach: DriverRange | 
 def _at(plan: SolvePlan, u: Iterable[float]) -> str:
     """Return driver values for a title, such as 'crank = pi/3 (60 deg)'."""
     unit, drivers = plan.mechanism.length_unit, plan.mechanism.drivers
-    return listed(f"{d.name} = {written(float(v), unit, d.quantity.kind)}" for d, v in zip(drivers, u, strict=True))
+    return listed(f"{d.name} = {value_text(float(v), unit, d.quantity.kind)}" for d, v in zip(drivers, u, strict=True))
 
 
 def _pose(system: System, plan: SolvePlan, value: float) -> FloatArray | None:

@@ -1,4 +1,4 @@
-"""Singular points on the way of a driver, and the range that it can reach."""
+"""Singular points on the path of a driver, and its range."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kinfmu.analysis.way import Way
+from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.equations.system import System
 from kinfmu.plan import localized
 from kinfmu.solver.python import Pose
@@ -21,7 +21,7 @@ class SingularPoint:
     """A driver value where a block's determinant vanishes.
 
     kind: 'change point' (branches cross, the motion goes on) or 'limit' (a dead centre: the motion turns back).
-    block: its number, from 1, among the blocks of the plan in which the driver moves alone; 0 where none is to blame.
+    block: its number, from 1, among the blocks of the plan in which the driver moves alone; 0 if no block is singular.
     """
 
     value: float
@@ -32,11 +32,11 @@ class SingularPoint:
 
 @dataclass(frozen=True)
 class LimitPosition:
-    """The mechanism where a driver can go no further.
+    """The mechanism at a limit of a driver.
 
     value: of the driver [rad or length]; kind: 'dead centre' (the motion turns back), 'change point' (branches cross
-    and no run goes over it) or 'end' (a distance of 0); coordinates: all of them by name, in the world; bodies: those
-    that can move there while the drivers stand still.
+    and no run can cross it) or 'end' (a distance of 0); coordinates: all of them by name, in the world; bodies: those
+    that can move there while the drivers are fixed.
     """
 
     value: float
@@ -47,12 +47,11 @@ class LimitPosition:
 
 @dataclass(frozen=True)
 class DriverRange:
-    """How far a driver takes the mechanism, the other drivers at their start values, and what is singular on the way.
+    """The range of a driver, the other drivers at their start values, and its singular points.
 
     driver, kind: its name, and 'angle' or 'length'; points: in the order of the driver value; lowest, highest: the
-    limits, None where none was met; turns: after so many turns of an angle the mechanism is back where it was, None if
-    it never was; reach: the values that were looked at [rad or length]; stopped: why it could not be followed further
-    where that is no limit.
+    limits, None where none was met; turns: number of turns after which the mechanism repeats, None if it
+    does not; reach: the values evaluated [rad or length]; stopped: the reason that ended the path other than a limit.
     """
 
     driver: str
@@ -75,52 +74,52 @@ class DriverRange:
         return None if self.highest is None else self.highest.value
 
 
-def driver_range(way: Way) -> DriverRange:
-    """Singular points and limits met on a way."""
-    limits = [limit for limit in (way.low, way.high) if limit is not None]
+def driver_range(path: DriverPath) -> DriverRange:
+    """Return the singular points and limits of a path."""
+    limits = [limit for limit in (path.low, path.high) if limit is not None]
     found = [
         SingularPoint(
             limit.u[0],
             "change point" if _kind(limit) == "change point" else "limit",
             max(limit.block, -1) + 1,
-            way.name,
+            path.name,
         )
         for limit in limits
     ]
     found += [
-        _change_point(way, bridge)
-        for bridge in way.bridges
+        _change_point(path, bridge)
+        for bridge in path.bridges
         if not any(bridge.low <= limit.u[0] <= bridge.high for limit in limits)  # a distance of 0 is no crossing
     ]
     found.sort(key=lambda point: point.value)
     return DriverRange(
-        driver=way.name,
-        kind=way.kind,
-        points=tuple(found if way.kind != "angle" or limits else _distinct(found, way.turns or 1)),
-        lowest=_position(way, way.low),
-        highest=_position(way, way.high),
-        turns=way.turns,
-        reach=(way.poses[0].u[0], way.poses[-1].u[0]),
-        stopped=way.stopped,
+        driver=path.name,
+        kind=path.kind,
+        points=tuple(found if path.kind != "angle" or limits else _distinct(found, path.turns or 1)),
+        lowest=_position(path, path.low),
+        highest=_position(path, path.high),
+        turns=path.turns,
+        reach=(path.poses[0].u[0], path.poses[-1].u[0]),
+        stopped=path.stopped,
     )
 
 
-def _position(way: Way, limit: Limit | None) -> LimitPosition | None:
+def _position(path: DriverPath, limit: Limit | None) -> LimitPosition | None:
     if limit is None:
         return None
-    coordinates = way.at_limit(limit)
-    return LimitPosition(limit.u[0], _kind(limit), coordinates, parting(way, coordinates))
+    coordinates = path.at_limit(limit)
+    return LimitPosition(limit.u[0], _kind(limit), coordinates, parting(path, coordinates))
 
 
 def _kind(limit: Limit) -> str:
-    """What a limit is, as LimitPosition has it."""
+    """Return the kind of a limit, as in LimitPosition."""
     if limit.block == NO_BLOCK:
         return "end"
     return "change point" if limit.crosses else "dead centre"
 
 
-def _change_point(way: Way, bridge: Bridge) -> SingularPoint:
-    """The zero of the determinant inside a bridge's window, by thirds: its size falls straight to it."""
+def _change_point(path: DriverPath, bridge: Bridge) -> SingularPoint:
+    """Return the zero of the determinant inside a bridge's window, by ternary search of its magnitude."""
     low, high = bridge.centre - 0.999 * bridge.half, bridge.centre + 0.999 * bridge.half
     block = _block(bridge)
     for _ in range(90):
@@ -129,23 +128,23 @@ def _change_point(way: Way, bridge: Bridge) -> SingularPoint:
             high -= third
         else:
             low += third
-    return SingularPoint(0.5 * (low + high), "change point", block + 1, way.name)
+    return SingularPoint(0.5 * (low + high), "change point", block + 1, path.name)
 
 
 def _block(bridge: Bridge) -> int:
-    """The block that is interpolated; of several the one whose determinant is the smallest beside the point."""
+    """Return the interpolated block; of several, the one with the smallest determinant near the point."""
     held = [block for block in range(len(bridge.nodes[2].determinants)) if bridge.span.held >> block & 1]
     return min(held, key=lambda block: abs(bridge.nodes[2].determinants[block]))
 
 
 def _determinant(bridge: Bridge, u: float, block: int) -> float:
-    """Its size."""
+    """Return the magnitude of a block's determinant."""
     pose: Pose = bridge.pose((u,))
     return abs(float(pose.determinants[block]))
 
 
 def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint]:
-    """Points that differ by whole periods are one, the one in [0, 2 pi turns); alike in every turn, by whole turns."""
+    """Return points reduced to [0, 2 pi turns), or to [0, 2 pi) if every turn has the same points."""
     if turns > 1:
         once, all_turns = _distinct(points, 1), _modulo(points, turns)
         return once if len(all_turns) == turns * len(once) else all_turns
@@ -153,7 +152,7 @@ def _distinct(points: Sequence[SingularPoint], turns: int) -> list[SingularPoint
 
 
 def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
-    """Points brought to [0, 2 pi turns), each once, in order."""
+    """Return points reduced to [0, 2 pi turns), each once, in order."""
     kept: dict[int, SingularPoint] = {}
     period = turns * math.tau
     for point in points:
@@ -163,18 +162,18 @@ def _modulo(points: Iterable[SingularPoint], turns: int) -> list[SingularPoint]:
     return sorted(kept.values(), key=lambda point: point.value)
 
 
-_MOVES = 1e-3  # of the largest motion; a body that moves less stands still
+_MOVES = 1e-3  # of the largest motion; a body that moves less is fixed
 _MOST_COORDINATES = 600  # coordinates; the singular values of more take too long
 
 
-def parting(way: Way, at_limit: dict[str, float]) -> tuple[str, ...]:
-    """Names of the bodies that move in the null direction of Phi_q at a limit pose, in file order.
+def parting(path: DriverPath, at_limit: dict[str, float]) -> tuple[str, ...]:
+    """Return the bodies that move in the null direction of Phi_q at a limit pose, in file order.
 
-    at_limit: all coordinates by name. Empty for a mechanism too large to tell.
+    at_limit: all coordinates by name. Empty for large mechanisms.
     """
     if len(at_limit) > _MOST_COORDINATES:
         return ()
-    local, origin = localized(way.plan.mechanism)
+    local, origin = localized(path.plan.mechanism)
     system = System(local)
     offset = {"x": origin.x, "y": origin.y, "phi": 0.0}
     q = np.array([at_limit[name] - offset[name.rpartition(".")[2]] for name in system.coordinates])

@@ -1,4 +1,4 @@
-"""The findings of a check as text for people."""
+"""The findings of a check as text."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 from kinfmu.analysis.loops import FourBar, SliderCrank
 from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import TransmissionAngle
-from kinfmu.analysis.written import degrees, multiple_of_pi, written
+from kinfmu.analysis.values import degrees, multiple_of_pi, value_text
 from kinfmu.errors import listed
 
 if TYPE_CHECKING:
-    from kinfmu.analysis.named import NamedLoop
+    from kinfmu.analysis.named_loops import NamedLoop
     from kinfmu.analysis.report import Report
     from kinfmu.drivers import Driver
 
-_MOST_LOOPS = 8  # of which the text tells; JSON has them all
+_MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
     "dead centre": "a dead centre",
-    "change point": "where branches cross and no run goes on",
-    "end": "where nothing is left of it",
+    "change point": "where branches cross and the motion cannot continue",
+    "end": "where the distance is 0",
 }
-_SAME = 1e-9  # [rad or length]; values closer than this are one
-_MOST_NAMES = 24  # in one line; JSON has them all
+_SAME = 1e-9  # [rad or length]; values closer than this are equal
+_MOST_NAMES = 24  # in one line; JSON has all
 
 
 def lines(report: Report) -> list[str]:
-    """The findings, one a line, the subject in front."""
+    """Return the findings, one per line, each after its subject."""
     found = [f"{report.mechanism.name}: {report.mechanism.title}" if report.mechanism.title else report.mechanism.name]
     for parts in (_count, _rows, _plan, _advice, _loops, _motion):
         found += parts(report)
@@ -41,7 +41,7 @@ def _line(subject: str, text: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Names in a row; of very many, the first and how many more."""
+    """Return names separated by commas; of very many, the first and the number of others."""
     names = list(names)
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return listed(names[:_MOST_NAMES]) + more
@@ -54,21 +54,21 @@ def _count(report: Report) -> Iterator[str]:
     yield _line("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
     yield _line("mobility", f"{report.mobility}, driven by {_names(driver.name for driver in mechanism.drivers)}")
     if report.gruebler != report.mobility:
-        yield _line("", f"Gruebler's count gives {report.gruebler}: it does not see that rows are redundant")
+        yield _line("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 
 
 def _rows(report: Report) -> Iterator[str]:
     for row in report.redundant:
         within = f"{row.tolerance:.3g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
         reason = f"at every pose it follows from {listed(row.implied_by_joints)}, to within {within}"
-        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}; set aside and kept on watch")
+        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}; set aside, residual monitored")
     if not report.redundancy.dependent:
         yield _line("redundant", "none")
     for row in report.inconsistent:
         unit = "rad" if row.row.kind == "angle" else report.mechanism.length_unit
         gap = f"{abs(row.gap):.6g} {unit} at every pose; up to {row.tolerance:.3g} {unit} would count as redundant"
-        reason = f"{listed(row.implied_by_joints)} leave it open by {gap}"
-        yield _line("contradicts", f"{row.row.owner} (row {row.row.name}): {reason}")
+        reason = f"does not close with {listed(row.implied_by_joints)}: gap {gap}"
+        yield _line("contradicts", f"{row.row.owner} (row {row.row.name}) {reason}")
 
 
 def _plan(report: Report) -> Iterator[str]:
@@ -92,9 +92,9 @@ def _plan(report: Report) -> Iterator[str]:
 
 
 def _values(drivers: Iterable[Driver], values: Iterable[float], unit: str) -> Iterator[str]:
-    """Drivers with values, for people."""
+    """Yield drivers with their values as text."""
     for driver, value in zip(drivers, values, strict=True):
-        yield f"{driver.name} = {written(value, unit, driver.quantity.kind)}"
+        yield f"{driver.name} = {value_text(value, unit, driver.quantity.kind)}"
 
 
 def _advice(report: Report) -> Iterator[str]:
@@ -153,7 +153,7 @@ def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
 def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
     kind = named.grashof
     if kind.name == "does not close":
-        return f"does not close: the slide lies {kind.small:.6g} off, crank and rod reach {kind.large:.6g}"
+        return f"does not close: the offset of the slide is {kind.small:.6g}, crank and rod reach {kind.large:.6g}"
     shorter, longer = ("crank", "rod") if loop.crank.length <= loop.rod.length else ("rod", "crank")
     sums = f"{shorter} + offset {kind.small:.6g} {_sign(kind.small, kind.large, kind.name)} {longer} {kind.large:.6g}"
     turns = {
@@ -184,9 +184,9 @@ def _transmission(angle: TransmissionAngle, unit: str) -> str:
 
 
 def _in_line(angle: TransmissionAngle) -> str:
-    """What a transmission angle of 0 or 180 degrees looks like."""
+    """Return the position of the links at a transmission angle of 0 or 180 degrees."""
     if angle.is_slide:
-        return f"{angle.coupler} stands across the slide"
+        return f"{angle.coupler} is perpendicular to the slide"
     return f"{angle.coupler} and {angle.output} fall in line"
 
 
@@ -208,22 +208,22 @@ def _change_points(report: Report, reach: DriverRange, several: bool) -> Iterato
     ends = (reach.low, reach.high)
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
-        places = _names(written(value, report.mechanism.length_unit, reach.kind) for value in changes)
+        places = _names(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
         every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
-        goes_on = "with several drivers no run goes over it" if several else "the motion goes on (bridged)"
+        goes_on = "with several drivers no run can cross it" if several else "the motion goes on (bridged)"
         yield _line("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
 
 
 def _all_multiples_of_pi(values: list[float]) -> bool:
-    """True for 0 and pi, modulo whole turns: k pi for every whole k."""
+    """Return True for 0 and pi, modulo whole turns: k pi for every integer k."""
     return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
 
 
 def _range(report: Report, reach: DriverRange) -> Iterator[str]:
     unit = report.mechanism.length_unit
-    seen = [written(end, unit, reach.kind) for end in reach.reach]
+    seen = [value_text(end, unit, reach.kind) for end in reach.reach]
     limits = [limit for limit in (reach.lowest, reach.highest) if limit is not None]
-    ends = [written(limit.value, unit, reach.kind) for limit in limits]
+    ends = [value_text(limit.value, unit, reach.kind) for limit in limits]
     if reach.stopped is not None:
         yield _line("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
     elif len(limits) == 2:
@@ -248,9 +248,9 @@ def _range(report: Report, reach: DriverRange) -> Iterator[str]:
 
 
 def _parted(report: Report, reach: DriverRange, limit: LimitPosition) -> str:
-    """What happens at a limit: two links in line, or bodies that nothing holds."""
+    """Return the reason of a limit: two links in line, or bodies that can move."""
     for named in report.loops:
         for angle in named.transmission:
             if angle.driver == reach.driver and limit.value in angle.in_line_at:
                 return _in_line(angle)
-    return f"{_names(limit.bodies)} can move while {reach.driver} stands still"
+    return f"{_names(limit.bodies)} can move while {reach.driver} is fixed"

@@ -1,4 +1,4 @@
-"""Transmission angle: how well the coupler pushes the output, over the range of a driver."""
+"""Transmission angle between coupler and output, over the range of a driver."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
-from kinfmu.analysis.way import Way
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan import SolvePlan
 from kinfmu.solver.python import Pose
 
-POOR = math.radians(40.0)  # [rad]; the usual bound below which forces and clearances are felt
-LOCKED = math.radians(1e-4)  # [rad]; below which it is 0 but for rounding: the angle is an arc cosine
-_STRAIGHT = 1e-7  # of 1; a cosine so near to 1 at a limit is 1, for the limit is where the coupler is in line
+POOR = math.radians(40.0)  # [rad]; the usual lower bound
+LOCKED = math.radians(1e-4)  # [rad]; a smaller angle is 0 within rounding, because it is an arc cosine
+_STRAIGHT = 1e-7  # a cosine this close to 1 at a limit is 1, because there the coupler is in line
 _HALVINGS = 60
 
 Coordinates = Mapping[str, float]
@@ -23,7 +23,7 @@ Coordinates = Mapping[str, float]
 
 @dataclass(frozen=True)
 class TransmissionAngle:
-    """Extremes of the angle between coupler and output, 0 to pi; pi/2 pushes best, 0 and pi not at all.
+    """Extremes of the angle between coupler and output, 0 to pi; pi/2 is best, 0 and pi transmit nothing.
 
     driver, kind: whose values at_smallest and at_largest are, and whether it is an 'angle' or a 'length'; coupler,
     output: names of the links; is_slide: the output slides, and the angle is that between rod and the normal of the
@@ -61,22 +61,22 @@ class _Cosine(NamedTuple):
     slope: Callable[[Coordinates, Coordinates], float]
 
 
-def transmission_angle(way: Way, loop: FourBar | SliderCrank) -> TransmissionAngle | None:
-    """Extremes of a loop's transmission angle on the way of a driver, to round-off in the driver value.
+def transmission_angle(path: DriverPath, loop: FourBar | SliderCrank) -> TransmissionAngle | None:
+    """Return the extremes of a loop's transmission angle over the path of a driver, to round-off in the driver value.
 
-    None where the driver does not move the loop, or neither of its ends leads the other.
+    None if the driver does not move the loop, or neither of its ends leads the other.
     """
-    led = _led_four_bar(way.plan, loop) if isinstance(loop, FourBar) else _led_slider_crank(way.plan, loop)
+    led = _led_four_bar(path.plan, loop) if isinstance(loop, FourBar) else _led_slider_crank(path.plan, loop)
     if led is None:
         return None
     coupler, output, cosine, is_slide = led
-    found = _extremes(way, cosine)
+    found = _extremes(path, cosine)
     if found is None:
         return None
     (least, at_least), (most, at_most), in_line_at = found
     return TransmissionAngle(
-        driver=way.name,
-        kind=way.kind,
+        driver=path.name,
+        kind=path.kind,
         coupler=coupler,
         output=output,
         is_slide=is_slide,
@@ -93,7 +93,7 @@ def _angle(cosine: float) -> float:
 
 
 def _led_four_bar(plan: SolvePlan, loop: FourBar) -> tuple[str, str, _Cosine, bool] | None:
-    """Coupler and output and the cosine of their angle, if one end of the loop is found before the rest.
+    """Return coupler, output and the cosine of their angle, if one end of the loop is solved before the rest.
 
     cos mu = (b^2 + c^2 - f^2) / (2 b c)        f: distance of the input's pin P from the output's pivot C
     """
@@ -106,14 +106,14 @@ def _led_four_bar(plan: SolvePlan, loop: FourBar) -> tuple[str, str, _Cosine, bo
 
 
 def is_led_by_last(plan: SolvePlan, loop: FourBar) -> bool:
-    """True if the last link of a four-bar is found before the others."""
+    """Return True if the last link of a four-bar is solved before the others."""
     places = _block_of(plan)
     first, coupler, last = (places.get(f"{name}.phi") for name in loop.links)
     return _is_before(last, coupler, first)
 
 
 def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Cosine, bool] | None:
-    """Rod and slider led by the crank, or rod and crank led by the slider, and the cosine of their angle.
+    """Return rod and slider led by the crank, or rod and crank led by the slider, and the cosine of their angle.
 
     cos mu = n.(S - P) / l        n: normal of the slide
     """
@@ -141,7 +141,7 @@ def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Co
 
 
 def _drives_end(plan: SolvePlan, loop: SliderCrank) -> bool:
-    """True if a driver moves the guided end of the rod itself along the slide."""
+    """Return True if a driver moves the guided end of the rod along the slide."""
     return loop.slider == loop.rod.name and any(
         driver.quantity.kind == "length" and set(driver.bodies()) <= {loop.rod.name, GROUND_NAME}
         for driver in plan.mechanism.drivers
@@ -149,18 +149,18 @@ def _drives_end(plan: SolvePlan, loop: SliderCrank) -> bool:
 
 
 def _block_of(plan: SolvePlan) -> dict[str, int]:
-    """Number of the block in which each coordinate is found."""
+    """Return the number of the block in which each coordinate is solved."""
     return {name: k for k, block in enumerate(plan.blocks) for name in block.coordinates}
 
 
 def _is_before(leading: int | None, *others: int | None) -> bool:
-    """True if a coordinate is found in an earlier block than others, of which some may be no coordinates."""
+    """Return True if a coordinate is solved in an earlier block than the others; None is no coordinate."""
     later = [other for other in others if other is not None]
     return leading is not None and bool(later) and leading < min(later)
 
 
 def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
-    """Cosine of the angle between sides b and c of a triangle whose third side joins p and q."""
+    """Return the cosine of the angle between sides b and c of a triangle whose third side joins p and q."""
 
     def value(at: Coordinates) -> float:
         (px, py), (qx, qy) = _point(p, at), _point(q, at)
@@ -175,7 +175,7 @@ def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
 
 
 def _point(place: Place, q: Coordinates) -> tuple[float, float]:
-    """World coordinates of a place."""
+    """Return the world coordinates of a place."""
     if place.body == GROUND_NAME:
         return place.x, place.y
     c, s = math.cos(q[f"{place.body}.phi"]), math.sin(q[f"{place.body}.phi"])
@@ -183,7 +183,7 @@ def _point(place: Place, q: Coordinates) -> tuple[float, float]:
 
 
 def _velocity(place: Place, q: Coordinates, qd: Coordinates) -> tuple[float, float]:
-    """Rates of a place's world coordinates."""
+    """Return the rates of a place's world coordinates."""
     if place.body == GROUND_NAME:
         return 0.0, 0.0
     x, y = _point(place, q)
@@ -194,49 +194,52 @@ def _velocity(place: Place, q: Coordinates, qd: Coordinates) -> tuple[float, flo
     )
 
 
-def _extremes(way: Way, cosine: _Cosine) -> tuple[tuple[float, float], tuple[float, float], tuple[float, ...]] | None:
-    """Smallest and largest cosine, each with its driver value, and the limits where it is -1 or 1; None if it does not
-    change on the way.
+def _extremes(
+    path: DriverPath, cosine: _Cosine
+) -> tuple[tuple[float, float], tuple[float, float], tuple[float, ...]] | None:
+    """Return the smallest and largest cosine with their driver values, and the limits where it is -1 or 1.
+
+    None if it does not change on the path.
     """
 
     def slope(pose: Pose) -> float:
-        return cosine.slope(way.coordinates(pose), way.speeds(pose))
+        return cosine.slope(path.coordinates(pose), path.speeds(pose))
 
-    slopes = [slope(pose) for pose in way.poses]
-    if max(map(abs, slopes)) * (way.poses[-1].u[0] - way.poses[0].u[0]) < 1e-9:
+    slopes = [slope(pose) for pose in path.poses]
+    if max(map(abs, slopes)) * (path.poses[-1].u[0] - path.poses[0].u[0]) < 1e-9:
         return None
     found = []
-    for before, after, a, b in zip(way.poses, way.poses[1:], slopes, slopes[1:], strict=False):
+    for before, after, a, b in zip(path.poses, path.poses[1:], slopes, slopes[1:], strict=False):
         if a * b < 0.0:
-            pose = _flat(way, slope, before, after, a)
-            found.append((cosine.value(way.coordinates(pose)), pose.u[0]))
-    found += [(cosine.value(way.coordinates(pose)), pose.u[0]) for pose in way.poses]
+            pose = _flat(path, slope, before, after, a)
+            found.append((cosine.value(path.coordinates(pose)), pose.u[0]))
+    found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in path.poses]
     in_line = []
-    for limit in (way.low, way.high):
+    for limit in (path.low, path.high):
         if limit is not None:
-            value = cosine.value(way.at_limit(limit))
+            value = cosine.value(path.at_limit(limit))
             if abs(value) > 1.0 - _STRAIGHT:
                 in_line.append(limit.u[0])
                 value = math.copysign(1.0, value)
             found.append((value, limit.u[0]))
-    return _told(way, min(found)), _told(way, max(found)), tuple(in_line)
+    return _reduced(path, min(found)), _reduced(path, max(found)), tuple(in_line)
 
 
-def _told(way: Way, found: tuple[float, float]) -> tuple[float, float]:
-    """An extreme with its driver value in [0, 2 pi turns) where the mechanism comes back."""
+def _reduced(path: DriverPath, found: tuple[float, float]) -> tuple[float, float]:
+    """Return an extreme with its driver value in [0, 2 pi turns) if the mechanism repeats."""
     cosine, value = found
-    if way.turns is None:
+    if path.turns is None:
         return found
-    period = way.turns * math.tau
+    period = path.turns * math.tau
     value = math.fmod(math.fmod(value, period) + period, period)
     return cosine, 0.0 if period - value < 1e-12 else value
 
 
-def _flat(way: Way, slope: Callable[[Pose], float], low: Pose, high: Pose, at_low: float) -> Pose:
-    """The pose between two where a slope vanishes, by bisection."""
+def _flat(path: DriverPath, slope: Callable[[Pose], float], low: Pose, high: Pose, at_low: float) -> Pose:
+    """Return the pose between two where a slope vanishes, by bisection."""
     for _ in range(_HALVINGS):
         u = 0.5 * (low.u[0] + high.u[0])
-        middle = way.solver.solve(low, (u,))
+        middle = path.solver.solve(low, (u,))
         if not middle.good or u in (low.u[0], high.u[0]):
             break
         at_middle = slope(middle)

@@ -57,7 +57,7 @@ def test_a_four_bar_goes_together_in_two_ways() -> None:
         for name, phi in phis.items():
             assert phi is not None
             assert math.remainder(one.coordinates[f"{name}.phi"] - phi, math.tau) == pytest.approx(0.0, abs=1e-11)
-    assert assemblies.told_apart_by == ("coupler.phi",)
+    assert assemblies.distinguished_by == ("coupler.phi",)
     assert assemblies.drivers == {"crank": pytest.approx(1.0)}
     assert assemblies.is_complete
 
@@ -123,7 +123,7 @@ def test_one_start_angle_chooses_a_four_bar() -> None:
 def test_assemblies_are_plain_data_too() -> None:
     found = json.loads(json.dumps(found_for(fourbar(4, 1, 3.5, 3)).as_json()))
     assert found["complete"] is True
-    assert found["told_apart_by"] == ["coupler.phi"]
+    assert found["distinguished_by"] == ["coupler.phi"]
     assert [one["chosen"] for one in found["found"]] == [True, False]
     assert found["found"][0]["start"] == {}
     assert found["found"][1]["start"]["rocker"]["phi"] == pytest.approx(math.radians(-129.9))

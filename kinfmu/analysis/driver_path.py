@@ -1,4 +1,4 @@
-"""Way: the poses that one driver takes the mechanism through, the others at their start values."""
+"""The poses through which one driver moves the mechanism, the others at their start values."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from kinfmu.solver.python.advance import advance
 from kinfmu.solver.python.bridge import Bridge
 from kinfmu.solver.python.limit import NO_BLOCK, Limit
 
-STEP = 0.1  # [rad, sizes] between looks at the determinants
-MOST_TURNS = 12  # after which a mechanism that has not come back to its start is left: gears of odd ratios
-SIZES = 3.0  # reach of a driver of a length, either way
-_LARGE = 150  # coordinates; a mechanism of more is followed for one turn only
-_BESIDE_LIMIT = 1e-6  # [rad, sizes]; how near a limit the poses lie from which its own is extrapolated
-_REPEATS = 1e-6  # [rad, sizes]; poses closer than this are the same
+STEP = 0.1  # [rad, sizes] between evaluations of the determinants
+MOST_TURNS = 12  # most turns after which a mechanism may repeat: gears with odd ratios
+SIZES = 3.0  # reach of a driver of a length, in both directions
+_LARGE = 150  # coordinates; a larger mechanism is followed for one turn only
+_NEAR_LIMIT = 1e-6  # [rad, sizes]; distance from a limit of the poses from which its own is extrapolated
+_REPEATS = 1e-6  # [rad, sizes]; poses closer than this are equal
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """What one driver meets from the anchor on: until limits, a return to the start, or far enough.
+class DriverPath:
+    """The path of one driver from the anchor to its limits, to a repetition, or to the end of its reach.
 
     name, kind: of the driver, 'angle' or 'length'; plan, solver: those in which it moves alone; poses: in the order of
     the driver value, the anchor among them; bridges: those crossed; low, high: the limits, None where none was met;
-    turns: after so many the mechanism is back where it was, None for a length or if it did not come back; stopped: why
-    the way ended where that was no limit.
+    turns: number of turns after which the mechanism repeats, None for a length or if it does not; stopped: the reason
+    that ended the path other than a limit.
     """
 
     name: str
@@ -44,36 +44,36 @@ class Way:
     stopped: str | None
 
     def coordinates(self, pose: Pose) -> dict[str, float]:
-        """All coordinates of a pose by name, the fixed ones among them, in the world."""
+        """Return all coordinates of a pose by name, including fixed ones, in the world."""
         return {**self.plan.fixed, **dict(zip(self.plan.outputs, self.solver.outputs(pose), strict=True))}
 
     def speeds(self, pose: Pose) -> dict[str, float]:
-        """Rates of all coordinates per unit of the driver, by name."""
+        """Return the rates of all coordinates per unit of the driver, by name."""
         rates = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
         return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
-        """All coordinates by name at one of the limits.
+        """Return all coordinates by name at one of the limits.
 
-        There they go like a + b sqrt(s) + c s with the way s that is left: three poses beside it give a.
+        They are a + b sqrt(s) + c s at a distance s from the limit; three poses near it give a.
         """
-        beside = self._beside(limit)
-        if len(beside) < 3:
+        near = self._near(limit)
+        if len(near) < 3:
             return self.coordinates(self.poses[0 if limit is self.low else -1])
-        first, second, third = map(self.coordinates, beside)
+        first, second, third = map(self.coordinates, near)
         return {name: 3.0 * first[name] - 3.0 * second[name] + third[name] for name in first}
 
-    def _beside(self, limit: Limit) -> list[Pose]:
-        """Poses at s, 4 s and 9 s before a limit; fewer if they cannot be reached."""
+    def _near(self, limit: Limit) -> list[Pose]:
+        """Return poses at s, 4 s and 9 s before a limit; fewer if they are unreachable."""
         start, inwards = (self.poses[0], 1.0) if limit is self.low else (self.poses[-1], -1.0)
-        parts = [inwards * part * _BESIDE_LIMIT * self.solver.model.REACH[0] for part in (1.0, 4.0, 9.0)]
+        parts = [inwards * part * _NEAR_LIMIT * self.solver.model.REACH[0] for part in (1.0, 4.0, 9.0)]
         poses = [self.solver.solve(start, (limit.u[0] + part,)) for part in parts]
         return [pose for pose in poses if pose.good]
 
 
 @dataclass(frozen=True)
 class _Leg:
-    """A part of a way in one direction: its poses, bridges, and the limit or other reason that ended it early."""
+    """A part of a path in one direction: its poses, bridges, and the limit or other reason that ended it early."""
 
     poses: list[Pose]
     bridges: list[Bridge]
@@ -85,11 +85,15 @@ class _Leg:
         return self.limit is None and self.stopped is None
 
 
-def follow(plan: SolvePlan, number: int) -> Way:
-    """The way of one driver, by its number, the others at the values of the plan's anchor.
+def follow(plan: SolvePlan, number: int) -> DriverPath:
+    """Return the path of one driver, by its number, the others at the values of the plan's anchor.
 
-    An angle is turned on until the mechanism is back where it was (or for 12 turns), a length moved by three sizes
-    either way, a distance down to 0. Raises a KinfmuError if the driver cannot be planned alone.
+    An angle turns until the mechanism repeats (at most 12 turns), a length moves by three sizes in both directions, a
+    distance down to 0.
+
+    Raises:
+        KinfmuError: If the driver cannot be planned alone.
+
     """
     single = alone(plan, number)
     driver = plan.mechanism.drivers[number]
@@ -105,7 +109,7 @@ def follow(plan: SolvePlan, number: int) -> Way:
         down = _leg(solver, anchor, -min(reach, anchor.u[0] - least), plan.size)
         if down.is_whole and anchor.u[0] - reach <= least:
             low = Limit((least,), NO_BLOCK)
-    return Way(
+    return DriverPath(
         name=driver.name,
         kind=driver.quantity.kind,
         plan=single,
@@ -119,13 +123,13 @@ def follow(plan: SolvePlan, number: int) -> Way:
     )
 
 
-def _turned(solver: Solver, plan: SolvePlan, way: float) -> tuple[_Leg, int | None]:
-    """Turn after turn one way, 2 pi or -2 pi, and how many bring the mechanism back."""
+def _turned(solver: Solver, plan: SolvePlan, path: float) -> tuple[_Leg, int | None]:
+    """Return the path over full turns of 2 pi or -2 pi, and the number after which the mechanism repeats."""
     whole = _Leg([], [])
     pose = solver.anchor
     most = 1 if len(plan.mechanism.coordinate_names) > _LARGE else MOST_TURNS
     for turn in range(1, most + 1):
-        leg = _leg(solver, pose, way, 1.0)
+        leg = _leg(solver, pose, path, 1.0)
         whole = _Leg(whole.poses + leg.poses, whole.bridges + leg.bridges, leg.limit, leg.stopped)
         if not whole.is_whole:
             return whole, None
@@ -136,7 +140,7 @@ def _turned(solver: Solver, plan: SolvePlan, way: float) -> tuple[_Leg, int | No
 
 
 def _is_back(plan: SolvePlan, before: tuple[float, ...], after: tuple[float, ...]) -> bool:
-    """True if two poses are the same but for whole turns."""
+    """Return True if two poses are equal modulo whole turns."""
     for name, a, b in zip(plan.outputs, before, after, strict=True):
         apart = math.remainder(b - a, math.tau) if name.endswith(".phi") else (b - a) / plan.size
         if abs(apart) > _REPEATS:
@@ -145,7 +149,7 @@ def _is_back(plan: SolvePlan, before: tuple[float, ...], after: tuple[float, ...
 
 
 def _leg(solver: Solver, start: Pose, distance: float, unit: float) -> _Leg:
-    """From a pose over a distance of the driver, in steps that no singular point escapes."""
+    """Follow the driver from a pose over a distance, in steps that miss no singular point."""
     poses: list[Pose] = []
     bridges: list[Bridge] = []
     pose, count = start, math.ceil(abs(distance) / (STEP * unit))

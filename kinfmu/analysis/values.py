@@ -1,19 +1,19 @@
-"""Driver values, lengths and angles as people read them."""
+"""Driver values, lengths and angles as text."""
 
 from __future__ import annotations
 
 import math
 
 
-def written(value: float, unit: str, kind: str) -> str:
-    """'pi (180 deg)', '0.7227 rad (41.41 deg)' or '0.35 m': a driver value for people."""
+def value_text(value: float, unit: str, kind: str) -> str:
+    """Return a driver value as text: 'pi (180 deg)', '0.7227 rad (41.41 deg)' or '0.35 m'."""
     if kind != "angle":
         return f"{value:.9g} {unit}"
     return f"{multiple_of_pi(value) or f'{value:.9g} rad'} ({round(math.degrees(value), 8) + 0.0:.9g} deg)"
 
 
 def multiple_of_pi(value: float) -> str | None:
-    """'0', 'pi', '3 pi/2' for values that are simple fractions of pi to nine digits."""
+    """Return '0', 'pi', '3 pi/2' for simple fractions of pi, to nine digits; None for others."""
     for denominator in (1, 2, 3, 4, 6):
         numerator = value / math.pi * denominator
         if abs(numerator - round(numerator)) < 1e-9:
@@ -27,5 +27,5 @@ def multiple_of_pi(value: float) -> str | None:
 
 
 def degrees(angle: float) -> str:
-    """'41.4096 deg': an angle [rad] for people."""
+    """Return an angle [rad] as text: '41.4096 deg'."""
     return f"{round(math.degrees(angle), 4) + 0.0:.6g} deg"
