@@ -243,7 +243,7 @@ def test_the_tolerance_is_1e_11_of_the_link_and_check_states_it() -> None:
     report = kinfmu.check(third_crank(2.0, 0.0, is_body=False))
     (row,) = report.redundant
     assert row.tolerance == pytest.approx(1e-11 * 1.1)
-    assert "it follows from O, P, Q, C, to within 1.1e-11 m; set aside and kept on watch" in str(report)
+    assert "it follows from O, P, Q, C, to within 1.1e-11 m; set aside, residual monitored" in str(report)
     report = kinfmu.check(third_crank(2.0, 1e-9, is_body=False))
     assert "open by 1.1" in str(report)
     assert "up to 1.1e-11 m would count as redundant" in str(report)

@@ -139,7 +139,7 @@ def _welded(mechanism: Mechanism) -> set[str]:
 
 
 def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop]) -> Iterator[str]:
-    """Yield a line for each toggle position that the run crosses: two links in line, or a rod perpendicular to its slide.
+    """Yield a line for each toggle position that the run crosses: two links in line, a rod perpendicular to its slide.
 
     A run of a full turn moves every crank through them as intended, so there are no lines for it.
     """

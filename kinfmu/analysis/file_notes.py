@@ -79,7 +79,7 @@ _LARGE = 600  # coordinates; runs of larger mechanisms with several drivers are 
 
 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
-    """Yield a line if the file's run exceeds the range of its driver, or if several drivers leave the reachable poses."""
+    """Yield a line if the run exceeds the range of its driver, or if several drivers leave the reachable poses."""
     mechanism = plan.mechanism
     times = np.linspace(mechanism.run.start, mechanism.run.stop, _LOOKS)
     if len(mechanism.drivers) == 1 and ranges:

@@ -30,7 +30,8 @@ def find_named_loops(
 ) -> tuple[NamedLoop, ...]:
     """Return the four-bars and slider-cranks of a mechanism, each read from its driven end.
 
-    Joints with a row set aside are ignored: they form no loop of their own. Large mechanisms have no transmission angles.
+    Joints with a row set aside are ignored: they form no loop of their own. Large mechanisms have no
+    transmission angles.
     """
     four_bars, slider_cranks = named_loops(mechanism, {row.row.owner for row in redundancy.dependent})
     followed = paths if len(mechanism.coordinate_names) <= _MOST else ()

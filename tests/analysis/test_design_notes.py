@@ -69,7 +69,7 @@ def test_no_gallery_mechanism_has_a_note_but_for_the_toggle_position_of_the_pend
 
 def test_bodies_that_a_swapped_point_made_rigid_are_named() -> None:
     (note,) = [note for note in notes(('"crank.P", "coupler.P"', '"ground.O", "coupler.P"')) if "move" in note]
-    assert note.startswith("coupler, rocker do not move with any driver: look at the points of their joints, or weld")
+    assert note.startswith("coupler, rocker do not move with any driver: check the points of their joints, or weld")
 
 
 def test_a_body_that_is_welded_to_the_ground_may_stand_still() -> None:
@@ -91,7 +91,7 @@ def test_points_that_nothing_uses_are_named() -> None:
 
 def test_joints_that_hold_the_same_bodies_in_one_place_are_named() -> None:
     twice = 'P2 = { type = "revolute", between = ["coupler.P", "crank.P"] }\nQ = {'
-    assert "joints P, P2 hold coupler, crank in one place: one of them is enough" in [
+    assert "joints P, P2 connect coupler, crank at the same point: one of them is enough" in [
         note.replace("crank, coupler", "coupler, crank") for note in notes(("Q = {", twice))
     ]
 
@@ -168,5 +168,5 @@ def test_a_rod_across_the_slide_of_its_driver_is_reported_with_its_position() ->
     # The rod points down from P to the slide at height 5: P is 35 above O, which a crank of 40 reaches.
     text = (SLIDER_CRANK + BY_RAM).replace("P = [20, 0]", "P = [40, 0]")
     (note,) = toggles(text, "58 deg", "-88 deg")
-    assert note.startswith("the run crosses a toggle position: rod stands across the slide at ram = ")
+    assert note.startswith("the run crosses a toggle position: rod is perpendicular to the slide at ram = ")
     assert float(note.partition("= ")[2].split()[0]) == pytest.approx(math.sqrt(40.0**2 - 35.0**2), rel=1e-8)

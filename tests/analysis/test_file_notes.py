@@ -49,7 +49,7 @@ def test_a_driven_distance_below_zero_is_reported() -> None:
     mechanism = parse(CRANK_ROCKER.replace(DRIVER, f"{cylinder}\n", 1))
     assert list(file_notes(mechanism)) == [
         "[drivers.cylinder] the distance is -3 m at the start of the run: "
-        "it counts without its sign, and shrinks as the value grows"
+        "its magnitude counts, and decreases as the value increases"
     ]
 
 

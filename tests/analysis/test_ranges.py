@@ -70,7 +70,7 @@ def test_limits_of_a_slider_crank_are_where_the_rod_stands_across_the_slide(
         sine = (offset + side * rod) / crank
         expected = math.asin(sine) if abs(sine) < 1.0 else side * math.pi - math.asin((offset - side * rod) / crank)
         assert end == pytest.approx(expected, abs=1e-10)
-    assert "rod stands across the slide" in str(report)
+    assert "rod is perpendicular to the slide" in str(report)
 
 
 def test_a_slider_that_drives_goes_from_crank_and_rod_folded_to_stretched() -> None:
@@ -101,7 +101,7 @@ def test_each_driver_of_a_five_bar_goes_until_its_arms_are_straight() -> None:
     assert elbow.high == pytest.approx(lean + half, abs=1e-10)
     text = str(report)
     assert "each with the other drivers at their start values" in text
-    assert "forearm, strut can move while shoulder stands still" in text
+    assert "forearm, strut can move while shoulder is fixed" in text
 
 
 def test_cylinders_go_as_far_as_their_triangles() -> None:
@@ -121,7 +121,7 @@ def test_a_cylinder_that_closes_wholly_ends_at_zero() -> None:
     assert report.ranges[0].low == pytest.approx(0.0, abs=1e-12)
     assert report.ranges[0].high == pytest.approx(4.0, abs=1e-10)
     assert [point.kind for point in report.ranges[0].points] == ["limit", "limit"]
-    assert "lift from 0 m, where nothing is left of it, to 4 m, a dead centre" in str(report)
+    assert "lift from 0 m, where the distance is 0, to 4 m, a dead centre" in str(report)
 
 
 def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dead_centre() -> None:
@@ -133,7 +133,7 @@ def test_a_place_where_the_solver_stops_at_crossing_branches_is_not_called_a_dea
     assert (reach.lowest.value, reach.lowest.kind) == (pytest.approx(-dead_centre, abs=1e-9), "dead centre")
     assert reach.highest.kind == "change point"
     assert reach.highest.value < dead_centre - 0.2
-    assert "where branches cross and no run goes on" in str(report)
+    assert "where branches cross and the motion cannot continue" in str(report)
 
 
 def test_a_crossing_beside_a_dead_centre_is_bridged_and_the_dead_centre_is_the_limit() -> None:
@@ -158,7 +158,7 @@ def test_change_points_show_with_several_drivers_too() -> None:
     crank, arm_alone = report.ranges
     np.testing.assert_allclose([point.value for point in crank.points], [0.0, math.pi], atol=1e-11)
     assert arm_alone.points == ()
-    assert "branches cross, with several drivers no run goes over it" in str(report)
+    assert "branches cross, with several drivers no run can cross it" in str(report)
 
 
 def test_a_geared_linkage_turns_until_it_is_back() -> None:
