@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from kinfmu.plan import SolvePlan
 
 _SAME = 1e-6  # [rad, sizes]; largest difference of recomputed coordinates from those of the run
+_plans: deque[tuple[Mechanism, SolvePlan]] = deque(maxlen=4)
 
 
 def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | None:
@@ -63,19 +64,16 @@ def _as_run(run: Run, mechanism: Mechanism) -> Mechanism:
     return replace(continued(mechanism, changed).mechanism, coordinates="all", points={})
 
 
-@lru_cache(maxsize=4)
-def _plan_of_text(text: str) -> SolvePlan:
-    from kinfmu.mechanism import toml_file
+def _plan_of_all(mechanism: Mechanism) -> SolvePlan:
+    """Return the plan of a mechanism; the last ones are kept, because records are drawn piece by piece."""
     from kinfmu.plan import compile_plan
 
-    return compile_plan(toml_file.parse(text, "the run's mechanism"))
-
-
-def _plan_of_all(mechanism: Mechanism) -> SolvePlan:
-    """Return the plan of a mechanism; it is cached, since records are drawn piece by piece."""
-    from kinfmu.mechanism.toml_text import text
-
-    return _plan_of_text(text(mechanism))
+    for known, plan in _plans:
+        if known == mechanism:
+            return plan
+    plan = compile_plan(mechanism)
+    _plans.append((mechanism, plan))
+    return plan
 
 
 def _spread(column: FloatArray, rows: IntArray, count: int) -> FloatArray:
