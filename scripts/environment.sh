@@ -1,4 +1,4 @@
-# Sourced by the scripts beside it: the checkout's own Python environment, .venv.
+# Sourced by the scripts of this folder: the checkout's own Python environment, .venv.
 # shellcheck shell=bash
 #
 #   set_up run    kinfmu and what it needs to run

@@ -1,6 +1,6 @@
 """Logs of a long run of the four-bar: how fast they are written and read, how large they are, what a logged step costs.
 
-Beside them the writer of the package mcap, which takes one message after another, and gets the same ones ready made.
+Compared with the writer of the package mcap, which gets the same messages, already made, one after another.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def fourbar(samples: int) -> Run:
 
 
 def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
-    """What is measured, the package mcap first if it is installed, and what is said if not."""
+    """Return the measurements, the package mcap first if it is installed, and a note if it is not."""
     n = len(long_run)
     record, everything = folder / "record.mcap", folder / "everything.mcap"
     short, recording = folder / "short.mcap", folder / "short.rrd"

@@ -1,4 +1,4 @@
-"""What was measured as Markdown, and the places in a page that it goes to."""
+"""The measurements as Markdown, and their places in a page."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from kinfmu.errors import KinfmuError
 
 PAGE, SETTINGS_PAGE = "accuracy.md", "accuracy-settings.md"
 PARTS = ("conditions", "engines", "singular points")
-TOLD = (1e-1, 1e-3, 1e-5, 1e-8)  # [rad], of DISTANCES
+SHOWN = (1e-1, 1e-3, 1e-5, 1e-8)  # [rad], of DISTANCES
 
 
 def begin(name: str) -> str:
-    """The comment before a generated part of a page."""
+    """Return the comment before a generated part of a page."""
     return f"<!-- generated: {name} -->"
 
 
 def end(name: str) -> str:
-    """The comment behind a generated part of a page."""
+    """Return the comment after a generated part of a page."""
     return f"<!-- end: {name} -->"
 
 
@@ -38,7 +38,7 @@ def check(folder: Path) -> None:
 
 
 def write(folder: Path, parts: Mapping[str, str], settings: str) -> tuple[Path, ...]:
-    """Fill the generated parts of PAGE in a folder, or make a page of them alone; write SETTINGS_PAGE beside it."""
+    """Fill the generated parts of PAGE in a folder, or make a page of them alone; also write SETTINGS_PAGE."""
     page, other = folder / PAGE, folder / SETTINGS_PAGE
     text = page.read_text(encoding="utf-8") if page.exists() else _bare()
     try:
@@ -51,7 +51,7 @@ def write(folder: Path, parts: Mapping[str, str], settings: str) -> tuple[Path, 
 
 
 def filled(page: str, parts: Mapping[str, str], path: Path) -> str:
-    """The page with its generated parts written anew. Raises KinfmuError if a place for one is missing."""
+    """Return the page with its generated parts replaced; raise a KinfmuError if a place for one is missing."""
     for name, text in parts.items():
         if page.count(begin(name)) != 1 or page.count(end(name)) != 1:
             raise KinfmuError(f"{path}: must have {begin(name)} and {end(name)}, once each")
@@ -66,18 +66,18 @@ def _bare() -> str:
 
 
 def conditions(rounds: int) -> str:
-    """A sentence on where and how times were taken."""
+    """Return a sentence on the machine and method of the times."""
     where = f"{_processor()}, Python {platform.python_version()}"
     return f"Measured on {where}; processor time, median of {rounds} rounds in which all take their turn."
 
 
 def _processor() -> str:
-    """What the processor calls itself."""
+    """Return the name of the processor."""
     try:
-        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:
-        told = ""
-    names = re.findall(r"^model name\s*: (.+)$", told, re.MULTILINE)
+        text = ""
+    names = re.findall(r"^model name\s*: (.+)$", text, re.MULTILINE)
     return names[0] if names else platform.processor() or platform.machine()
 
 
@@ -143,13 +143,13 @@ def row_head(engine: str, setting: Setting, *, is_usual: bool) -> tuple[str, str
 
 def singular_table(near: Sequence[Near]) -> str:
     """Error of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
-    told = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in TOLD]
-    heads = [*(f"{d:.0e}" for d in TOLD), "at it", f"{TOLD[-1]:.0e} beyond", f"{TOLD[0]:.0e} beyond", "us a sample"]
+    shown = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in SHOWN]
+    heads = [*(f"{d:.0e}" for d in SHOWN), "at it", f"{SHOWN[-1]:.0e} beyond", f"{SHOWN[0]:.0e} beyond", "us a sample"]
     parts = []
     for point in dict.fromkeys(one.point for one in near):
         lines = [f"| {point} | {' | '.join(heads)} |", f"|{'---|' * (len(heads) + 1)}"]
         for one in (one for one in near if one.point == point):
-            samples = [*(one.before[k] for k in told), one.at, one.beyond[told[-1]], one.beyond[told[0]]]
+            samples = [*(one.before[k] for k in shown), one.at, one.beyond[shown[-1]], one.beyond[shown[0]]]
             cells = [", ".join(number(float(error)) for error in sample) for sample in samples]
             lines.append(f"| {one.engine} | {' | '.join(cells)} | {duration(one.microseconds.median)} |")
         parts.append("\n".join(lines))

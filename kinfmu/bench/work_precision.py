@@ -120,9 +120,9 @@ def _lighter(colour: Colour, part: float) -> tuple[float, float, float]:
 
 
 def _name(axes: Axes, engine: str, colour: Colour, curves: Sequence[Curve], others: Sequence[Curve]) -> None:
-    """The engine's name beside its curves: above or below, where there is more room.
+    """Write the engine's name above or below its curves, where there is more space.
 
-    Of single points it stands on the left of the slowest, and below the others.
+    For single points it is to the left of the slowest, and below the others.
     """
     points = [point for curve in curves for point in curve.points]
     if len(points) == 1:

@@ -1,4 +1,4 @@
-"""The Python engine bare: generated code with nobody who judges a step, in every setting of Newton."""
+"""The Python engine bare: generated code without step control, in every setting of Newton."""
 
 from __future__ import annotations
 

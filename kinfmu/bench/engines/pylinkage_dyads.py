@@ -31,7 +31,7 @@ class Pylinkage(Engine):
         if case.name not in _LINKAGES:
             return None
         try:
-            import pylinkage  # noqa: F401  the solver needs it; told before anything is built
+            import pylinkage  # noqa: F401  the solver needs it; a missing package is reported first
         except ImportError:
             raise MissingPackageError("pylinkage is not installed: pip install 'kinfmu[bench]'") from None
         u = np.array(case.u)[:, 0]

@@ -19,17 +19,17 @@ from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python.pose import evaluated
 
-DEFAULT = 1.49012e-8  # xtol of fsolve, if nothing is said
+DEFAULT = 1.49012e-8  # default xtol of fsolve
 FINEST = 1e-15
 UNREAD = "unread"  # a parameter that nothing depends on: models with parameters can tell their residuals
 
 
 @lru_cache(maxsize=1)
-def _telling(case: Case) -> Any:
+def _distinct(case: Case) -> Any:
     """The generated model of a case, with a function that gives its residuals."""
     mechanism = case.mechanism
-    telling = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
-    return load_model(compile_plan(telling, case.columns))
+    distinct = replace(mechanism, parameters={**mechanism.parameters, UNREAD: Parameter(1.0)})
+    return load_model(compile_plan(distinct, case.columns))
 
 
 class Fsolve(Engine):
@@ -42,7 +42,7 @@ class Fsolve(Engine):
     def way(self, case: Case, setting: Setting) -> Way:
         from scipy.optimize import fsolve
 
-        model = _telling(case)
+        model = _distinct(case)
         alone = len(case.u[0]) == 1
         gap = (GAP,) * (3 * len(case.columns))
         samples = list(zip(case.u, case.ud, case.udd, strict=True))

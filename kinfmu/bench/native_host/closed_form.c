@@ -90,15 +90,15 @@ int fmi2DoStep(void *m, double time, double length, int keep)
     return step(m, time, length);
 }
 #else
-int fmi3SetFloat64(void *m, const unsigned *references, size_t count, const double *values, size_t room);
-int fmi3SetFloat64(void *m, const unsigned *references, size_t count, const double *values, size_t room)
+int fmi3SetFloat64(void *m, const unsigned *references, size_t count, const double *values, size_t capacity);
+int fmi3SetFloat64(void *m, const unsigned *references, size_t count, const double *values, size_t capacity)
 {
-    return room < count ? 3 : set(m, references, count, values);
+    return capacity < count ? 3 : set(m, references, count, values);
 }
-int fmi3GetFloat64(void *m, const unsigned *references, size_t count, double *values, size_t room);
-int fmi3GetFloat64(void *m, const unsigned *references, size_t count, double *values, size_t room)
+int fmi3GetFloat64(void *m, const unsigned *references, size_t count, double *values, size_t capacity);
+int fmi3GetFloat64(void *m, const unsigned *references, size_t count, double *values, size_t capacity)
 {
-    return room < count ? 3 : get(m, references, count, values);
+    return capacity < count ? 3 : get(m, references, count, values);
 }
 int fmi3DoStep(void *m, double time, double length, bool keep, bool *event, bool *terminate, bool *early, double *last);
 int fmi3DoStep(void *m, double time, double length, bool keep, bool *event, bool *terminate, bool *early, double *last)
