@@ -159,7 +159,7 @@ def test_an_argument_that_means_nothing_is_wrong_usage(miniature: Miniature, scr
 def test_check_names_the_checks_it_knows(miniature: Miniature) -> None:
     status, said = miniature.run("check", "lint", "spelling")
     assert status == 2
-    assert said == "kinfmu: scripts/check does not know 'spelling'; checks: lint, format, types, imports\n"
+    assert said == "kinfmu: scripts/check does not know 'spelling'; checks: lint, format, types, imports, words\n"
 
 
 def test_check_goes_on_after_a_failure_and_fails_in_the_end(miniature: Miniature) -> None:
@@ -169,6 +169,7 @@ def test_check_goes_on_after_a_failure_and_fails_in_the_end(miniature: Miniature
         (tools / tool).write_text(f'#!/bin/sh\necho "{tool} $*"\nexit {status}\n')
         (tools / tool).chmod(0o755)
     assert miniature.run("check") == (1, "ruff check .\nruff format --check .\nmypy \nlint-imports \n")
+    assert miniature.asked == ["python scripts/words.py"]
     assert miniature.run("check", "types") == (0, "mypy \n")
 
 
