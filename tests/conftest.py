@@ -11,7 +11,7 @@ from hypothesis import settings
 
 GOLDEN = Path(__file__).parent / "golden"
 
-settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=60)
+settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.load_profile("kinfmu")
 
 

@@ -38,8 +38,8 @@ _MANY_DOTS = re.compile(rf"^(?:[^.\n]*+\.){{{DEEPEST_KEY}}}", re.MULTILINE)  # w
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"?+|'[^'\n]*+'?+)"""  # of a key, or a text on one line
 _TOKEN = re.compile(
     r"#[^\n]*+"  # a comment
-    r'|"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}+|\Z)'  # texts on several lines
-    r"|'''(?:[^']|'(?!''))*+(?:'{3,5}+|\Z)"
+    r'|"""(?:[^"\\]++|\\.|"(?!""))*(?:"{3,5}|\Z)'  # texts on several lines
+    r"|'''(?:[^']++|'(?!''))*(?:'{3,5}|\Z)"  # before 3.11.5, Python's possessive groups of alternatives fail
     rf"|(?P<deep>(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}})"
     rf"|(?:{_PART}[ \t]*+(?:\.[ \t]*+)?+)++"  # other keys and values
     r"""|[^\w"'#-]++""",

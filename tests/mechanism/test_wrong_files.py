@@ -274,4 +274,4 @@ def test_insufficient_memory_is_reported(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(gallery, "load", load)
     result = CliRunner().invoke(main, ["check", "fourbar"])
     assert result.exit_code == 1
-    assert result.stderr == "kinfmu: there is not enough memory for so large a mechanism\n"
+    assert result.stderr == "kinfmu: not enough memory for a mechanism of this size\n"

@@ -36,7 +36,7 @@ def test_a_second_call_only_runs(miniature: Miniature) -> None:
 def test_tests_need_more_than_the_demo_and_the_demo_nothing_more_than_tests(miniature: Miniature) -> None:
     miniature.run("demo")
     miniature.run("test")
-    assert miniature.asked == [f"{INSTALL}.[dev]", "python -m pytest --numprocesses auto"]
+    assert miniature.asked == [f"{INSTALL}.[dev]", "python -m pytest --numprocesses auto --dist loadfile"]
     miniature.run("demo")
     assert miniature.asked == ["python -m kinfmu.cli.demo"]
 
@@ -137,7 +137,7 @@ def test_arguments_are_passed_on_unchanged_and_the_callers_folder_is_kept(miniat
 
 def test_tests_run_in_the_checkout_from_any_folder(miniature: Miniature, tmp_path: Path) -> None:
     miniature.run("test", "tests/joints", "-k", "revolute", cwd=tmp_path)
-    assert miniature.asked[-1] == "python -m pytest --numprocesses auto tests/joints -k revolute"
+    assert miniature.asked[-1] == "python -m pytest --numprocesses auto --dist loadfile tests/joints -k revolute"
     assert miniature.environment.endswith(f"cwd={miniature.root}")
 
 
