@@ -32,7 +32,10 @@ def loaded_by(statement: str) -> set[str]:
         ("import kinfmu; kinfmu.load; kinfmu.Mechanism; kinfmu.Body", HEAVY | {"click"}),
         ("import kinfmu.solver.python", HEAVY | {"click"}),
         ("import kinfmu.cli", HEAVY),
-        ("import kinfmu.log", HEAVY - {"numpy", "importlib.metadata"}),
+        (
+            "from kinfmu.log import read, review, write_mcap, write_rrd, write_table",
+            HEAVY - {"numpy", "importlib.metadata"},
+        ),
         ("import kinfmu.draw", HEAVY - {"numpy", "scipy", "importlib.metadata"}),
         ("import kinfmu.fmu", HEAVY - {"numpy", "importlib.metadata"}),
     ],

@@ -13,9 +13,10 @@ import pytest
 from kinfmu import gallery
 
 CHECKOUT = Path(__file__).parents[2]
+TYPED = ("py.typed", "__init__.pyi")
 
 
-def test_the_gallery_its_references_and_the_marker_of_types_are_installed(tmp_path: Path) -> None:
+def test_the_gallery_its_references_and_the_types_are_installed(tmp_path: Path) -> None:
     pytest.importorskip("setuptools", reason="comes with pip, mostly")
     project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
     data = project["tool"]["setuptools"]["package-data"]["kinfmu"]
@@ -23,7 +24,8 @@ def test_the_gallery_its_references_and_the_marker_of_types_are_installed(tmp_pa
     shutil.copy(CHECKOUT / "setup.py", tmp_path)
     (tmp_path / "kinfmu").mkdir()
     (tmp_path / "kinfmu" / "__init__.py").touch()
-    shutil.copy(CHECKOUT / "kinfmu" / "py.typed", tmp_path / "kinfmu")
+    for name in TYPED:
+        shutil.copy(CHECKOUT / "kinfmu" / name, tmp_path / "kinfmu")
     (tmp_path / "setup.cfg").write_text(
         "[metadata]\nname = kinfmu\n[options]\npackages = kinfmu\n"
         f"[options.package_data]\nkinfmu = {', '.join(data)}\n",
@@ -31,7 +33,8 @@ def test_the_gallery_its_references_and_the_marker_of_types_are_installed(tmp_pa
     )
     build = [sys.executable, "setup.py", "-q", "build_py", "--build-lib", "built"]
     subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
-    assert (tmp_path / "built" / "kinfmu" / "py.typed").is_file()
+    for name in TYPED:
+        assert (tmp_path / "built" / "kinfmu" / name).is_file()
     installed = tmp_path / "built" / "kinfmu" / "fmus"
     assert sorted(path.name for path in installed.iterdir()) == gallery.names()
     for folder in installed.iterdir():
