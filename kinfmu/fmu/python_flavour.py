@@ -27,7 +27,8 @@ from kinfmu.codegen.python import emit
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
-from kinfmu.fmu.interface import Drive, Interface, interface
+from kinfmu.fmu.interface import Drive, Interface
+from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description
-from kinfmu.fmu.interface import interface
+from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.conftest import mechanism
 

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import kinfmu
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu.interface import Drive, interface
+from kinfmu.fmu.interface import Drive
 from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import linkage
 from tests.fuzz.summary import Summary, seeds

@@ -12,8 +12,8 @@ from xml.etree import ElementTree as ET
 
 from kinfmu.fmu import python_flavour
 from kinfmu.fmu.description import FmiVersion
-from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native.archive import _contents
+from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.mechanism.toml_text import text

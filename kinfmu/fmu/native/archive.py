@@ -20,9 +20,10 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
 from kinfmu.fmu.description import Description, FmiVersion
-from kinfmu.fmu.interface import Drive, Interface, interface
+from kinfmu.fmu.interface import Drive, Interface
 from kinfmu.fmu.native.platforms import PLATFORMS, Platform, host
 from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
 

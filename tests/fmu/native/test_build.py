@@ -16,10 +16,10 @@ import pytest
 import kinfmu
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError, FmuError, RequestError
-from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native import archive
 from kinfmu.fmu.native.platforms import PLATFORMS, host
 from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.conftest import Build
 from tests.fmu.host import Host
@@ -49,7 +49,7 @@ def test_two_builds_are_the_same_bytes(built_native: Build, fmi: int, tmp_path: 
 def test_contents_do_not_depend_on_the_hash_seed() -> None:
     code = (
         "import hashlib, kinfmu; from kinfmu.fmu.native.archive import _contents; from kinfmu.plan import compile_plan;"
-        "from kinfmu.fmu.interface import interface; plan = compile_plan(kinfmu.load('double_pendulum'));"
+        "from kinfmu.fmu.variables import interface; plan = compile_plan(kinfmu.load('double_pendulum'));"
         "files = _contents(plan, interface(plan), '1', '2.0', '{x}');"
         "print(hashlib.sha256(repr(files).encode()).hexdigest())"
     )

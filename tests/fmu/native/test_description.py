@@ -13,7 +13,8 @@ from fmpy.validation import validate_fmu
 
 import kinfmu
 from kinfmu.fmu import description
-from kinfmu.fmu.interface import Interface, interface
+from kinfmu.fmu.interface import Interface
+from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.conftest import Build
 from tests.fmu.test_parameters import linkage

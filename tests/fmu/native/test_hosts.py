@@ -111,7 +111,7 @@ def _wanted(name: str, times: np.ndarray) -> np.ndarray:
 
 @pytest.mark.skipif(not _has("libcosimpy"), reason="libcosimpy is not installed")
 def test_osp_steps_it(built_native: Build, tmp_path: Path) -> None:
-    from kinfmu.fmu.interface import interface
+    from kinfmu.fmu.variables import interface
     from kinfmu.plan import compile_plan
 
     references = interface(compile_plan(kinfmu.load("crank_rocker"))).value_references()

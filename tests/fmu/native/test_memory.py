@@ -10,8 +10,8 @@ import pytest
 
 import kinfmu
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu.interface import interface
 from kinfmu.fmu.native.sources import headers, sources
+from kinfmu.fmu.variables import interface
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import linkage
 

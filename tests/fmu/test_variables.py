@@ -7,7 +7,7 @@ import pytest
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.fmu.linear import linear_inputs
+from kinfmu.fmu.variables import linear_inputs
 from kinfmu.plan import compile_plan
 from tests.fmu.test_parameters import geared
 
