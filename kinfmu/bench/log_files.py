@@ -21,9 +21,9 @@ from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import MissingPackageError
 from kinfmu.gallery import load
 from kinfmu.log import read, write_mcap, write_rrd
-from kinfmu.log.clock import nanoseconds
-from kinfmu.log.mcap_file import sample_template
+from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.record import layout, tables
+from kinfmu.log.topics import sample_template
 from kinfmu.log.viewer.decimated import MOST_ROWS
 from kinfmu.run import Run
 from kinfmu.sweep import solve

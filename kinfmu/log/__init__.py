@@ -1,5 +1,9 @@
 """Files of runs: MCAP as the permanent record, Rerun recordings for viewing, tables for other programs.
 
+    write: Run -> writing | growing -> record, topics, cdr -> mcap_writer -> file      whole, or while a run goes on
+    read:  file -> mcap_reader -> reading -> record_text, record -> Run                complete, or cut off (`recover`)
+    view:  Run -> viewer/ -> Rerun recording;  tables: Run -> table -> .csv .parquet .npz
+
 The writers and readers load their packages (zstandard, rerun, pyarrow) when first used, not on import.
 """
 
@@ -9,21 +13,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kinfmu.log.mcap_file import write_mcap
-    from kinfmu.log.mcap_log import McapLog
+    from kinfmu.log.growing import McapLog
     from kinfmu.log.reading import read, recover
     from kinfmu.log.table import write_table
     from kinfmu.log.viewer.rerun_file import write_rrd
     from kinfmu.log.viewer.reviewing import review
+    from kinfmu.log.writing import write_mcap
 
 __all__ = ["McapLog", "read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
 
 _HOME = {
-    "McapLog": "mcap_log",
+    "McapLog": "growing",
     "read": "reading",
     "recover": "reading",
     "review": "viewer.reviewing",
-    "write_mcap": "mcap_file",
+    "write_mcap": "writing",
     "write_rrd": "viewer.rerun_file",
     "write_table": "table",
 }

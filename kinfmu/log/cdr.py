@@ -1,20 +1,50 @@
-"""CDR, the wire format of ROS 2: thousands of messages of one layout filled by numpy at once.
+"""ROS 2 messages: definitions, time stamps, and CDR, their wire format, of which numpy fills thousands at once.
 
-Little-endian; the offset of an item of k bytes is a multiple of k, counted after the four header bytes (OMG DDS-XTypes,
-plain CDR version 1).
+CDR is little-endian; the offset of an item of k bytes is a multiple of k, counted after the four header bytes (OMG
+DDS-XTypes, plain CDR version 1). Source of the definitions: common_interfaces, geometry2 and rcl_interfaces (Apache-2.0
+/ BSD-3), without comments.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.log.clock import NANOSECONDS
+from kinfmu.errors import LogError
+from kinfmu.run import FloatArray
 
 HEADER = b"\x00\x01\x00\x00"
 Bytes = NDArray[np.uint8]
+
+NANOSECONDS = 1_000_000_000
+LATEST = 2.0**31 - 1.0  # [s]; a ROS 2 time stamp holds its seconds in 32 bits
+
+_LINE = "=" * 80
+TIME_DEFINITION = f"{_LINE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+_HEADER = f"{_LINE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n{TIME_DEFINITION}"
+
+STRING = "string data\n"
+JOINT_STATE = (
+    f"std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{_HEADER}"
+)
+TF_MESSAGE = (
+    "geometry_msgs/TransformStamped[] transforms\n"
+    f"{_LINE}\nMSG: geometry_msgs/TransformStamped\n"
+    "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
+    f"{_LINE}\nMSG: geometry_msgs/Transform\n"
+    "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
+    f"{_LINE}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    f"{_LINE}\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n{_HEADER}"
+)
+LOG = (
+    "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
+    "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"
+    f"{TIME_DEFINITION}"
+)
+LOG_LEVELS = {"info": 20, "warning": 30, "error": 40}
 
 
 class Template:
@@ -90,6 +120,12 @@ class Template:
                 if filled == slots[k].shape[1]:
                     k, filled = k + 1, 0
 
+    def messages(
+        self, places: NDArray[np.int64], times: NDArray[np.int64], tables: Sequence[NDArray[np.generic]] = ()
+    ) -> Messages:
+        """Return messages at these places and times; tables: as in `fill`."""
+        return Messages(self, places, times, tables)
+
     def read(self, messages: Bytes) -> NDArray[np.uint64]:
         """Return the 8-byte items (n, slots) of messages (n, L), the inverse of `fill`."""
         return np.hstack([messages[:, place : place + 8 * count].view("<u8") for place, count in self._words])
@@ -103,6 +139,32 @@ class Template:
         self._bytes += bytes(-(len(self._bytes) - len(HEADER)) % size)
 
 
+class Messages(NamedTuple):
+    """Messages of one layout: their places in a chunk (n,), log times (n,) [ns] and tables as in `Template.fill`."""
+
+    template: Template
+    places: NDArray[np.int64]
+    times: NDArray[np.int64]
+    tables: Sequence[NDArray[np.generic]]
+
+
 def _words(table: NDArray[np.generic]) -> NDArray[np.uint64]:
     """Return a table of 8-byte items as their bits, so that copying does not interpret them."""
     return table.astype(table.dtype.newbyteorder("<"), copy=False).view("<u8")
+
+
+def nanoseconds(t: FloatArray) -> NDArray[np.int64]:
+    """Return times (n,) [s] as whole nanoseconds, rounded: truncation would make times of a 1 ms grid 1 ns too low."""
+    bad = ~(np.abs(t) <= LATEST)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise LogError(f"time of sample {row} is {t[row]} s; a log needs a number within +-{LATEST:.0f} s")
+    return np.rint(t * NANOSECONDS).astype(np.int64)
+
+
+def zero_of(t: FloatArray) -> int:
+    """Return the origin of log times [whole s]: 0, or less if the run begins before 0.
+
+    MCAP's times are unsigned, so the log times of a run that begins at -0.5 s are counted from -1 s.
+    """
+    return min(0, int(np.floor(t.min()))) if len(t) else 0

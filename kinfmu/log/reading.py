@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -11,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import LogError, listed
-from kinfmu.log.cdr import Template
-from kinfmu.log.clock import NANOSECONDS, nanoseconds
-from kinfmu.log.drawn import LOG_TOPIC, event_in
-from kinfmu.log.mcap_file import (
+from kinfmu.log.cdr import NANOSECONDS, Template, nanoseconds
+from kinfmu.log.mcap_reader import McapReader
+from kinfmu.log.record import lists_in, run_of
+from kinfmu.log.record_text import events_of, samples_of, whole_number
+from kinfmu.log.topics import LOG_TOPIC, SAMPLE_TOPIC, event_in, sample_template
+from kinfmu.log.writing import (
     ABOUT,
     CHECKSUM,
     END,
@@ -22,14 +26,9 @@ from kinfmu.log.mcap_file import (
     MECHANISM_FILE,
     MODEL_DESCRIPTION,
     RECORD,
-    SAMPLE_TOPIC,
     checksum,
-    sample_template,
     write_mcap,
 )
-from kinfmu.log.record import lists_in, run_of
-from kinfmu.log.record_text import events_of, samples_of, whole_number
-from kinfmu.log.scan import Scan
 from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
 
 
@@ -43,16 +42,14 @@ def read(path: str | Path) -> Run:
         LogError: The file is not a record of kinfmu, cannot be read, or is damaged or cut off, with the place.
 
     """
-    scan = _scan(path)
-    if scan.fault:
-        raise LogError(f"{path}: not a whole MCAP file: {scan.fault}{_advice(scan, path)}")
-    try:
-        run, _ = _run_in(scan)
-        return run
-    except OSError as error:
-        raise _read_error(path, error) from None
-    except LogError as error:
-        raise LogError(f"{path}: {error}{_advice(scan, path)}") from None
+    with _os_errors_as_log_errors(path):
+        reader = McapReader(Path(path))
+        if reader.fault:
+            raise LogError(f"{path}: not a whole MCAP file: {reader.fault}{_advice(reader, path)}")
+        try:
+            return _run_in(reader)[0]
+        except LogError as error:
+            raise LogError(f"{path}: {error}{_advice(reader, path)}") from None
 
 
 def recover(path: str | Path, output: str | Path) -> Run:
@@ -71,44 +68,42 @@ def recover(path: str | Path, output: str | Path) -> Run:
         LogError: `path` holds no beginning of a run, or a file cannot be read or written.
 
     """
-    scan = _scan(path)
-    try:
-        run, fault = _run_in(scan, is_cut=True)
-    except OSError as error:
-        raise _read_error(path, error) from None
-    except LogError as error:
-        raise LogError(f"{path}: nothing can be recovered: {scan.fault or error}") from None
-    run = _with_end_noted(run, fault)
+    with _os_errors_as_log_errors(path):
+        reader = McapReader(Path(path))
+        try:
+            run, fault = _run_in(reader, is_cut=True)
+        except LogError as error:
+            raise LogError(f"{path}: nothing can be recovered: {reader.fault or error}") from None
+    if fault:
+        end = float(run.t[-1]) if len(run) else 0.0
+        run = replace(run, events=(*run.events, Event(end, "warning", f"the record ends here: {fault}")))
     write_mcap(run, output)
     return run
 
 
-def _scan(path: str | Path) -> Scan:
+@contextmanager
+def _os_errors_as_log_errors(path: str | Path) -> Iterator[None]:
     try:
-        return Scan(Path(path))
+        yield
     except OSError as error:
-        raise _read_error(path, error) from None
+        raise LogError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def _read_error(path: str | Path, error: OSError) -> LogError:
-    return LogError(f"{path}: cannot be read ({error.strerror or error})")
-
-
-def _advice(scan: Scan, path: str | Path) -> str:
+def _advice(reader: McapReader, path: str | Path) -> str:
     """Return the next command for a file that holds the beginning of a run, else ''."""
-    is_begun = RECORD in scan.metadata and scan.id_of(SAMPLE_TOPIC) is not None
+    is_begun = RECORD in reader.metadata and reader.id_of(SAMPLE_TOPIC) is not None
     return f"; kinfmu recover {quote(str(path))} keeps what is left" if is_begun else ""
 
 
-def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
+def _run_in(reader: McapReader, *, is_cut: bool = False) -> tuple[Run, str]:
     """Return the run in a file; if is_cut, what is left of it, and why there is no more."""
-    channel = scan.id_of(SAMPLE_TOPIC)
-    if RECORD not in scan.metadata or channel is None:
-        topics = listed(sorted(one.topic for one in scan.channels.values()))
+    channel = reader.id_of(SAMPLE_TOPIC)
+    if RECORD not in reader.metadata or channel is None:
+        topics = listed(sorted(one.topic for one in reader.channels.values()))
         raise LogError(f"no topic {SAMPLE_TOPIC}, so this is not a run of kinfmu; topics: {topics}")
-    texts, info, end = (scan.metadata.get(name, {}) for name in (RECORD, INFO, END))
+    texts, info, end = (reader.metadata.get(name, {}) for name in (RECORD, INFO, END))
     try:
-        attachments = {name: scan.attachments.get(name, b"").decode() for name in (MECHANISM_FILE, MODEL_DESCRIPTION)}
+        attachments = {name: reader.attachments.get(name, b"").decode() for name in (MECHANISM_FILE, MODEL_DESCRIPTION)}
     except UnicodeDecodeError:
         attachments = {}
     if texts.pop(CHECKSUM, "") != checksum(texts, info, attachments):
@@ -120,18 +115,18 @@ def _run_in(scan: Scan, *, is_cut: bool = False) -> tuple[Run, str]:
     about = lists_in(texts)
     count = samples_of(end) if end else MOST_SAMPLES
     events = events_of(end) if end else ()
-    blocks, fault = _samples(scan, channel, sample_template(len(about["columns"])), count, is_cut=is_cut)
+    blocks, fault = _samples(reader, channel, sample_template(len(about["columns"])), count, is_cut=is_cut)
     samples = sum(map(len, blocks))
     if end and samples != count:
         fault = fault or f"holds {samples} of {count} samples"
     if fault and not is_cut:
         raise LogError(fault)
     run = run_of(about, blocks, events, info, attachments[MECHANISM_FILE], attachments[MODEL_DESCRIPTION])
-    return run if end else replace(run, events=_logged_events(scan, run.t)), fault
+    return run if end else replace(run, events=_logged_events(reader, run.t)), fault
 
 
 def _samples(
-    scan: Scan, channel: int, template: Template, count: int, *, is_cut: bool
+    reader: McapReader, channel: int, template: Template, count: int, *, is_cut: bool
 ) -> tuple[list[NDArray[np.uint64]], str]:
     """Return rows of samples as blocks, in order of their numbers, and why there are no more.
 
@@ -139,9 +134,9 @@ def _samples(
     """
     blocks: list[NDArray[np.uint64]] = []
     numbers: list[NDArray[np.uint32]] = []
-    fault, found = scan.fault, 0
+    fault, found = reader.fault, 0
     try:
-        for block in scan.blocks(channel, template.length):
+        for block in reader.blocks(channel, template.length):
             found += len(block.sequence)
             if found > count:
                 raise LogError(f"holds more than {count} samples")
@@ -163,17 +158,17 @@ def _samples(
     )
 
 
-def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
+def _logged_events(reader: McapReader, t: FloatArray) -> tuple[Event, ...]:
     """Return the run's events from the log topic; events logged with a sample get its exact time."""
-    channel = scan.id_of(LOG_TOPIC)
-    about = scan.metadata.get(ABOUT, {})
+    channel = reader.id_of(LOG_TOPIC)
+    about = reader.metadata.get(ABOUT, {})
     if channel is None:
         return ()
     zero = whole_number(about, "time_zero_s")
     events = []
     times = dict(zip((nanoseconds(t) - zero * NANOSECONDS).tolist(), t.tolist(), strict=True))
     try:
-        for block in scan.blocks(channel):
+        for block in reader.blocks(channel):
             for stamp, payload in zip(block.times.tolist(), block.payloads, strict=True):
                 event = event_in(payload.tobytes(), times.get(stamp, zero + stamp / NANOSECONDS))
                 if event:
@@ -181,11 +176,3 @@ def _logged_events(scan: Scan, t: FloatArray) -> tuple[Event, ...]:
     except (LogError, ValueError, IndexError, struct.error):
         pass  # events after a damaged message are lost; reading the samples reports where the file is damaged
     return tuple(events)
-
-
-def _with_end_noted(run: Run, fault: str) -> Run:
-    """Return the run with an event that states where and why its samples end."""
-    if not fault:
-        return run
-    end = float(run.t[-1]) if len(run) else 0.0
-    return replace(run, events=(*run.events, Event(end, "warning", f"the record ends here: {fault}")))

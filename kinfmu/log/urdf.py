@@ -10,7 +10,6 @@ import numpy as np
 
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import Distance
-from kinfmu.log.ros2 import ROOT
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
@@ -20,6 +19,7 @@ from kinfmu.scene.placing import poses_of, world
 from kinfmu.scene.scene import DrawnCylinder, Scene
 from kinfmu.scene.strokes import Stroke
 
+ROOT = "ground"  # the root frame
 KNOWN_AT_ONCE = ("cam", "roller", "wheel", "spoke", "belt", "block")  # strokes whose size follows from one pose
 _BAR, _BARREL, _ROD, _BLOCK = 0.02, 1.4, 0.6, 1.8  # width of links relative to the size; of others relative to links
 

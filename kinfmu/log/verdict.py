@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.log.clock import nanoseconds
+from kinfmu.log.cdr import nanoseconds
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.solver.python.status import Status

@@ -24,8 +24,8 @@ from kinfmu import gallery
 from kinfmu.errors import KinfmuError
 from kinfmu.fmu import build, description, simulate
 from kinfmu.fmu.unpacked import DESCRIPTION, MECHANISM, unpacked
-from kinfmu.log import mcap_file, read, record, recover, write_mcap, write_rrd, write_table
-from kinfmu.log.container import ZSTD, Opcode
+from kinfmu.log import read, record, recover, write_mcap, write_rrd, write_table, writing
+from kinfmu.log.mcap_writer import ZSTD, Opcode
 from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
 from kinfmu.sweep import solve
@@ -271,17 +271,17 @@ def _written(run: Run, path: Path, texts: dict[str, str], *, is_checked: bool = 
     """A record of the run with these texts in place of its own."""
     begin = {key: text for key, text in texts.items() if key not in ("samples", "events")}
     end = {key: text for key, text in texts.items() if key not in begin}
-    kept = {name: getattr(mcap_file, name) for name in ("description", "ending", "status_events", "sentence")}
+    kept = {name: getattr(writing, name) for name in ("description", "ending", "status_events", "sentence")}
     try:
-        mcap_file.description = lambda run: record.description(run) | begin
-        mcap_file.ending = lambda run: record.ending(run) | end
+        writing.description = lambda run: record.description(run) | begin
+        writing.ending = lambda run: record.ending(run) | end
         if not is_checked:
-            mcap_file.status_events = lambda *_: []
-            mcap_file.sentence = lambda _: ""
+            writing.status_events = lambda *_: []
+            writing.sentence = lambda _: ""
         write_mcap(run, path, channels=["-drawn"])
     finally:
         for name, function in kept.items():
-            setattr(mcap_file, name, function)
+            setattr(writing, name, function)
 
 
 def _bombs(drawn: random.Random, find: Find) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from kinfmu.errors import LogError
-from kinfmu.log import mcap_file, read, record, write_mcap
+from kinfmu.log import read, record, topics, write_mcap
 from kinfmu.log.cdr import Template
 from kinfmu.run import Run
 
@@ -78,7 +78,7 @@ def test_a_record_of_another_format_is_reported(run: Run, tmp_path: Path) -> Non
 
 def test_samples_whose_length_does_not_match_their_columns_are_reported(run: Run, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mcap_file, "sample_template", lambda columns: Template().stamp().words(columns + 1))
+        patch.setattr(topics, "sample_template", lambda columns: Template().stamp().words(columns + 1))
         write_mcap(run, tmp_path / "run.mcap")
     found = re.fullmatch(r"a sample has (\d+) bytes instead of (\d+)", complaint(tmp_path / "run.mcap"))
     assert found is not None

@@ -17,8 +17,8 @@ import zstandard
 
 from kinfmu.draw import animate
 from kinfmu.errors import FigureError, LogError
-from kinfmu.log import mcap_file, read, record, record_text, recover, scan, write_mcap
-from kinfmu.log.container import MESSAGE, ZSTD, Opcode
+from kinfmu.log import mcap_reader, read, record, record_text, recover, write_mcap, writing
+from kinfmu.log.mcap_writer import MESSAGE, ZSTD, Opcode
 from kinfmu.log.viewer.series import groups
 from kinfmu.run import Run
 
@@ -42,8 +42,8 @@ def line_of(path: Path) -> str:
 def with_texts(run: Run, path: Path, begin: dict[str, str], end: dict[str, str] | None = None) -> Path:
     """Write the record of a run with other texts and correct checksums."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mcap_file, "description", lambda run: record.description(run) | begin)
-        patch.setattr(mcap_file, "ending", lambda run: record.ending(run) | (end or {}))
+        patch.setattr(writing, "description", lambda run: record.description(run) | begin)
+        patch.setattr(writing, "ending", lambda run: record.ending(run) | (end or {}))
         write_mcap(run.part(slice(0, 3)), path, channels=["-drawn"])
     return path
 
@@ -107,8 +107,8 @@ def test_a_million_names_are_refused_at_once(run: Run, tmp_path: Path, key: str)
 def test_an_invalid_status_or_time_is_one_line(run: Run, tmp_path: Path) -> None:
     odd = dataclasses.replace(run, status=np.where(np.arange(len(run)) == 1, 17, run.status))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mcap_file, "sentence", lambda _: "")
-        patch.setattr(mcap_file, "status_events", lambda _: [])
+        patch.setattr(writing, "sentence", lambda _: "")
+        patch.setattr(writing, "status_events", lambda _: [])
         write_mcap(odd, tmp_path / "a.mcap")
     assert line_of(tmp_path / "a.mcap") == "sample 1 has the status 17; known: 0 to 5"
 
@@ -152,7 +152,7 @@ def test_a_chunk_that_claims_to_unpack_to_a_terabyte_is_refused(run: Run, tmp_pa
     path = behind_the_first(run, tmp_path / "a.mcap", chunk(b"", 2**40, packed=b""))
     tracemalloc.start()
     try:
-        assert f"its unpacked size is {2**40} bytes; the largest valid size is {scan.ALWAYS}" in line_of(path)
+        assert f"its unpacked size is {2**40} bytes; the largest valid size is {mcap_reader.ALWAYS}" in line_of(path)
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:
         tracemalloc.stop()
@@ -161,8 +161,8 @@ def test_a_chunk_that_claims_to_unpack_to_a_terabyte_is_refused(run: Run, tmp_pa
 def test_chunks_that_unpack_to_gigabytes_are_refused_together(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scan, "MOST_UNPACKED", 2**22)
-    monkeypatch.setattr(scan, "LARGEST_RATIO", 1)
+    monkeypatch.setattr(mcap_reader, "MOST_UNPACKED", 2**22)
+    monkeypatch.setattr(mcap_reader, "LARGEST_RATIO", 1)
     empty = struct.pack("<BQ", Opcode.DATA_END, 2**20 - 9) + bytes(2**20 - 9)
     path = behind_the_first(run, tmp_path / "a.mcap", *[chunk(empty)] * 10)
     assert "its unpacked size is 1048576 bytes; the largest" in line_of(path)
@@ -170,13 +170,13 @@ def test_chunks_that_unpack_to_gigabytes_are_refused_together(
 
 def test_a_chunk_may_unpack_to_little_more_than_its_index_counts(run: Run, tmp_path: Path) -> None:
     write_mcap(run, tmp_path / "a.mcap")
-    opened = scan.Scan(tmp_path / "a.mcap")
+    opened = mcap_reader.McapReader(tmp_path / "a.mcap")
     channel = opened.id_of("/sample")
     assert channel is not None
     first = next(one for one in opened._chunks if channel in one.messages)
     length = next(opened.blocks(channel)).payloads.shape[1]
     true = first.messages[channel] * (MESSAGE.itemsize + length)
-    assert true <= first.most(channel, length) <= max(2 * true, scan.ALWAYS)
+    assert true <= first.most(channel, length) <= max(2 * true, mcap_reader.ALWAYS)
 
 
 RECORDS = {
@@ -222,7 +222,7 @@ def test_a_long_run_in_which_nothing_moves_is_read(run: Run, tmp_path: Path, is_
     write_mcap(still, path, channels=["-drawn"])
     if is_cut:
         whole = path.read_bytes()
-        index = struct.pack("<BQH", Opcode.MESSAGE_INDEX, 6 + 16 * mcap_file.ROWS, 0)
+        index = struct.pack("<BQH", Opcode.MESSAGE_INDEX, 6 + 16 * writing.ROWS, 0)
         path.write_bytes(whole[: whole.rindex(index, 0, len(whole) // 2)])  # a chunk without its index
         again = recover(path, tmp_path / "again.mcap")
         assert 0 < len(again) < n

@@ -15,8 +15,8 @@ from mcap.writer import CompressionType, Writer
 
 from kinfmu.errors import LogError
 from kinfmu.log import read, write_mcap
-from kinfmu.log.container import McapWriter
-from kinfmu.log.ros2 import field_names
+from kinfmu.log.mcap_writer import McapWriter
+from kinfmu.log.topics import field_names
 from kinfmu.log.viewer.headless import executable
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import select

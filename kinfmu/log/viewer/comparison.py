@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinfmu.errors import LogError, listed
-from kinfmu.log.clock import nanoseconds
+from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.verdict import sentence
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain

@@ -27,7 +27,7 @@ from zlib import crc32
 import numpy as np
 
 from kinfmu.errors import LogError
-from kinfmu.log.clock import nanoseconds
+from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
 from kinfmu.log.verdict import changes, label, notable_events, sentence
 from kinfmu.log.viewer.blueprint import single

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.errors import LogError
-from kinfmu.log.clock import nanoseconds
+from kinfmu.log.cdr import nanoseconds
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import DEGREE, SAMPLE, axis_of
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import LogError, MissingPackageError
-from kinfmu.log.container import MAGIC, MESSAGE, Bytes, Opcode
+from kinfmu.log.cdr import Bytes
+from kinfmu.log.mcap_writer import MAGIC, MESSAGE, Opcode
 from kinfmu.mechanism.valid import quoted
 
 MOST_IN_CHUNK = 2**27  # [bytes] unpacked; twice what a chunk of ours holds
@@ -56,7 +57,7 @@ class _Chunk:
         return min(MOST_IN_CHUNK, max(ALWAYS, count * (MESSAGE.itemsize + length)))
 
 
-class Scan:
+class McapReader:
     """Content of an MCAP file; fault: where and why its records end early, empty if the file is complete."""
 
     def __init__(self, path: Path) -> None:

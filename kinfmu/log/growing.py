@@ -10,10 +10,10 @@ from pathlib import Path
 from shlex import quote
 
 from kinfmu.files.whole_file import lock_for_writing
-from kinfmu.log.clock import zero_of
-from kinfmu.log.mcap_file import Content
+from kinfmu.log.cdr import zero_of
 from kinfmu.log.target import check_writable, checked, replacing, write_error
 from kinfmu.log.verdict import status_events, unexplained
+from kinfmu.log.writing import Content
 from kinfmu.run import Event, Run
 from kinfmu.solver.python.status import Status
 

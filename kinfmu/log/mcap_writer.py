@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import MissingPackageError
-
-Bytes = NDArray[np.uint8]
+from kinfmu.log.cdr import Bytes, Messages
 
 MAGIC = b"\x89MCAP0\r\n"
 ZSTD = "zstd"
@@ -54,18 +53,6 @@ class Opcode(IntEnum):
     METADATA_INDEX = 0x0D
     SUMMARY_OFFSET = 0x0E
     DATA_END = 0x0F
-
-
-class Messages(NamedTuple):
-    """Messages of one length: their places in the chunk (n,), log times (n,) [ns] and payloads.
-
-    fill(payloads): writes the payloads (n, length).
-    """
-
-    places: NDArray[np.int64]
-    times: NDArray[np.int64]
-    length: int
-    fill: Callable[[Bytes], None]
 
 
 class _Chunk(NamedTuple):
@@ -110,15 +97,15 @@ class McapWriter:
         """Continue at the end of `file`, which is the same file opened under another name."""
         self._file = file
 
-    def channel(self, topic: str, encoding: str, schema: str, definition: str, metadata: Mapping[str, str]) -> int:
-        """Add a channel and return its id; schema, definition: name and text of the message type (ros2msg)."""
+    def channel(self, topic: str, schema: str, definition: str, metadata: Mapping[str, str]) -> int:
+        """Add a channel of ROS 2 messages and return its id; schema, definition: name and text of their type."""
         if schema not in self._schemas:
             body = struct.pack("<H", len(self._schemas) + 1) + _text(schema) + _text("ros2msg") + _text(definition)
             self._schemas[schema] = _record(Opcode.SCHEMA, body)
             self._put(self._schemas[schema])
         schema_id = list(self._schemas).index(schema) + 1
         channel = len(self._channels)
-        body = struct.pack("<HH", channel, schema_id) + _text(topic) + _text(encoding) + _table(metadata)
+        body = struct.pack("<HH", channel, schema_id) + _text(topic) + _text("cdr") + _table(metadata)
         self._channels.append(_record(Opcode.CHANNEL, body))
         self._counts.append(0)
         self._put(self._channels[channel])
@@ -175,14 +162,15 @@ class McapWriter:
 
     def _block(self, channel: int, kind: Messages, ranks: NDArray[np.int64]) -> Bytes:
         """Return messages of one length, (n, bytes), which have the positions `ranks` in the chunk."""
-        block = np.empty((len(ranks), MESSAGE.itemsize + kind.length), np.uint8)
+        length = kind.template.length
+        block = np.empty((len(ranks), MESSAGE.itemsize + length), np.uint8)
         heads = block[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0]
         heads["opcode"] = Opcode.MESSAGE
-        heads["length"] = MESSAGE.itemsize - 9 + kind.length
+        heads["length"] = MESSAGE.itemsize - 9 + length
         heads["channel"] = channel
         heads["sequence"] = self._counts[channel] + ranks
         heads["log"] = heads["publish"] = kind.times
-        kind.fill(block[:, MESSAGE.itemsize :])
+        kind.template.fill(block[:, MESSAGE.itemsize :], kind.times, kind.tables)
         return block
 
     def finish(self) -> None:

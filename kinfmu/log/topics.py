@@ -1,17 +1,18 @@
-"""ROS 2 topics that viewers draw without set-up: joint states, transforms, robot description, log."""
+"""Topics of a record: every sample, and those that ROS 2 viewers draw: joint states, transforms, description, log."""
 
 from __future__ import annotations
 
+import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.log import ros2, urdf
-from kinfmu.log.cdr import Template
-from kinfmu.log.clock import NANOSECONDS, nanoseconds
-from kinfmu.log.container import McapWriter, Messages
+from kinfmu.log import cdr, urdf
+from kinfmu.log.cdr import NANOSECONDS, Messages, Template, nanoseconds
+from kinfmu.log.mcap_writer import McapWriter
+from kinfmu.log.record import is_integer, layout, tables
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import Event, Run
 from kinfmu.scene.scene import scene
@@ -19,7 +20,47 @@ from kinfmu.units import METRES, derivative_name, quantity_of
 
 SOURCE = "kinfmu"  # of log messages that are events of the run
 STATUS_SOURCE = "kinfmu.status"  # of log messages that follow from the samples
-LOG_TOPIC = "/log"
+SAMPLE_TOPIC, LOG_TOPIC = "/sample", "/log"
+
+
+class SampleTopic:
+    """The full record, every sample, in the mechanism's own units."""
+
+    def __init__(self, writer: McapWriter, run: Run) -> None:
+        places = list(run.places())
+        names = field_names(place.name for place in places)
+        metadata = {f"unit.{name}": place.unit for name, place in zip(names, places, strict=True)}
+        metadata |= {f"column.{name}": place.name for name, place in zip(names, places, strict=True)}
+        fields = "\n".join(
+            f"{'int64' if is_integer(place.table) else 'float64'} {name}  # {place.name} [{place.unit}]"
+            for name, place in zip(names, places, strict=True)
+        )
+        definition = f"builtin_interfaces/Time stamp\n{fields}\n{cdr.TIME_DEFINITION}"
+        self._writer, self._template, self._layout = writer, sample_template(len(places)), layout(run)
+        self._channel = writer.channel(SAMPLE_TOPIC, "kinfmu_msgs/msg/Sample", definition, metadata)
+
+    def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
+        """Write the next samples; stamps (n,) [ns]."""
+        numbers = tables(run, self._layout)
+        self._writer.write(self._channel, self._template.messages(np.arange(len(run)), stamps, numbers))
+
+
+def sample_template(columns: int) -> Template:
+    """Return the layout of /sample: a stamp, then the columns."""
+    return Template().stamp().words(columns)
+
+
+def field_names(columns: Iterable[str]) -> list[str]:
+    """Return names that ROS 2 allows, 'coupler_x' for 'coupler.x': lower case, single underscores, all different."""
+    names: dict[str, None] = {}
+    for column in columns:
+        name = re.sub(r"[^a-z0-9]+", "_", column.lower()).strip("_") or "column"
+        name = name if name[0].isalpha() else f"n{name}"
+        unused, number = name, 2
+        while unused in names:
+            unused, number = f"{name}_{number}", number + 1
+        names[unused] = None
+    return list(names)
 
 
 class JointTopic:
@@ -36,7 +77,7 @@ class JointTopic:
         self._was_good = False
         fields = zip(("position", "velocity"), orders, strict=False)
         units = "; ".join(f"{field}: {_si_units(names, order)}" for field, order in fields)
-        self._channel = writer.channel(topic, "cdr", "sensor_msgs/msg/JointState", ros2.JOINT_STATE, {"units": units})
+        self._channel = writer.channel(topic, "sensor_msgs/msg/JointState", cdr.JOINT_STATE, {"units": units})
 
     def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
         """Write the next samples; stamps (n,) [ns]."""
@@ -47,11 +88,10 @@ class JointTopic:
         every = len(rows) == len(good)
         tables = [(run.values, run.rates, run.accelerations)[order][:, self._columns] for order in self._orders]
         numbers = [(table if every else table[rows]) * self._to_si for table in tables]
-        at = stamps[rows]
         self._writer.write(
             self._channel,
-            Messages(rows, at, self._template.length, lambda out: self._template.fill(out, at, numbers)),
-            Messages(gaps, stamps[gaps], self._empty.length, lambda out: self._empty.fill(out, stamps[gaps])),
+            self._template.messages(rows, stamps[rows], numbers),
+            self._empty.messages(gaps, stamps[gaps]),
         )
 
 
@@ -71,7 +111,7 @@ class LinkTopic:
             self._describe(run, stamps)
         if self._template is None:
             return
-        template, metres, numbers = self._template, self._metres, []
+        metres, numbers = self._metres, []
         for pose in urdf.frames(run, self._mechanism).values():
             x, y, phi = pose.T
             nothing = np.zeros_like(x)
@@ -79,12 +119,9 @@ class LinkTopic:
             numbers.append(np.column_stack([*place, nothing, nothing, np.sin(phi / 2), np.cos(phi / 2)]))
         with np.errstate(over="ignore", invalid="ignore"):  # a foreign record may hold any numbers
             rows = np.flatnonzero(run.good & np.isfinite(sum(table.sum(axis=1) for table in numbers)))
-        at = stamps[rows]
         if len(rows) < len(run):
             numbers = [table[rows] for table in numbers]
-        self._writer.write(
-            self._channel, Messages(rows, at, template.length, lambda out: template.fill(out, at, numbers))
-        )
+        self._writer.write(self._channel, self._template.messages(rows, stamps[rows], numbers))
 
     def _describe(self, run: Run, stamps: NDArray[np.int64]) -> None:
         """Write the robot description, drawn to the size of the mechanism in its first pose."""
@@ -94,13 +131,12 @@ class LinkTopic:
         if not frames:
             return
         message = Template().string(urdf.robot_description(self._name, shown, self._metres))
-        channel = self._writer.channel("/robot_description", "cdr", "std_msgs/msg/String", ros2.STRING, {})
-        at = stamps[:1]
-        self._writer.write(channel, Messages(np.zeros(1, int), at, message.length, lambda out: message.fill(out, at)))
+        channel = self._writer.channel("/robot_description", "std_msgs/msg/String", cdr.STRING, {})
+        self._writer.write(channel, message.messages(np.zeros(1, int), stamps[:1]))
         self._template = Template().uint32(len(frames))
         for name in frames:
-            self._template.stamp().string(ros2.ROOT).string(name).words(7)
-        self._channel = self._writer.channel("/tf", "cdr", "tf2_msgs/msg/TFMessage", ros2.TF_MESSAGE, {"units": "m"})
+            self._template.stamp().string(urdf.ROOT).string(name).words(7)
+        self._channel = self._writer.channel("/tf", "tf2_msgs/msg/TFMessage", cdr.TF_MESSAGE, {"units": "m"})
 
 
 class LogTopic:
@@ -108,7 +144,7 @@ class LogTopic:
 
     def __init__(self, writer: McapWriter, zero: int) -> None:
         self._writer, self._zero = writer, zero
-        self._channel = writer.channel(LOG_TOPIC, "cdr", "rcl_interfaces/msg/Log", ros2.LOG, {})
+        self._channel = writer.channel(LOG_TOPIC, "rcl_interfaces/msg/Log", cdr.LOG, {})
 
     def add(self, entries: Sequence[tuple[str, Event]]) -> None:
         """Write events in order of time, each with its source."""
@@ -123,15 +159,14 @@ class LogTopic:
 
 def _entries(source: str, level: str, text: str, places: NDArray[np.int64], stamps: NDArray[np.int64]) -> Messages:
     """Return log messages of the same source, level and text."""
-    number = ros2.LOG_LEVELS.get(level, ros2.LOG_LEVELS["info"])
+    number = cdr.LOG_LEVELS.get(level, cdr.LOG_LEVELS["info"])
     template = Template().stamp().uint8(number).string(source).string(text).string("").string("").uint32(0)
-    at = stamps[places]
-    return Messages(places, at, template.length, lambda out: template.fill(out, at))
+    return template.messages(places, stamps[places])
 
 
 def event_in(message: bytes, t: float) -> Event | None:
     """Return the event in a log message at time t [s]; None if the message follows from the samples."""
-    level = next((name for name, number in ros2.LOG_LEVELS.items() if number == message[12]), "info")
+    level = next((name for name, number in cdr.LOG_LEVELS.items() if number == message[12]), "info")
     at, texts = 16, []
     for _ in range(2):
         (count,) = struct.unpack_from("<I", message, at)
@@ -156,7 +191,7 @@ def joint_topics(writer: McapWriter, run: Run) -> list[JointTopic]:
 
 
 def _joint_state(names: tuple[str, ...], with_velocity: bool) -> Template:
-    template = Template().stamp().string(ros2.ROOT).strings(names).sequence(len(names))
+    template = Template().stamp().string(urdf.ROOT).strings(names).sequence(len(names))
     return template.sequence(len(names) if with_velocity else 0).sequence(0)
 
 

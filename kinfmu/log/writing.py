@@ -22,17 +22,14 @@ from io import FileIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinfmu import VERSION
 from kinfmu.errors import MechanismError
-from kinfmu.log import ros2
-from kinfmu.log.cdr import Template
-from kinfmu.log.clock import NANOSECONDS, nanoseconds, zero_of
-from kinfmu.log.container import McapWriter, Messages
-from kinfmu.log.drawn import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, joint_topics
-from kinfmu.log.record import description, ending, is_integer, layout, tables
+from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
+from kinfmu.log.mcap_writer import McapWriter
+from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
+from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
 from kinfmu.log.verdict import sentence, status_events, unexplained
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
@@ -40,7 +37,6 @@ from kinfmu.run.channels import is_drawn, select
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that
-SAMPLE_TOPIC = "/sample"
 MECHANISM_FILE = "mechanism.toml"
 MODEL_DESCRIPTION = "modelDescription.xml"
 RECORD, INFO, ABOUT, END = "kinfmu.record", "kinfmu.info", "kinfmu.about", "kinfmu.end"  # metadata
@@ -97,7 +93,7 @@ class Content:
         base = "simulation" if axis.is_time else "number of the sample, one a second"
         about = {"time_base": base, "axis": axis.label, "time_zero_s": str(zero), **_versions()}
         self.until = 0.0  # time of the last sample [s]
-        self._sample = _SampleTopic(writer, run)
+        self._sample = SampleTopic(writer, run)
         self._topics: list[JointTopic | LinkTopic] = []
         self._log: LogTopic | None = None
         if drawn:
@@ -145,34 +141,6 @@ class Content:
     def close(self) -> None:
         """Discard what is not in the file yet."""
         self._writer.close()
-
-
-class _SampleTopic:
-    """The full record, every sample, in the mechanism's own units."""
-
-    def __init__(self, writer: McapWriter, run: Run) -> None:
-        places = list(run.places())
-        names = ros2.field_names(place.name for place in places)
-        kinds = ["int64" if is_integer(place.table) else "float64" for place in places]
-        comments = [f"{place.name} [{place.unit}]" for place in places]
-        metadata = {f"unit.{name}": place.unit for name, place in zip(names, places, strict=True)}
-        metadata |= {f"column.{name}": place.name for name, place in zip(names, places, strict=True)}
-        definition = ros2.sample_definition(zip(kinds, names, comments, strict=True))
-        self._writer, self._template, self._layout = writer, sample_template(len(places)), layout(run)
-        self._channel = writer.channel(SAMPLE_TOPIC, "cdr", "kinfmu_msgs/msg/Sample", definition, metadata)
-
-    def add(self, run: Run, stamps: NDArray[np.int64]) -> None:
-        """Write the next samples."""
-        template, numbers = self._template, tables(run, self._layout)
-        self._writer.write(
-            self._channel,
-            Messages(np.arange(len(run)), stamps, template.length, lambda out: template.fill(out, stamps, numbers)),
-        )
-
-
-def sample_template(columns: int) -> Template:
-    """Return the layout of /sample: a stamp, then the columns."""
-    return Template().stamp().words(columns)
 
 
 def checksum(*texts: Mapping[str, str]) -> str:
