@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from kinfmu.drivers import Driver
-from kinfmu.joints.joint import Held
+from kinfmu.joints import Held
 from kinfmu.measures import CoordinateOf, Measure
-from kinfmu.measures.decimal_sum import decimal_sum
+from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Start
 from kinfmu.plan import SolvePlan, compile_plan
 

@@ -1,17 +1,19 @@
-"""The contract of cams with a lift law: a follower whose position depends on the angle of a cam."""
+"""Cams with a lift law: the position of a follower depends on the angle of a cam."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
 from kinfmu.laws.law import TURN
-from kinfmu.measures import AngleBetween, Measure
+from kinfmu.measures import AngleBetween, Measure, PositionAlong
 from kinfmu.measures.arithmetic import Value
-from kinfmu.measures.placement import Placement
+from kinfmu.measures.placement import BodyName, BodyPair, Placement, PointPair, body_of
+from kinfmu.units import Length, Radians
 
 _SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
 
@@ -73,3 +75,56 @@ class Cam(Joint):
 def closing(law: Law) -> tuple[Condition, ...]:
     """Return the conditions for a law of an angle to be periodic over a turn."""
     return tuple(Condition(f"law: {key}", value, "0") for key, value in law.zeros().items())
+
+
+@dataclass(frozen=True)
+class CamTranslating(Cam):
+    """A cam that lifts a follower along an axis by a lift law.
+
+        Phi = e.d - offset - f(phi_k - phi_i),   d = r_j + A_j s_b - r_i - A_i s_a        (1 row, scale 1)
+
+    The guide is a separate joint. After Haug (1989), cam-followers, which are given there by profiles.
+    """
+
+    type: ClassVar[str] = "cam_translating"
+    labels: ClassVar[tuple[str, ...]] = ("lift",)
+    led: ClassVar[str] = "length"
+
+    name: str
+    between: Annotated[PointPair, "a point of body i, which holds cam and guide, then a point of the follower j"]
+    cam: Annotated[BodyName, "the cam, body k"]
+    law: Annotated[Law, "lift f over the cam's angle [length over rad]"]
+    axis: Annotated[Radians, "direction e of the lift in i's frame [rad]"] = 0.0
+    offset: Annotated[Length, "position of the follower where the lift is 0 [length]"] = 0.0
+
+    def bodies(self) -> tuple[str, ...]:
+        return (*map(body_of, self.between), self.cam)
+
+    def follower(self) -> PositionAlong:
+        return PositionAlong(self.between, self.axis)
+
+
+@dataclass(frozen=True)
+class CamOscillating(Cam):
+    """A cam that swings a follower by a lift law.
+
+        Phi = phi_j - phi_i - offset - f(phi_k - phi_i)        (1 row)
+
+    After Haug (1989), cam-followers, which are given there by profiles.
+    """
+
+    type: ClassVar[str] = "cam_oscillating"
+    labels: ClassVar[tuple[str, ...]] = ("lift",)
+    led: ClassVar[str] = "angle"
+
+    name: str
+    between: Annotated[BodyPair, "body i, which holds both pivots, then the follower j"]
+    cam: Annotated[BodyName, "the cam, body k"]
+    law: Annotated[Law, "lift f over the cam's angle [rad over rad]"]
+    offset: Annotated[Radians, "angle of the follower where the lift is 0 [rad]"] = 0.0
+
+    def bodies(self) -> tuple[str, ...]:
+        return (*self.between, self.cam)
+
+    def follower(self) -> AngleBetween:
+        return AngleBetween(self.between[1], self.between[0])

@@ -46,8 +46,7 @@ class CamRoller(Joint):
         return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        (a_x, a_y), (b_x, b_y) = map(at.point, self.between)
-        d_x, d_y = b_x - a_x, b_y - a_y
+        d_x, d_y = at.vector(self.between)
         (e_x, e_y), (n_x, n_y) = (at.direction(body_of(self.between[0]), angle) for angle in (0.0, 0.5 * math.pi))
         angle = atan2(n_x * d_x + n_y * d_y, e_x * d_x + e_y * d_y)
         return (sqrt(d_x * d_x + d_y * d_y) - self.law.at(angle),)

@@ -27,13 +27,11 @@ class Fixed(Joint):
     angle: Annotated[Radians, "angle of body j relative to body i [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
-        return tuple(body_of(point) for point in self.between)
+        return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
         i, j = self.bodies()
-        a_x, a_y = at.point(self.between[0])
-        b_x, b_y = at.point(self.between[1])
-        return b_x - a_x, b_y - a_y, AngleBetween(j, i).row(at, self.angle)
+        return (*at.vector(self.between), AngleBetween(j, i).row(at, self.angle))
 
     def kinds(self) -> tuple[str, ...]:
         return "length", "length", "angle"

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
 from kinfmu.measures.arithmetic import Value
-from kinfmu.measures.measure import Measure
 from kinfmu.measures.placement import Placement
 
 
@@ -76,34 +75,3 @@ class Joint(ABC):
     def kinds(self) -> tuple[str, ...]:
         """Return the kind of each row's gap, 'length' or 'angle'."""
         return ("length",) * len(self.labels)
-
-
-class Held(Joint):
-    """One measured quantity, held at a value.
-
-        Phi = measure - value        (1 row; a measure may define its own row)
-
-    Leaves define `measured`.
-    """
-
-    @abstractmethod
-    def measured(self) -> tuple[Measure, float]:
-        """Return the measure and the value at which it is held."""
-
-    def bodies(self) -> tuple[str, ...]:
-        return self.measured()[0].bodies()
-
-    def residual(self, at: Placement) -> tuple[Value, ...]:
-        measure, value = self.measured()
-        return (measure.row(at, value),)
-
-    def scales(self) -> tuple[float, ...]:
-        measure, value = self.measured()
-        return (measure.scale(value),)
-
-    def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
-        measure, value = self.measured()
-        return (measure.gap(residual[0], value),)
-
-    def kinds(self) -> tuple[str, ...]:
-        return (self.measured()[0].kind,)

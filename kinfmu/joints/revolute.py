@@ -24,9 +24,7 @@ class Revolute(Joint):
     between: Annotated[PointPair, "the two points 'body.point', s_a and s_b in their bodies' frames"]
 
     def bodies(self) -> tuple[str, ...]:
-        return tuple(body_of(point) for point in self.between)
+        return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        a_x, a_y = at.point(self.between[0])
-        b_x, b_y = at.point(self.between[1])
-        return b_x - a_x, b_y - a_y
+        return at.vector(self.between)

@@ -28,14 +28,11 @@ class Translational(Joint):
     angle: Annotated[Radians, "angle of j relative to i [rad]"] = 0.0
 
     def bodies(self) -> tuple[str, ...]:
-        return tuple(body_of(point) for point in self.between)
+        return tuple(map(body_of, self.between))
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
         i, j = self.bodies()
-        return (
-            OffsetFrom(self.between, self.axis).row(at, 0.0),
-            AngleBetween(j, i).row(at, self.angle),
-        )
+        return OffsetFrom(self.between, self.axis).row(at, 0.0), AngleBetween(j, i).row(at, self.angle)
 
     def kinds(self) -> tuple[str, ...]:
         return "length", "angle"

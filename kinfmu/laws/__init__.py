@@ -1,15 +1,12 @@
-"""Laws, one per file, with all rises in one: how one quantity follows another, such as a cam follower the cam.
+"""Laws: how one quantity follows another, such as a cam follower the cam.
 
 To add one, write a file and add a line here.
 """
 
 from __future__ import annotations
 
-from kinfmu.laws.constant_speed import ConstantSpeed
-from kinfmu.laws.external import External
-from kinfmu.laws.harmonic import Harmonic
+from kinfmu.laws.formulas import ConstantSpeed, External, Harmonic, Polynomial
 from kinfmu.laws.law import Constant, Law, LawQuantity
-from kinfmu.laws.polynomial import Polynomial
 from kinfmu.laws.rise import (
     RISES,
     Cycloidal,

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from kinfmu.laws.jumps import Jumps, jumping_breaks
-from kinfmu.laws.law import Argument, Duration, Law, Led
+from kinfmu.laws.law import Argument, Duration, Jumps, Law, Led, jumping_breaks
 from kinfmu.measures.arithmetic import Value, curve
 from kinfmu.solver.python.curve import CurveData, Piece
 

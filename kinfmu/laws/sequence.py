@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.jumps import Jumps, jumping_breaks
-from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, Law, LawQuantity, Led, Path
+from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, Jumps, Law, LawQuantity, Led, Path, jumping_breaks
 from kinfmu.laws.rise import RISES
 from kinfmu.measures.arithmetic import Value, curve, split_periods, sqrt
 

@@ -8,8 +8,7 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.jumps import Jumps, jumping_breaks
-from kinfmu.laws.law import NEARLY, TURN, Constant, Law, LawQuantity, Path
+from kinfmu.laws.law import NEARLY, TURN, Constant, Jumps, Law, LawQuantity, Path, jumping_breaks
 from kinfmu.measures.arithmetic import Value, curve, split_periods
 from kinfmu.measures.placement import Reference
 from kinfmu.solver.python.curve import CurveData, Piece

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from kinfmu.measures.angle import AngleBetween
-from kinfmu.measures.coordinate import CoordinateOf
-from kinfmu.measures.distance import DistanceBetween
-from kinfmu.measures.measure import Measure
-from kinfmu.measures.slide import OffsetFrom, PositionAlong
+from kinfmu.measures.measure import AngleBetween, CoordinateOf, DistanceBetween, Measure, OffsetFrom, PositionAlong
 
 MEASURES: tuple[type[Measure], ...] = (AngleBetween, CoordinateOf, DistanceBetween, PositionAlong, OffsetFrom)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from decimal import Decimal
 from functools import singledispatch
 from typing import Any
 
@@ -117,6 +118,13 @@ def _halves(x: Value) -> tuple[Value, Value]:
     scaled = 134217729.0 * x  # 2^27 + 1
     high = scaled - (scaled - x)
     return high, x - high
+
+
+def decimal_sum(a: Any, b: float) -> Any:
+    """Return a + b as decimals, rounded once: 1000000.7 - 1000000 is 0.7; an expression gets b as a term."""
+    if isinstance(a, int | float):
+        return float(Decimal(repr(float(a))) + Decimal(repr(float(b))))
+    return a + b
 
 
 sin.register(complex, cmath.sin)

@@ -59,6 +59,11 @@ class Placement:
         s_x, s_y = self.points[name]
         return body.x + body.c * s_x - body.s * s_y, body.y + body.s * s_x + body.c * s_y
 
+    def vector(self, between: tuple[str, str]) -> tuple[Value, Value]:
+        """Return the world coordinates of the vector from the first point to the second."""
+        (a_x, a_y), (b_x, b_y) = map(self.point, between)
+        return b_x - a_x, b_y - a_y
+
     def angle(self, body: str) -> Value:
         """Return the angle phi of a body [rad]."""
         return self.poses[body].phi

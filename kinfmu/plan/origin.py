@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kinfmu.equations.system import size_of
-from kinfmu.measures.decimal_sum import decimal_sum
+from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Point, Start
 
 FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own

@@ -34,9 +34,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (copy / "kinfmu" / "joints" / named).write_text(joint, encoding="utf-8")
     package = copy / "kinfmu" / "joints" / "__init__.py"
     text = package.read_text(encoding="utf-8")
-    text = text.replace(
-        "from kinfmu.joints.point_on_line import", f"{export}from kinfmu.joints.point_on_line import", 1
-    )
+    text = text.replace("from kinfmu.joints.rack_and", f"{export}from kinfmu.joints.rack_and", 1)
     text = text.replace("\n)\n\n__all__", "\n    Opposed,\n)\n\n__all__", 1)
     text = text.replace('    "PointOnLine",\n', '    "Opposed",\n    "PointOnLine",\n', 1)
     assert text.count("Opposed") == 3
