@@ -1,34 +1,106 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/python/advance.py. */
 #include "internal.h"
 
-/* Return the pose at the end of a path, with the iterations of the whole path.
- *
- * A dead centre has no tangent that the next path could start with: that starts from the last regular pose.
- */
-static kf_pose *arrived(kf_pose *pose, const kf_pose *regular, int iterations)
+void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places)
 {
-    pose->found.iterations = iterations;
-    if (pose->found.margin < KF_NEAR) {
-        pose->status = KF_NEAR_SINGULAR;
-        pose->has_base = true;
-        memcpy(pose->base_u, KF_POSE_U(regular), sizeof pose->base_u);
-        memcpy(pose->base_z, regular->found.x, KF_UNKNOWNS * sizeof(double));
-        pose->base_bridge = regular->bridge;
-        pose->map = regular->map;
-        pose->low = regular->low;
-        pose->high = regular->high;
+    path->places = places;
+    path->target = target;
+    path->pose = path->before = path->regular = start;
+    path->margin = start->found.margin;
+    if (driver >= 0) {
+        memset(path->direction, 0, sizeof path->direction);
+        path->direction[driver] = 1.0;
+        path->distance = target[driver] - KF_POSE_U(start)[driver];
+        path->longest = KF_LONGEST_STEP * kf_reach[driver];
+    } else {
+        path->distance = kf_straight_path(KF_POSE_U(start), target, path->direction);
+        path->longest = KF_LONGEST_STEP;
     }
-    return pose;
+    path->length = path->longest;
+    path->most_steps = fabs(path->distance) > KF_MOST_STEPS * path->longest ? 0 : KF_MOST_STEPS;
+    path->iterations = 0;
+    path->is_limited = path->is_ended = false;
+    path->end = NULL;
 }
 
-/* Return a place for one more pose that holds none of those needed. */
-static kf_pose *spare(kf_solver *solver, const kf_pose *pose, const kf_pose *before, const kf_pose *regular)
+kf_pose *kf_path_spare(const kf_path *path)
 {
-    kf_pose *place = solver->scratch.poses;
-    while (place == pose || place == before || place == regular) {
+    kf_pose *place = path->places;
+    while (place == path->pose || place == path->before || place == path->regular) {
         ++place;
     }
     return place;
+}
+
+const double *kf_path_ahead(kf_path *path, double *s)
+{
+    int k;
+    if (-path->length <= path->distance && path->distance <= path->length) {
+        *s = path->distance;
+        return path->target;
+    }
+    *s = path->distance > 0.0 ? path->length : -path->length;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        path->u[k] = KF_POSE_U(path->pose)[k] + *s * path->direction[k];
+    }
+    return path->u;
+}
+
+void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margin)
+{
+    path->margin = margin;
+    if (s == path->distance) {
+        path->end = trial;
+        path->is_ended = true;
+        return;
+    }
+    path->before = path->pose;
+    path->pose = trial;
+    if (margin >= KF_NEAR) {
+        path->regular = trial;
+    }
+    path->distance -= s;
+    path->length = fmin(2.0 * path->length, path->longest);
+}
+
+bool kf_path_shorten(kf_path *path, double s)
+{
+    path->length = 0.5 * fabs(s);
+    return path->length < KF_SHORTEST_STEP * path->longest;
+}
+
+void kf_path_limit(kf_path *path, double s)
+{
+    path->is_limited = true;
+    path->is_ended = path->length < KF_GIVE_UP * path->longest
+                     || kf_is_beyond(path->target, path->limit.u, path->direction, s);
+}
+
+kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
+{
+    kf_pose *const end = path->end;
+    const kf_pose *const regular = path->regular;
+    if (!path->is_ended) {
+        memcpy(path->limit.u, KF_POSE_U(path->pose), sizeof path->limit.u);
+        path->limit.block = KF_TOO_FAR;
+        path->limit.crosses = false;
+    }
+    if (end == NULL) {
+        *limit = path->limit;
+    } else if (end->bridge < 0) {
+        end->found.iterations = path->iterations;
+        if (path->margin < KF_NEAR) {
+            end->status = KF_NEAR_SINGULAR;
+            end->has_base = true;
+            memcpy(end->base_u, KF_POSE_U(regular), sizeof end->base_u);
+            memcpy(end->base_z, regular->found.x, KF_UNKNOWNS * sizeof(double));
+            end->base_bridge = regular->bridge;
+            end->map = regular->map;
+            end->low = regular->low;
+            end->high = regular->high;
+        }
+    }
+    return end;
 }
 
 /* Return the same pose with another singularity map. */
@@ -45,6 +117,77 @@ static kf_pose *with_map(kf_solver *solver, const kf_pose *pose, int map, kf_pos
     return place;
 }
 
+/* Go on at the far side of a bridge ahead, or end on it; return false where there is none and a step is needed. */
+static bool goes_over_a_bridge(kf_solver *solver, const kf_pose *start, kf_path *path)
+{
+    kf_pose *const pose = path->pose, *const place = kf_path_spare(path);
+    const double target = path->target[KF_ALONG(solver)];
+    kf_keep_maps(solver, start->map, pose->map, path->regular->map);
+    if (!(pose->low <= target && target <= pose->high)) {
+        const int map = pose->map;
+        const int bridge = pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, map, KF_HERE(solver, pose), target);
+        if (!kf_covers(&KF_POOL(solver)->bridges[bridge], target)) {
+            kf_bridge_exit(solver, bridge, target, place);
+            path->pose = with_map(solver, place, map, place);
+            return true;
+        }
+        path->is_ended = true;
+        if (kf_bridge_pose(solver, bridge, path->target, place)) {
+            kf_around(solver, map, target, &place->low, &place->high);
+            place->map = map;
+            path->end = place;
+        } else { /* a block not interpolated ends there */
+            memcpy(path->limit.u, KF_POSE_U(pose), sizeof path->limit.u);
+            path->limit.block = KF_NO_BLOCK;
+            path->limit.crosses = false;
+        }
+        return true;
+    }
+    path->distance = target - KF_HERE(solver, pose);
+    if (path->distance == 0.0) { /* a node, or a step that ended there by rounding */
+        path->end = pose;
+        path->margin = pose->found.margin;
+        path->is_ended = true;
+    }
+    return path->is_ended;
+}
+
+/* Go one step along the path, or over a bridge; or try a shorter step, or find a singular point. */
+static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
+{
+    const bool one = KF_IS_FOLLOWED;
+    kf_pose *pose, *trial;
+    const double *u;
+    double s;
+    if (one && goes_over_a_bridge(solver, start, path)) {
+        return;
+    }
+    pose = path->pose;
+    trial = kf_path_spare(path);
+    u = kf_path_ahead(path, &s);
+    if (kf_trusted_step(solver, pose, path->direction, s, u, trial)) {
+        path->iterations += trial->found.iterations;
+        if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR)
+            || kf_keeps_branch(solver, pose, trial, path->direction, s)) {
+            if (one && trial->found.margin < KF_REGULAR) {
+                const int map = kf_surveyed(solver, pose, trial);
+                if (map != trial->map) {
+                    path->pose = with_map(solver, pose, map, trial);
+                    return;
+                }
+            }
+            kf_path_accept(path, trial, s, trial->found.margin);
+            return;
+        }
+    }
+    if (kf_path_shorten(path, s)) {
+        if (!path->is_limited) {
+            kf_limit_beyond(solver, path->before, pose, path->direction, &path->limit);
+        }
+        kf_path_limit(path, s);
+    }
+}
+
 /* Follow the branch in a straight line of the driver values.
  *
  * Each step predicts with velocity and acceleration (the prediction decides the branch), corrects by Newton on the
@@ -56,93 +199,14 @@ static kf_pose *with_map(kf_solver *solver, const kf_pose *pose, int map, kf_pos
  */
 kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const double *target, kf_limit *limit)
 {
-    const bool one = KF_IS_FOLLOWED;
-    const double longest = one ? KF_LONGEST_STEP * kf_reach[KF_ALONG(solver)] : KF_LONGEST_STEP;
-    kf_pose *pose = start, *before = start, *regular = start, *trial;
-    double direction[KF_DRIVERS], u[KF_DRIVERS], distance, step = longest;
-    int iterations = 0, turn, k;
-    bool is_limited = false;
-    memcpy(direction, KF_SPEEDS(&solver->model), sizeof direction);
-    distance = one ? target[KF_ALONG(solver)] - KF_HERE(solver, start) : kf_straight_path(KF_POSE_U(start), target, direction);
-    memcpy(limit->u, KF_POSE_U(start), sizeof limit->u);
-    limit->block = KF_TOO_FAR;
-    limit->crosses = false;
-    if (fabs(distance) > KF_MOST_STEPS * longest) {
-        return NULL;
-    }
+    kf_path path;
+    int k;
+    kf_path_init(&path, start, target, KF_IS_FOLLOWED ? KF_ALONG(solver) : -1, solver->scratch.poses);
     if (map != start->map) {
-        pose = with_map(solver, start, map, solver->scratch.poses);
+        path.pose = with_map(solver, start, map, solver->scratch.poses);
     }
-    for (turn = 0; turn < KF_MOST_STEPS; ++turn) {
-        bool whole;
-        double s;
-        trial = spare(solver, pose, before, regular);
-        if (one) {
-            kf_keep_maps(solver, start->map, pose->map, regular->map);
-            map = pose->map;
-            if (!(pose->low <= target[KF_ALONG(solver)] && target[KF_ALONG(solver)] <= pose->high)) {
-                const int bridge =
-                    pose->bridge >= 0 ? pose->bridge : kf_next_bridge(solver, map, KF_HERE(solver, pose), target[KF_ALONG(solver)]);
-                if (kf_covers(&KF_POOL(solver)->bridges[bridge], target[KF_ALONG(solver)])) {
-                    if (!kf_bridge_pose(solver, bridge, target, trial)) { /* a block not interpolated ends there */
-                        memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
-                        limit->block = KF_NO_BLOCK;
-                        return NULL;
-                    }
-                    kf_around(solver, map, target[KF_ALONG(solver)], &trial->low, &trial->high);
-                    trial->map = map;
-                    return trial;
-                }
-                kf_bridge_exit(solver, bridge, target[KF_ALONG(solver)], trial);
-                pose = with_map(solver, trial, map, trial);
-                continue;
-            }
-            distance = target[KF_ALONG(solver)] - KF_HERE(solver, pose);
-            if (distance == 0.0) { /* a node, or a step that ended there by rounding */
-                return arrived(pose, regular, iterations);
-            }
-        }
-        whole = -step <= distance && distance <= step;
-        s = whole ? distance : distance > 0.0 ? step : -step;
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            u[k] = whole ? target[k] : KF_POSE_U(pose)[k] + s * direction[k];
-        }
-        if (kf_trusted_step(solver, pose, direction, s, u, trial)) {
-            iterations += trial->found.iterations;
-            if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR)
-                || kf_keeps_branch(solver, pose, trial, direction, s)) {
-                if (trial->found.margin < KF_REGULAR && one) {
-                    map = kf_surveyed(solver, pose, trial);
-                    if (map != trial->map) {
-                        pose = with_map(solver, pose, map, trial);
-                        continue;
-                    }
-                }
-                if (whole) {
-                    return arrived(trial, regular, iterations);
-                }
-                before = pose;
-                pose = trial;
-                if (pose->found.margin >= KF_NEAR) {
-                    regular = pose;
-                }
-                distance -= s;
-                step = fmin(2.0 * step, longest);
-                continue;
-            }
-        }
-        step = 0.5 * fabs(s);
-        if (step < KF_SHORTEST_STEP * longest) {
-            if (!is_limited) {
-                kf_limit_beyond(solver, before, pose, direction, limit);
-                is_limited = true;
-            }
-            if (step < KF_GIVE_UP * longest || kf_is_beyond(target, limit->u, direction, s)) {
-                return NULL;
-            }
-        }
+    for (k = 0; k < path.most_steps && !path.is_ended; ++k) {
+        step(solver, start, &path);
     }
-    memcpy(limit->u, KF_POSE_U(pose), sizeof limit->u);
-    limit->block = KF_TOO_FAR;
-    return NULL;
+    return kf_path_terminate(&path, limit);
 }

@@ -113,7 +113,47 @@ void kf_limit_beyond(kf_solver *solver, const kf_pose *before, kf_pose *pose, co
 bool kf_is_beyond(const double *target, const double *limit, const double *direction, double s);
 void kf_append_limit(char *message, const kf_limit *limit, const double *target, int driver);
 
-/* advance.c */
+/* advance.c
+ *
+ * A straight path of the driver values, as far as it has been followed in trusted steps. pose: the last trusted one,
+ * before: the one before it, regular: the last one away from singular points; places: of four poses; distance: what is
+ * left to the target; length: of the next step; most_steps: 0 where the target is too far; iterations: of Newton, of all
+ * steps; end: the pose at the target, NULL where the path ends at the limit before it.
+ */
+typedef struct {
+    kf_pose *places, *pose, *before, *regular, *end;
+    const double *target;
+    double direction[KF_DRIVERS], u[KF_DRIVERS];
+    double distance, length, longest, margin;
+    int most_steps, iterations;
+    bool is_limited, is_ended;
+    kf_limit limit;
+} kf_path;
+
+/* Start a path along one driver, or along all if it is below 0. */
+void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places);
+
+/* Return a place for one more pose that holds none of those needed. */
+kf_pose *kf_path_spare(const kf_path *path);
+
+/* Find the next step; return the driver values at its end, which are the target in the last one. */
+const double *kf_path_ahead(kf_path *path, double *s);
+
+/* Go on from a trusted pose with longer steps, or end there if it is at the target. */
+void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margin);
+
+/* Go on with shorter steps; return whether they are so short that the path's limit is needed. */
+bool kf_path_shorten(kf_path *path, double s);
+
+/* End at the limit if no step is left or if the target lies beyond it. */
+void kf_path_limit(kf_path *path, double s);
+
+/* Return the pose at the target, with the iterations of the whole path, or NULL and the limit before it.
+ *
+ * A dead centre has no tangent that the next path could start with: that starts from the last regular pose.
+ */
+kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit);
+
 KF_RARE kf_pose *kf_advance(kf_solver *solver, kf_pose *start, int map, const double *target, kf_limit *limit);
 
 /* trusted_step.c */
@@ -150,7 +190,7 @@ const bool *kf_rates_in_time(const kf_model *model, kf_pose *pose, const double 
 
 /* mixed.c */
 #if KF_MIXES
-KF_RARE kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
+KF_RARE kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *pose);
 #endif
 
 /* worst_case_step.c */

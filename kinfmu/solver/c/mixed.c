@@ -1,6 +1,4 @@
-/* Mixed: blocks that depend on several drivers, where others depend on one. See Solver._followed in
- * kinfmu/solver/python/solver.py.
- */
+/* Mixed: blocks that depend on several drivers, where others depend on one. See kinfmu/solver/python/mixed.py. */
 #include "internal.h"
 
 #if KF_MIXES
@@ -69,35 +67,17 @@ static void mixed_limit(kf_solver *solver, const kf_pose *before, kf_pose *pose,
     kf_leave_track(solver);
 }
 
-static kf_status ended(kf_solver *solver, const kf_limit *limit, const double *target, kf_pose *pose)
-{
-    solver->message[0] = '\0';
-    kf_append_limit(solver->message, limit, target, -1);
-    return kf_failed(pose, KF_OUTSIDE);
-}
-
-/* Return a place for one more pose that holds none of those needed. */
-static kf_pose *spare(kf_solver *solver, const kf_pose *pose, const kf_pose *before, const kf_pose *regular)
-{
-    kf_pose *place = solver->scratch.whole;
-    while (place == pose || place == before || place == regular) {
-        ++place;
-    }
-    return place;
-}
-
 /* Find the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
  *
  * The path is straight, as in kf_advance, but at each step the tracks are solved first, and the other blocks are
  * predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
  */
-kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *target, kf_pose *found)
+kf_status kf_advance_mixed(kf_solver *solver, kf_pose *start, const double *target, kf_pose *found)
 {
-    kf_pose *pose = start, *before, *regular;
-    double direction[KF_DRIVERS], u[KF_DRIVERS], distance, step = KF_LONGEST_STEP;
+    kf_pose *pose = start;
+    kf_path path;
     kf_limit limit;
-    int iterations = 0, turn, k;
-    bool is_limited = false;
+    int turn, k;
     for (k = 0; k < KF_DRIVERS; ++k) {
         solver->scratch.origin[k] = start->has_tracks ? start->own[k].map : -1;
     }
@@ -107,63 +87,33 @@ kf_status kf_followed_all(kf_solver *solver, kf_pose *start, const double *targe
             return kf_failed(found, pose->status);
         }
     }
-    before = regular = pose;
-    distance = kf_straight_path(KF_POSE_U(pose), target, direction);
-    memcpy(limit.u, KF_POSE_U(pose), sizeof limit.u);
-    limit.block = KF_TOO_FAR;
-    limit.crosses = false;
-    if (distance > KF_MOST_STEPS * KF_LONGEST_STEP) {
-        return ended(solver, &limit, target, found);
-    }
-    for (turn = 0; turn < KF_MOST_STEPS; ++turn) {
-        const bool whole = distance <= step;
-        const double s = whole ? distance : step;
-        kf_pose *const trial = spare(solver, pose, before, regular);
-        const double *const at = whole ? target : u;
-        for (k = 0; k < KF_DRIVERS; ++k) {
-            u[k] = KF_POSE_U(pose)[k] + s * direction[k];
-        }
-        if ((!(whole && pose == start) && kf_is_near(solver, pose, at, trial))
-            || mixed_step(solver, pose, at, target, trial)) {
-            double margin;
+    kf_path_init(&path, pose, target, -1, solver->scratch.whole);
+    for (turn = 0; turn < path.most_steps && !path.is_ended; ++turn) {
+        double s;
+        const double *const u = kf_path_ahead(&path, &s);
+        kf_pose *const trial = kf_path_spare(&path);
+        if ((!(u == target && path.pose == start) && kf_is_near(solver, path.pose, u, trial))
+            || mixed_step(solver, path.pose, u, target, trial)) {
             if (!KF_GOOD(trial->status)) {
                 return kf_failed(found, trial->status);
             }
-            iterations += trial->found.iterations;
-            margin = share_of(trial, &solver->scratch.share[0])->found.margin;
-            if (whole) {
-                trial->found.iterations = iterations;
-                if (margin < KF_NEAR) {
-                    trial->status = KF_NEAR_SINGULAR;
-                    trial->has_base = true;
-                    memcpy(trial->base_u, KF_POSE_U(regular), sizeof trial->base_u);
-                    memcpy(trial->base_z, regular->found.x, sizeof trial->base_z);
-                }
-                *found = *trial;
-                return found->status;
+            path.iterations += trial->found.iterations;
+            kf_path_accept(&path, trial, s, share_of(trial, solver->scratch.share)->found.margin);
+        } else if (kf_path_shorten(&path, s)) {
+            if (!path.is_limited) {
+                mixed_limit(solver, path.before, path.pose, path.direction, &path.limit);
             }
-            before = pose;
-            pose = trial;
-            regular = margin >= KF_NEAR ? pose : regular;
-            distance -= s;
-            step = fmin(2.0 * step, KF_LONGEST_STEP);
-            continue;
-        }
-        step = 0.5 * s;
-        if (step < KF_SHORTEST_STEP * KF_LONGEST_STEP) {
-            if (!is_limited) {
-                mixed_limit(solver, before, pose, direction, &limit);
-                is_limited = true;
-            }
-            if (step < KF_GIVE_UP * KF_LONGEST_STEP || kf_is_beyond(target, limit.u, direction, s)) {
-                return ended(solver, &limit, target, found);
-            }
+            kf_path_limit(&path, s);
         }
     }
-    memcpy(limit.u, KF_POSE_U(pose), sizeof limit.u);
-    limit.block = KF_TOO_FAR;
-    limit.crosses = false;
-    return ended(solver, &limit, target, found);
+    pose = kf_path_terminate(&path, &limit);
+    if (pose == NULL) {
+        solver->message[0] = '\0';
+        kf_append_limit(solver->message, &limit, target, -1);
+        return kf_failed(found, KF_OUTSIDE);
+    }
+    *found = *pose;
+    return found->status;
 }
 
 #endif

@@ -227,7 +227,7 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
             return kf_failed(pose, KF_OUTSIDE);
         }
     }
-    status = kf_followed_all(solver, start, u, pose);
+    status = kf_advance_mixed(solver, start, u, pose);
 #else
     status = kf_assembled(solver, start, u, u, start->found.x, pose);
 #endif

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .bridge import Bridge
 from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond
 from .pose import ALONE, Model, Pose, Vector, with_map
@@ -15,6 +17,87 @@ SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near
 NEAR_SINGULAR = 0.0125  # determinant below which qdd keeps less than nine digits
 CLOSE = 0.1  # determinant below which branches may lie as close as a correction
 GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
+
+
+class Path:
+    """A straight path of the driver values, as far as it has been followed in trusted steps.
+
+    pose: the last trusted one, before: the one before it, regular: the last one away from singular points; distance:
+    what is left to the target; length: of the next step; most_steps: 0 where the target is too far; iterations: of
+    Newton, of all steps; end: the pose at the target or the limit before it, None while the path goes on.
+    """
+
+    __slots__ = (
+        "before",
+        "direction",
+        "distance",
+        "end",
+        "iterations",
+        "length",
+        "limit",
+        "longest",
+        "margin",
+        "most_steps",
+        "pose",
+        "regular",
+        "target",
+    )
+
+    def __init__(self, model: Model, start: Pose, target: Vector) -> None:
+        self.target = target
+        self.pose = self.before = self.regular = start
+        self.margin = start.margin
+        if len(target) == 1:
+            self.direction, self.distance = ALONE, target[0] - start.u[0]
+            self.longest: float = LONGEST_STEP * model.REACH[0]
+        else:
+            self.direction, self.distance = straight_path(model, start.u, target)
+            self.longest = LONGEST_STEP
+        self.length = self.longest
+        self.most_steps = 0 if abs(self.distance) > MOST_STEPS * self.longest else MOST_STEPS
+        self.iterations = 0
+        self.limit: Limit | None = None
+        self.end: Pose | Limit | None = None
+
+    def ahead(self) -> tuple[float, Vector]:
+        """Return the next step and the driver values at its end, which are the target's to the bit in the last one."""
+        if -self.length <= self.distance <= self.length:
+            return self.distance, self.target
+        s = self.length if self.distance > 0.0 else -self.length
+        return s, tuple([a + s * d for a, d in zip(self.pose.u, self.direction)])  # noqa: B905  one a driver, both
+
+    def accept(self, trial: Pose, s: float, margin: float) -> None:
+        """Go on from a trusted pose with longer steps, or end there if it is at the target."""
+        self.margin = margin
+        if s == self.distance:
+            self.end = trial
+            return
+        self.before, self.pose = self.pose, trial
+        if margin >= NEAR_SINGULAR:
+            self.regular = trial
+        self.distance -= s
+        self.length = min(2.0 * self.length, self.longest)
+
+    def shorten(self, s: float, limit_here: Callable[[], Limit]) -> None:
+        """Go on with shorter steps; end at the limit if no step is left or if the target lies beyond it."""
+        self.length = 0.5 * abs(s)
+        if self.length < SHORTEST_STEP * self.longest:
+            self.limit = self.limit or limit_here()
+            if self.length < GIVE_UP * self.longest or is_beyond(self.target, self.limit.u, self.direction, s):
+                self.end = self.limit
+
+    def terminate(self) -> Pose | Limit:
+        """Return the pose at the target, with the iterations of the whole path, or the limit before it.
+
+        A dead centre has no tangent that the next path could start with: that starts from the last regular pose.
+        """
+        end = Limit(self.pose.u, TOO_FAR) if self.end is None else self.end
+        if isinstance(end, Pose) and end.bridge is None:
+            end.iterations = self.iterations
+            if self.margin < NEAR_SINGULAR:
+                end.status = Status.NEAR_SINGULAR
+                end.base = self.regular
+        return end
 
 
 def advance(model: Model, start: Pose, target: Vector, singularities: SingularityMap | None = None) -> Pose | Limit:
@@ -34,69 +117,57 @@ def advance(model: Model, start: Pose, target: Vector, singularities: Singularit
         The pose at the target, or the limit of the path before it.
 
     """
-    one = len(target) == 1
-    direction, distance = (ALONE, 0.0) if one else straight_path(model, start.u, target)
-    longest: float = LONGEST_STEP * model.REACH[0] if one else LONGEST_STEP
-    pose = start if singularities is None or singularities is start.singularities else with_map(start, singularities)
-    step, iterations = longest, 0
-    before, regular, limit = start, start, None
-    if abs(target[0] - start.u[0] if one else distance) > MOST_STEPS * longest:
-        return Limit(start.u, TOO_FAR)
-    for _ in range(MOST_STEPS):
-        if one:
-            singularities = pose.singularities
-            if singularities is not None and not singularities.low <= target[0] <= singularities.high:
-                bridge: Bridge = pose.bridge or singularities.next_bridge(pose.u[0], target[0])
-                if bridge.covers(target[0]):
-                    try:
-                        inside = bridge.pose(target)
-                    except (ArithmeticError, ValueError):  # a block that is not interpolated ends there
-                        return Limit(pose.u, NO_BLOCK)
-                    inside.singularities = singularities if pose.bridge is bridge else singularities.around(target[0])
-                    return inside
-                pose = bridge.exit(target[0])
-                pose = with_map(pose, singularities.around(pose.u[0]))
-                continue
-            distance = target[0] - pose.u[0]
-            if distance == 0.0:  # a node, or a step that ended there by rounding
-                return _arrived(pose, regular, iterations)
-        whole = -step <= distance <= step
-        s = distance if whole else step if distance > 0.0 else -step
-        u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction)])  # noqa: B905
-        trial = trusted_step(model, pose, direction, s, u)
-        if trial is not None:
-            iterations += trial.iterations
-            if trial.margin < (CLOSE if one else REGULAR) and not keeps_branch(model, pose, trial, direction, s):
-                trial = None
-        if trial is not None:
-            if trial.margin < REGULAR and one:
+    path = Path(model, start, target)
+    if singularities is not None and singularities is not start.singularities:
+        path.pose = with_map(start, singularities)
+    for _ in range(path.most_steps):
+        _step(model, path)
+        if path.end is not None:
+            break
+    return path.terminate()
+
+
+def _step(model: Model, path: Path) -> None:
+    """Go one step along the path, or over a bridge; or try a shorter step, or find a singular point."""
+    one = len(path.target) == 1
+    if one and _goes_over_a_bridge(path):
+        return
+    pose, direction = path.pose, path.direction
+    s, u = path.ahead()
+    trial = trusted_step(model, pose, direction, s, u)
+    if trial is not None:
+        path.iterations += trial.iterations
+        if trial.margin >= (CLOSE if one else REGULAR) or keeps_branch(model, pose, trial, direction, s):
+            if one and trial.margin < REGULAR:
                 singularities = surveyed(model, pose, trial)
                 if singularities is not trial.singularities:
-                    pose = with_map(pose, singularities)
-                    continue
-            if whole:
-                return _arrived(trial, regular, iterations)
-            before, pose = pose, trial
-            if pose.margin >= NEAR_SINGULAR:
-                regular = pose
-            distance -= s
-            step = min(2.0 * step, longest)
-            continue
-        step = 0.5 * abs(s)
-        if step < SHORTEST_STEP * longest:
-            limit = limit or limit_beyond(model, before, pose, direction)
-            if step < GIVE_UP * longest or is_beyond(target, limit.u, direction, s):
-                return limit
-    return Limit(pose.u, TOO_FAR)
+                    path.pose = with_map(pose, singularities)
+                    return
+            path.accept(trial, s, trial.margin)
+            return
+    path.shorten(s, lambda: limit_beyond(model, path.before, pose, direction))
 
 
-def _arrived(pose: Pose, regular: Pose, iterations: int) -> Pose:
-    """Return the pose at the end of a path, with the iterations of the whole path.
-
-    A dead centre has no tangent that the next path could start with: that starts from the last regular pose.
-    """
-    pose.iterations = iterations
-    if pose.margin < NEAR_SINGULAR:
-        pose.status = Status.NEAR_SINGULAR
-        pose.base = regular
-    return pose
+def _goes_over_a_bridge(path: Path) -> bool:
+    """Go on at the far side of a bridge ahead, or end on it; return False where there is none and a step is needed."""
+    pose, target = path.pose, path.target
+    singularities = pose.singularities
+    if singularities is not None and not singularities.low <= target[0] <= singularities.high:
+        bridge: Bridge = pose.bridge or singularities.next_bridge(pose.u[0], target[0])
+        if not bridge.covers(target[0]):
+            pose = bridge.exit(target[0])
+            path.pose = with_map(pose, singularities.around(pose.u[0]))
+            return True
+        try:
+            inside = bridge.pose(target)
+        except (ArithmeticError, ValueError):  # a block that is not interpolated ends there
+            path.end = Limit(pose.u, NO_BLOCK)
+            return True
+        inside.singularities = singularities if pose.bridge is bridge else singularities.around(target[0])
+        path.end = inside
+        return True
+    path.distance = target[0] - pose.u[0]
+    if path.distance == 0.0:  # a node, or a step that ended there by rounding
+        path.end, path.margin = pose, pose.margin
+        return True
+    return False

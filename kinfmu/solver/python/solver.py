@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf, isfinite
 from typing import Any
 
-from .advance import CLOSE, GIVE_UP, NEAR_SINGULAR, SHORTEST_STEP, advance
+from .advance import CLOSE, NEAR_SINGULAR, advance
 from .estimate import estimated_errors, margin_of, with_driver_errors
-from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond, limit_message
+from .limit import Limit, limit_message
 from .message import place
+from .mixed import advance_mixed
 from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
 from .singularity_map import restored_map
 from .span import REGULAR
 from .status import Status
 from .survey import surveyed
-from .tracks import MIXED, Track, on_track, rates_in_time, tracks_of
-from .trusted_step import BENT, LONGEST_STEP, keeps_branch, straight_path, trusted_step
+from .tracks import MIXED, Track, Tracks, on_track, rates_in_time, tracks_of
+from .trusted_step import LONGEST_STEP, keeps_branch, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
@@ -37,15 +39,17 @@ class Solver:
         self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
         self._one = len(u) == 1
         tracks = () if self._one else tracks_of(model, u, self.anchor.z)
-        self._tracks = tuple([None if track is None else _solver_of(track, self.anchor) for track in tracks])
-        mixes = any(self._tracks) and MIXED in model.BLOCK_DRIVERS
-        self._mixed: Any = Track(model, MIXED, u, self.anchor.z) if mixes else None
+        self._tracks: Tracks | None = None
+        if tracks:  # the tolerance applies to the whole pose only
+            solvers = [None if one is None else Solver(one, inf, on_track(one, self.anchor)) for one in tracks]
+            mixed = Track(model, MIXED, u, self.anchor.z) if MIXED in model.BLOCK_DRIVERS else None
+            self._tracks = Tracks(model, tolerance, solvers, mixed)
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """Return the pose at driver values u, followed from a good pose in a straight line of the driver values."""
-        if self._tracks:
-            return self._by_tracks(start, u)
+        if self._tracks is not None:
+            return self._by_tracks(self._tracks, start, u)
         if start.base is not None and u != start.u:
             start = start.base
         if u == start.u:
@@ -64,163 +68,35 @@ class Solver:
                         singularities = surveyed(self.model, start, near)
                         if singularities is start.singularities:  # nothing new there
                             return near
-        if not isfinite(sum(u)):
-            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
-        if any(u[driver] < 0.0 for driver, *_ in self.model.DISTANCES):
-            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
+        refused = self._refused(start, u, self.model.DISTANCES)
+        if refused is not None:
+            return refused
         pose = advance(self.model, start, u, singularities)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
         return self._checked(pose)
 
-    def _by_tracks(self, start: Pose, u: Vector) -> Pose:
+    def _by_tracks(self, tracks: Tracks, start: Pose, u: Vector) -> Pose:
         """Return the pose that consists of the poses of the tracks, each followed along its own driver."""
         if u == start.u and (start.tracks or start.singularities):
             return start
-        near = self._near(start, u)  # most samples: one trusted step of all drivers
+        mixed = tracks.mixed
+        near = tracks.near(start, u)  # most samples: one trusted step of all drivers
         if near is not None:
             return near
-        if not isfinite(sum(u)):
-            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
-        if self._mixed is not None and any(u[driver] < 0.0 for driver, *_ in self._mixed.DISTANCES):
-            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
-        pose = self._assembled(start, u, u, start.z) if self._mixed is None else self._followed(start, u)
+        refused = self._refused(start, u, mixed.DISTANCES if mixed is not None else ())
+        if refused is not None:
+            return refused
+        pose = tracks.assembled(start, u, u, start.z) if mixed is None else advance_mixed(tracks, mixed, start, u)
         return self._checked(pose) if pose.good else pose
 
-    def _assembled(self, start: Pose, u: Vector, target: Vector, z: Vector) -> Pose:
-        """Return the pose of the tracks at u, on the path from `start` to `target`; all other blocks are as in z."""
-        known = {track.driver: own for track, own in start.tracks}
-        parts = []
-        for k, solver in enumerate(self._tracks):
-            if solver is None:
-                continue
-            before = known.get(k) or on_track(solver.model, start)
-            own = solver.solve(before, (u[k],))
-            if not own.good and u is not target:  # the message names the target
-                beyond = solver.solve(before, (target[k],))
-                own = own if beyond.good else beyond
-            if not own.good:
-                return failed(start, target, Status(own.status), own.message)
-            z = solver.model.put(own.z, z)
-            parts.append((solver.model, own))
-        try:
-            pose = Pose(u, evaluated(self.model, u, z))
-        except (ArithmeticError, ValueError):  # an assigned coordinate has no value there
-            return failed(start, target, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), target))
-        pose.tracks = tuple(parts)
-        maps = {track.driver: own.singularities for track, own in parts}
-        pose.singularities = tuple([maps.get(k) for k in range(len(u))])
-        pose.iterations = sum([own.iterations for _, own in parts])
-        statuses = [own.status for _, own in parts]
-        if Status.NEAR_SINGULAR in statuses:
-            pose.status = Status.NEAR_SINGULAR
-        elif Status.BRIDGED in statuses:
-            pose.status = Status.BRIDGED
-        return pose
-
-    def _followed(self, start: Pose, target: Vector) -> Pose:
-        """Return the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
-
-        The path is straight, as in `advance`, but at each step the tracks are solved first, and the other blocks are
-        predicted along the chord of the tracks: they need no rates of the tracks, which may be singular.
-        """
-        model, pose = self.model, start
-        if start.base is not None:
-            pose = self._assembled(start, start.base.u, start.base.u, start.base.z)
-            if not pose.good:
-                return failed(start, target, Status(pose.status), pose.message)
-        direction, distance = straight_path(model, pose.u, target)
-        if distance > MOST_STEPS * LONGEST_STEP:
-            return failed(start, target, Status.OUTSIDE, limit_message(model, Limit(pose.u, TOO_FAR), target))
-        before, regular, limit = pose, pose, None
-        step, iterations = LONGEST_STEP, 0
-        for _ in range(MOST_STEPS):
-            whole = distance <= step
-            s = distance if whole else step
-            u = target if whole else tuple([a + s * d for a, d in zip(pose.u, direction, strict=True)])
-            trial = None if whole and pose is start else self._near(pose, u)
-            if trial is None:
-                trial = self._mixed_step(pose, u, target)
-            if trial is not None:
-                if not trial.good:
-                    return failed(start, target, Status(trial.status), trial.message)
-                iterations += trial.iterations
-                margin = min([abs(trial.determinants[k]) for k in self._mixed.blocks])
-                if whole:
-                    trial.iterations = iterations
-                    if margin < NEAR_SINGULAR:
-                        trial.status = Status.NEAR_SINGULAR
-                        trial.base = regular
-                    return trial
-                before, pose = pose, trial
-                if margin >= NEAR_SINGULAR:
-                    regular = pose
-                distance -= s
-                step = min(2.0 * step, LONGEST_STEP)
-                continue
-            step = 0.5 * s
-            if step < SHORTEST_STEP * LONGEST_STEP:
-                limit = limit or self._mixed_limit(before, pose, direction)
-                if step < GIVE_UP * LONGEST_STEP or is_beyond(target, limit.u, direction, s):
-                    break
-        else:
-            limit = Limit(pose.u, TOO_FAR)
-        return failed(start, target, Status.OUTSIDE, limit_message(self._mixed, limit, target))
-
-    def _mixed_step(self, pose: Pose, u: Vector, target: Vector) -> Pose | None:
-        """Return one step of all blocks, or a failed pose if the tracks end before it.
-
-        None if the blocks that depend on several drivers cannot be trusted to stay on their branch.
-        """
-        there = self._assembled(pose, u, target, pose.z)
-        if not there.good:
-            return there
-        model, chord = self.model, tuple([b - a for a, b in zip(pose.z, there.z, strict=True)])
-        if max([abs(a) / scale for a, scale in zip(chord, model.UNKNOWN_SCALES, strict=True)]) > BENT:
-            return None
-        mixed = self._mixed.with_rest(there.z, chord)
-        path = tuple([b - a for a, b in zip(pose.u, u, strict=True)])
-        start = on_track(mixed, pose)
-        trial = trusted_step(mixed, start, path, 1.0, u)
-        if trial is None or (trial.margin < REGULAR and not keeps_branch(mixed, start, trial, path, 1.0)):
-            return None
-        tracks, singularities, status, iterations = there.tracks, there.singularities, there.status, there.iterations
-        there = Pose(u, evaluated(model, u, mixed.put(trial.z, there.z)), singularities)
-        there.tracks, there.status, there.iterations = tracks, status, iterations + trial.iterations
-        return there
-
-    def _mixed_limit(self, before: Pose, pose: Pose, direction: Vector) -> Limit:
-        """Return where the path of the blocks that depend on several drivers ends, just beyond a pose."""
-        slopes, _ = rates_in_time(self.model, pose, direction, (0.0,) * len(direction))
-        mixed = self._mixed.with_rest(pose.z, slopes)
-        return limit_beyond(mixed, on_track(mixed, before), on_track(mixed, pose), direction)
-
-    def _near(self, start: Pose, u: Vector) -> Pose | None:
-        """Return the pose one trusted step away, or None if a track is near a singular point there."""
-        if start.status or start.base is not None or not self._is_apart(start):
-            return None
-        direction, distance = straight_path(self.model, start.u, u)
-        if not 0.0 < distance <= LONGEST_STEP:
-            return None
-        if start.singularities is not None:
-            for singularities, value in zip(start.singularities, u, strict=True):
-                if singularities is not None and not singularities.low <= value <= singularities.high:
-                    return None
-        near = trusted_step(self.model, start, direction, distance, u)
-        if near is None or not self._is_apart(near) or not near.watch <= self.tolerance >= near.residual:
-            return None
-        if near.margin < REGULAR and not keeps_branch(self.model, start, near, direction, distance):
-            return None
-        near.singularities = start.singularities or (None,) * len(u)
-        return near
-
-    def _is_apart(self, pose: Pose) -> bool:
-        """Return whether the blocks of all tracks are regular, and the others not near singular."""
-        margin: float = pose.margin
-        if margin >= REGULAR or self._mixed is None:
-            return margin >= REGULAR
-        of_tracks = [abs(pose.determinants[k]) for k, by in enumerate(self.model.BLOCK_DRIVERS) if by != MIXED]
-        return margin >= NEAR_SINGULAR and min(of_tracks) >= REGULAR
+    def _refused(self, start: Pose, u: Vector, distances: Sequence[Sequence[Any]]) -> Pose | None:
+        """Return a failed pose at driver values that no mechanism has: not finite, or a distance below 0."""
+        if not isfinite(sum(u)):
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
+        if any(u[driver] < 0.0 for driver, *_ in distances):
+            return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
+        return None
 
     def _again(self, start: Pose) -> Pose:
         """Return the pose at the driver values of `start`: `start` itself, or its checked copy if it is the anchor."""
@@ -325,11 +201,8 @@ class Solver:
 
     def dump(self, pose: Pose) -> list[Any]:
         """Return a pose as plain numbers; `restore` gives one that behaves the same to the bit."""
-        if self._tracks:
-            maps = pose.singularities and [None if one is None else one.dump() for one in pose.singularities]
-            parts = [self._tracks[track.driver].dump(own) for track, own in pose.tracks]
-            base = None if pose.base is None else [list(pose.base.u), list(pose.base.z)]
-            return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, maps, parts, base]
+        if self._tracks is not None:
+            return self._tracks.dump(pose)
         known = None if pose.singularities is None else pose.singularities.dump()
         number = -1 if pose.bridge is None else pose.singularities.bridges.index(pose.bridge)
         base = None if pose.base is None else self.dump(pose.base)
@@ -337,8 +210,8 @@ class Solver:
 
     def restore(self, data: list[Any]) -> Pose:
         """Return the pose that `dump` gave as plain numbers."""
-        if self._tracks:
-            return self._restored(*data)
+        if self._tracks is not None:
+            return self._tracks.restore(data)
         u, z, iterations, status, message, known, number, base = data
         singularities = None if known is None else restored_map(self.model, known)
         if singularities is not None and number >= 0:
@@ -349,38 +222,3 @@ class Solver:
         pose.iterations, pose.status, pose.message = iterations, status, message
         pose.base = None if base is None else self.restore(base)
         return pose
-
-    def _restored(
-        self,
-        u: list[float],
-        z: list[float],
-        iterations: int,
-        status: int,
-        message: str,
-        maps: Any,
-        parts: list[Any],
-        base: list[list[float]] | None,
-    ) -> Pose:
-        """Return the same of a pose that consists of tracks."""
-        pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
-        pose.iterations, pose.status, pose.message = iterations, status, message
-        if base is not None:
-            there, unknowns = map(tuple, base)
-            pose.base = Pose(there, evaluated(self.model, there, unknowns))
-        solvers = [solver for solver in self._tracks if solver is not None]
-        if parts:
-            pose.tracks = tuple([(s.model, s.restore(own)) for s, own in zip(solvers, parts, strict=True)])
-        if maps is not None:
-            models = [None if solver is None else solver.model for solver in self._tracks]
-            pose.singularities = tuple(
-                [
-                    None if data is None else restored_map(model, data).around(value)
-                    for model, data, value in zip(models, maps, u, strict=True)
-                ]
-            )
-        return pose
-
-
-def _solver_of(track: Track, anchor: Pose) -> Solver:
-    """Return a solver of a track alone; the tolerance applies to the whole pose only."""
-    return Solver(track, inf, on_track(track, anchor))

@@ -11,10 +11,16 @@ from collections.abc import Sequence
 from copy import copy
 from itertools import pairwise
 from math import inf, sqrt
-from typing import Any
+from typing import Any, Protocol
 
+from .advance import NEAR_SINGULAR
+from .limit import NO_BLOCK, Limit, limit_message
 from .linear import Matrix
-from .pose import Found, Model, Pose, Vector, evaluated, tangent_of
+from .pose import Found, Model, Pose, Vector, evaluated, failed, tangent_of
+from .singularity_map import restored_map
+from .span import REGULAR
+from .status import Status
+from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 MIXED = -1  # in place of a block's driver: it depends on several
 
@@ -150,6 +156,124 @@ class Track:
         """Return the same as a model's `residuals`."""
         every = self._model.residuals(values)
         return [every[k] for k in self.blocks]
+
+
+class TrackSolver(Protocol):
+    """A solver of one track alone."""
+
+    model: Any
+
+    def solve(self, start: Pose, u: Vector) -> Pose:
+        """Return the pose at a driver value, followed from a good pose."""
+
+    def dump(self, pose: Pose) -> list[Any]:
+        """Return a pose as plain numbers."""
+
+    def restore(self, data: list[Any]) -> Pose:
+        """Return the pose that `dump` gave as plain numbers."""
+
+
+class Tracks:
+    """The tracks of a model, each with a solver of its own.
+
+    solvers: one for each driver, None where no block depends on it alone; mixed: the blocks that depend on several
+    drivers, None if there are none.
+    """
+
+    def __init__(
+        self, model: Model, tolerance: float, solvers: Sequence[TrackSolver | None], mixed: Track | None
+    ) -> None:
+        self.model = model
+        self.mixed = mixed
+        self._tolerance = tolerance
+        self._solvers = solvers
+
+    def assembled(self, start: Pose, u: Vector, target: Vector, z: Vector) -> Pose:
+        """Return the pose of the tracks at u, on the path from `start` to `target`; all other blocks are as in z."""
+        known = {track.driver: own for track, own in start.tracks}
+        parts = []
+        for k, solver in enumerate(self._solvers):
+            if solver is None:
+                continue
+            before = known.get(k) or on_track(solver.model, start)
+            own = solver.solve(before, (u[k],))
+            if not own.good and u is not target:  # the message names the target
+                beyond = solver.solve(before, (target[k],))
+                own = own if beyond.good else beyond
+            if not own.good:
+                return failed(start, target, Status(own.status), own.message)
+            z = solver.model.put(own.z, z)
+            parts.append((solver.model, own))
+        try:
+            pose = Pose(u, evaluated(self.model, u, z))
+        except (ArithmeticError, ValueError):  # an assigned coordinate has no value there
+            return failed(start, target, Status.OUTSIDE, limit_message(self.model, Limit(start.u, NO_BLOCK), target))
+        pose.tracks = tuple(parts)
+        maps = {track.driver: own.singularities for track, own in parts}
+        pose.singularities = tuple([maps.get(k) for k in range(len(u))])
+        pose.iterations = sum([own.iterations for _, own in parts])
+        statuses = [own.status for _, own in parts]
+        if Status.NEAR_SINGULAR in statuses:
+            pose.status = Status.NEAR_SINGULAR
+        elif Status.BRIDGED in statuses:
+            pose.status = Status.BRIDGED
+        return pose
+
+    def near(self, start: Pose, u: Vector) -> Pose | None:
+        """Return the pose one trusted step away, or None if a track is near a singular point there."""
+        if start.status or start.base is not None or not self._is_apart(start):
+            return None
+        direction, distance = straight_path(self.model, start.u, u)
+        if not 0.0 < distance <= LONGEST_STEP:
+            return None
+        if start.singularities is not None:
+            for singularities, value in zip(start.singularities, u, strict=True):
+                if singularities is not None and not singularities.low <= value <= singularities.high:
+                    return None
+        near = trusted_step(self.model, start, direction, distance, u)
+        if near is None or not self._is_apart(near) or not near.watch <= self._tolerance >= near.residual:
+            return None
+        if near.margin < REGULAR and not keeps_branch(self.model, start, near, direction, distance):
+            return None
+        near.singularities = start.singularities or (None,) * len(u)
+        return near
+
+    def _is_apart(self, pose: Pose) -> bool:
+        """Return whether the blocks of all tracks are regular, and the others not near singular."""
+        margin: float = pose.margin
+        if margin >= REGULAR or self.mixed is None:
+            return margin >= REGULAR
+        of_tracks = [abs(pose.determinants[k]) for k, by in enumerate(self.model.BLOCK_DRIVERS) if by != MIXED]
+        return margin >= NEAR_SINGULAR and min(of_tracks) >= REGULAR
+
+    def dump(self, pose: Pose) -> list[Any]:
+        """Return a pose that consists of tracks as plain numbers."""
+        maps = pose.singularities and [None if one is None else one.dump() for one in pose.singularities]
+        solvers = [solver for solver in self._solvers if solver is not None]
+        parts = [solver.dump(own) for solver, (_, own) in zip(solvers, pose.tracks, strict=False)]  # or no parts
+        base = None if pose.base is None else [list(pose.base.u), list(pose.base.z)]
+        return [list(pose.u), list(pose.z), pose.iterations, int(pose.status), pose.message, maps, parts, base]
+
+    def restore(self, data: list[Any]) -> Pose:
+        """Return the pose that `dump` gave as plain numbers."""
+        u, z, iterations, status, message, maps, parts, base = data
+        pose = Pose(tuple(u), evaluated(self.model, tuple(u), tuple(z)))
+        pose.iterations, pose.status, pose.message = iterations, status, message
+        if base is not None:
+            there, unknowns = map(tuple, base)
+            pose.base = Pose(there, evaluated(self.model, there, unknowns))
+        solvers = [solver for solver in self._solvers if solver is not None]
+        if parts:
+            pose.tracks = tuple([(s.model, s.restore(own)) for s, own in zip(solvers, parts, strict=True)])
+        if maps is not None:
+            models = [None if solver is None else solver.model for solver in self._solvers]
+            pose.singularities = tuple(
+                [
+                    None if known is None else restored_map(model, known).around(value)
+                    for model, known, value in zip(models, maps, u, strict=True)
+                ]
+            )
+        return pose
 
 
 def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
