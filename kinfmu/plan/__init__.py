@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from kinfmu.plan.block import Block
+from kinfmu.plan.compile import compile_plan, plan_from
 from kinfmu.plan.determinant import determinant_formula
 from kinfmu.plan.origin import localized
-from kinfmu.plan.plan import DriverInfo, Motion, SolvePlan, compile_plan, plan_from
+from kinfmu.plan.plan import DriverInfo, Motion, SolvePlan
 
 __all__ = [
     "Block",

@@ -1,10 +1,18 @@
-"""Conditions on numbers that follow from parameters, for parameters set at run time."""
+"""Conditions of a plan: what joints and drivers must keep, and parameters that are set at run time."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from kinfmu.equations.closing import motion_samples, null_space
 from kinfmu.equations.graph import Node
+from kinfmu.equations.part import Part
+from kinfmu.equations.redundancy import Redundancy
+from kinfmu.equations.start_poses import StartValues
+from kinfmu.equations.system import System
+from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, listed
+from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.plan.trace import Tracer
@@ -40,3 +48,70 @@ def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition
 
     tracer.members.changed(look)
     return tuple(found)
+
+
+def refuse_inconsistent(system: System, redundancy: Redundancy) -> None:
+    """Raise the InconsistentError of the first row that contradicts the others."""
+    for dependent in redundancy.inconsistent:
+        unit = system.gap_unit(dependent.row)
+        raise InconsistentError(
+            f"[joints.{dependent.row.owner}] contradicts the other joints: with "
+            f"{listed(dependent.implied_by_joints) if dependent.implied_by_joints else 'all of them'} closed, row "
+            f"'{dependent.row.label}' does not close: gap {abs(dependent.gap):.6g} {unit} in every pose; "
+            f"change a dimension by that gap or remove the joint",
+            joint=dependent.row.owner,
+            gap=dependent.gap,
+        )
+
+
+def refuse_mobility(system: System, redundancy: Redundancy) -> None:
+    """Raise a MobilityError if there are not as many drivers as degrees of freedom."""
+    names = [driver.name for driver in system.mechanism.drivers]
+    mobility = redundancy.mobility
+    if len(names) == mobility > 0:
+        return
+    if len(names) < mobility:
+        missing = mobility - len(names)
+        raise MobilityError(
+            f"[drivers] mobility is {mobility} but there {_are(names)}: "
+            f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed, or joints: "
+            f"{listed(_loose(system, redundancy))} can still move",
+            mobility=mobility,
+        )
+    if mobility == 0:
+        raise MobilityError(
+            "[drivers] mobility is 0: the joints leave no motion, so there is nothing to drive",
+            mobility=0,
+        )
+    raise MobilityError(
+        f"[drivers] mobility is {mobility} but there {_are(names)}: remove {len(names) - mobility}",
+        mobility=mobility,
+    )
+
+
+def refuse_negative_distances(system: System, start: StartValues) -> None:
+    """Raise an AssemblyError if a driver starts at a distance below 0."""
+    for driver, value in zip(system.mechanism.drivers, start.u, strict=True):
+        if isinstance(driver.measured(), DistanceBetween) and value < 0.0:
+            unit = system.mechanism.length_unit
+            raise AssemblyError(
+                f"[drivers.{driver.name}] starts at a length of {value:.6g} {unit}; a distance cannot be negative"
+            )
+
+
+def _loose(system: System, redundancy: Redundancy) -> list[str]:
+    """Return the bodies that joints and drivers together do not hold."""
+    rows = [*redundancy.kept, *range(system.joint_row_count, len(system.rows))]
+    start = redundancy.assembly.start.q
+    pose = next(iter(motion_samples(Part(system, redundancy.kept), start, 1)), start)
+    free = null_space(system.scaled_jacobian(pose)[rows])
+    moves = {
+        name.partition(".")[0] for name, move in zip(system.coordinates, free, strict=True) if abs(move).max() > 1e-6
+    }
+    return [body.name for body in system.mechanism.moving_bodies if body.name in moves]
+
+
+def _are(drivers: Sequence[str]) -> str:
+    if not drivers:
+        return "is no driver"
+    return f"is 1 driver ({drivers[0]})" if len(drivers) == 1 else f"are {len(drivers)} drivers ({listed(drivers)})"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.solver.python.turns import TURN, turned
+from kinfmu.solver.python.bridge import TURN, turned
 
 _HALF = 0.5 + 1e-9  # [turns]; a step of half a turn, within rounding, is unchanged
 

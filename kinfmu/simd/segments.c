@@ -7,7 +7,7 @@
 
 #define SEGMENTS 16       /* in a turn */
 #define TURN 6.283185307179586
-#define HIGH 6.2831853069365025     /* [rad]; 2 pi to 32 bits, as in turns.c */
+#define HIGH 6.2831853069365025     /* [rad]; 2 pi to 32 bits, as in bridge.c */
 #define LOW 2.430840202602477e-10   /* [rad]; the rest */
 #define SAME 1e-9         /* difference of poses that are a turn apart */
 #define SURE 0.05         /* determinant from which nodes count as regular */

@@ -14,8 +14,8 @@ from kinfmu.codegen.python import load_model
 from kinfmu.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
 from kinfmu.solver.python import Pose, Solver, Status
-from kinfmu.solver.python import bridge as bridging
-from kinfmu.solver.python.turns import TURN, turned, whole_turns
+from kinfmu.solver.python import build as building
+from kinfmu.solver.python.bridge import TURN, turned, whole_turns
 
 Errors = Callable[[Solver, Pose], list[float]]
 
@@ -37,7 +37,7 @@ def test_bridge_is_built_once_and_moved_on_later_turns(
     fourbar: Solver, errors: Errors, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     built = []
-    build = bridging.build
+    build = building.build
 
     def counted(*args: object) -> object:
         built.append(args)

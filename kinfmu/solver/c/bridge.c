@@ -3,14 +3,24 @@
  */
 #include "internal.h"
 
-#define NARROWEST 1e-3 /* [rad, sizes]; nodes closer than this have lost the digits that a bridge would gain */
 #define CLOSED 1e-12   /* residual relative to the size up to which an interpolated pose counts as closed */
-#define AGREED 1e-9    /* [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away */
-#define FINE 1e-12     /* [rad, sizes]; difference of two widths below which narrower ones gain nothing */
-#define STRAIGHT 0.1   /* change of a zero located anew, as a part of the distance ahead: it is as small where there is a zero */
 #define DAMPING 1e-3   /* of J dz = -r at a change point: its singular value is 0, the others are far above */
 #define NOISE 8.0      /* roundings of the residual at the centre; a smaller residual is no miss */
-#define STEADY 0.1     /* largest correction of an extrapolation over the determinant: beyond lies another branch */
+#define TURN 6.283185307179586       /* [rad]; for counting */
+#define HIGH 6.2831853069365025      /* [rad]; 2 pi to 32 bits: its multiples by up to 2^21 turns are exact */
+#define LOW 2.430840202602477e-10    /* [rad]; the rest */
+
+/* Return angle + turns * 2 pi [rad], rounded about once. */
+double kf_turned(double angle, double turns)
+{
+    return angle + turns * HIGH + turns * LOW;
+}
+
+/* Return the whole number of turns nearest to an angle [rad]. */
+double kf_whole_turns(double angle)
+{
+    return nearbyint(angle / TURN);
+}
 
 /* Return whether u is inside the window, where the bridge is used. */
 bool kf_covers(const kf_bridge *bridge, double u)
@@ -40,7 +50,7 @@ static kf_inner *inner_of(kf_solver *solver, const kf_bridge *bridge)
 }
 
 /* Make the bridge of a span moved by whole turns; `raised` holds the turns of the unknowns. */
-static void make(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
+void kf_make_bridge(kf_bridge *bridge, const kf_solver *solver, int span, double turns)
 {
     const kf_span *const from = &KF_POOL(solver)->spans[span];
     int k;
@@ -145,7 +155,7 @@ static bool keeps_distances(const kf_solver *solver, const kf_bridge *bridge, co
 }
 
 /* Return whether the interpolated pose at the centre closes, up to what rounding leaves of large angles. */
-static bool closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
+bool kf_bridge_closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found)
 {
     double largest;
     return find_middle(solver, bridge, found, &largest) && found->residual <= CLOSED + 4.0 * KF_EPS * largest
@@ -249,172 +259,15 @@ int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u)
     for (k = 0; k < KF_UNKNOWNS; ++k) {
         const double a = arrived->found.x[k], b = span->z[node][k];
         other->raised[k] = kf_unknown_is_angle[k] ? kf_whole_turns(a - b) : 0.0;
-        if (!(fabs(a - kf_turned(b, other->raised[k])) <= AGREED * kf_unknown_scales[k])) {
+        if (!(fabs(a - kf_turned(b, other->raised[k])) <= KF_AGREED * kf_unknown_scales[k])) {
             return -1;
         }
     }
-    make(other, solver, bridge->span, turns);
+    kf_make_bridge(other, solver, bridge->span, turns);
     for (k = 0; turns != 0.0 && k < KF_NODES; ++k) {
         if (!at_node(solver, other, k, &solver->scratch.follow[0])) {
             return -1;
         }
     }
-    return closes(solver, other, &solver->scratch.follow[0].found) ? made : -1;
-}
-
-/* Find the driver value where a determinant vanishes on the secant through its values at a and b. */
-bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero)
-{
-    const double rise = of_b - of_a;
-    *zero = b - of_b * (b - a) / rise;
-    return rise != 0.0;
-}
-
-/* Find where a block's determinant vanishes, by secants from the near side; false if it does not fall straight.
- *
- * Towards a dead centre it falls like a square root: the secant's zero is about twice as far as the dead centre.
- */
-static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
-{
-    const double least = 0.1 * NARROWEST * kf_reach[KF_ALONG(solver)];
-    double step = 0.5 * (*zero - KF_HERE(solver, pose));
-    bool whole = false; /* the first estimate may stem from the same two places */
-    while (fabs(step) > least) {
-        const double here = KF_HERE(solver, pose);
-        kf_pose *const ahead = kf_follow_path(solver, pose, here + step);
-        double of_here, of_ahead, better, left, change;
-        if (ahead == NULL) {
-            step *= 0.5;
-            whole = false;
-            continue;
-        }
-        of_here = pose->found.determinants[block];
-        of_ahead = ahead->found.determinants[block];
-        if (!kf_secant_zero(here, of_here, KF_HERE(solver, ahead), of_ahead, &better)) {
-            return false;
-        }
-        left = better - KF_HERE(solver, ahead);
-        if (left * step <= 0.0) {
-            return false;
-        }
-        change = fabs(better - *zero);
-        *zero = better;
-        if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
-            return true;
-        }
-        solver->scratch.located = *ahead; /* paths from here may fail */
-        pose = &solver->scratch.located;
-        whole = true;
-        step = 0.5 * (better - KF_HERE(solver, pose));
-    }
-    return false;
-}
-
-/* Return whether a block has more rows than unknowns: its determinant is never negative, and falls to zero at a
- * crossing.
- */
-static bool is_tall(int block)
-{
-    return kf_block_rows[block] > kf_block_ends[block] - (block > 0 ? kf_block_ends[block - 1] : 0);
-}
-
-/* Find poses at 1, 2, 4 half widths on the far side, each extrapolated from the last ones and corrected. */
-static bool cross(kf_solver *solver, kf_span *span, double side, int block)
-{
-    static const double places[KF_NODES] = {-4.0, -2.0, -1.0, 1.0, 2.0, 4.0}; /* in the direction of the crossing */
-    static const int order[KF_NODES] = {0, 1, 2, 3, 4, 5};
-    double(*const determinants)[KF_ROOM(KF_BLOCKS)] = solver->scratch.determinants; /* before the zero, after, last */
-    kf_pose *const pose = &solver->scratch.follow[0];
-    double *const last = determinants[2];
-#if KF_TRACKS
-    double buffer[KF_DRIVERS];
-#endif
-    int node, k;
-    for (node = 3; node < KF_NODES; ++node) {
-        const int first = node == 5 ? 1 : 0, count = node - first;
-        const double u = span->centre + side * places[node] * span->half;
-        double weights[KF_MOST_NODES][3];
-        kf_weights(count, places + first, places[node], weights);
-        kf_combined(span, side * span->half, count, order + first, (const double(*)[3])weights, solver->scratch.z);
-        kf_fresh(pose, -1, -INFINITY, INFINITY);
-        if (!kf_evaluated(&solver->model, KF_AT(&solver->model, &u, buffer), solver->scratch.z, NULL, &pose->found)
-            || pose->found.moved > STEADY * pose->found.margin) {
-            return false;
-        }
-        for (k = 0; node > 3 && k < KF_BLOCKS; ++k) {
-            if (pose->found.determinants[k] * last[k] <= 0.0) {
-                return false; /* there is another zero next to the one to be bridged */
-            }
-        }
-        memcpy(last, pose->found.determinants, KF_BLOCKS * sizeof(double));
-        if (node == 3) {
-            memcpy(determinants[1], last, KF_BLOCKS * sizeof(double));
-        }
-        kf_span_node(span, node, pose, &solver->model);
-    }
-    return determinants[0][block] * determinants[1][block] < 0.0 || is_tall(block); /* else it touches zero without crossing it */
-}
-
-/* Build a span of one width over the zero of a block's determinant, from the side of the pose. */
-static bool span_over(kf_solver *solver, kf_span *span, kf_pose *pose, int block, double centre, double half)
-{
-    const double side = centre > KF_HERE(solver, pose) ? 1.0 : -1.0;
-    double distance = 4.0;
-    int node;
-    span->centre = centre;
-    span->half = half;
-    for (node = 0; node < 3; ++node) {
-        pose = kf_follow_path(solver, pose, centre - side * distance * half);
-        if (pose == NULL) {
-            return false;
-        }
-        kf_span_node(span, node, pose, &solver->model);
-        distance *= 0.5;
-    }
-    memcpy(solver->scratch.determinants[0], pose->found.determinants, KF_BLOCKS * sizeof(double));
-    if (!cross(solver, span, side, block)) {
-        return false;
-    }
-    kf_span_hold(span, solver->scratch.determinants[0], solver->scratch.determinants[1]);
-    if (side < 0.0) {
-        kf_span_reverse(span);
-    }
-    return true;
-}
-
-/* Build a bridge over the zero of a block's determinant ahead of a regular pose; -1 if none is accepted.
- *
- * zero: a first estimate. Windows shrink until they hold one point and its six nodes, and both widths agree. Then the
- * closing decides: where lengths miss a change point, no narrower window would close. A dead centre gives no bridge:
- * the determinant does not fall to zero straight, the far side cannot be reached.
- */
-int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
-{
-    const double reach = kf_reach[KF_ALONG(solver)];
-    double half, apart = AGREED;
-    int best = -1;
-    if (!locate(solver, pose, block, &zero)) {
-        return -1;
-    }
-    for (half = KF_HALF_WIDTH * reach; half >= NARROWEST * reach && apart > FINE; half *= 0.5) {
-        const int number = kf_spare_span(solver, best);
-        kf_span *const span = &KF_POOL(solver)->spans[number < 0 ? 0 : number];
-        if (number >= 0 && span_over(solver, span, pose, block, zero, half) && kf_span_apart(span) < apart) {
-            best = number;
-            apart = kf_span_apart(span);
-        }
-    }
-    if (best >= 0) {
-        const int number = kf_spare_bridge(solver);
-        kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
-        int k;
-        for (k = 0; k < KF_UNKNOWNS; ++k) {
-            bridge->raised[k] = 0.0;
-        }
-        make(bridge, solver, best, 0.0);
-        if (closes(solver, bridge, &solver->scratch.follow[0].found)) {
-            return number;
-        }
-    }
-    return -1;
+    return kf_bridge_closes(solver, other, &solver->scratch.follow[0].found) ? made : -1;
 }

@@ -10,7 +10,7 @@
 
 #define KF_EPS DBL_EPSILON
 #define KF_REGULAR 0.19      /* determinant from which a block is regular: see span.py */
-#define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see bridge.py */
+#define KF_HALF_WIDTH 0.05   /* [rad, sizes] of a bridge: see build.py */
 #define KF_LONGEST_STEP 0.2  /* [rad, sizes]: see trusted_step.py, advance.py and limit.py, as all that follows */
 #define KF_TRUST 10.0
 #define KF_FALL 0.3
@@ -62,10 +62,6 @@ bool kf_evaluated(const kf_model *model, const double *u, const double *z, const
 bool kf_evaluated_as_given(const kf_model *model, const double *u, const double *z, kf_found *found);
 void kf_tangent(const kf_model *model, kf_pose *pose);
 
-/* turns.c */
-double kf_turned(double angle, double turns);
-double kf_whole_turns(double angle);
-
 /* hermite.c */
 void kf_hermite_through(int count, const double *nodes, const double samples[][3], kf_hermite *polynomial);
 void kf_hermite_at(const kf_hermite *polynomial, double x, double values[3]);
@@ -83,12 +79,19 @@ void kf_span_read(const kf_span *span, kf_inner *inner, double x, double *z, dou
 void kf_span_difference(const kf_span *span, kf_inner *inner, double x, double *z, double *zd, double *zdd);
 
 /* bridge.c */
+#define KF_AGREED 1e-9 /* [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away */
+double kf_turned(double angle, double turns);
+double kf_whole_turns(double angle);
+void kf_make_bridge(kf_bridge *bridge, const kf_solver *solver, int span, double turns);
+bool kf_bridge_closes(kf_solver *solver, const kf_bridge *bridge, kf_found *found);
 bool kf_covers(const kf_bridge *bridge, double u);
 bool kf_bridge_pose(kf_solver *solver, int number, const double *u, kf_pose *pose);
 bool kf_bridge_exit(kf_solver *solver, int number, double target, kf_pose *pose);
 void kf_bridge_missed(kf_solver *solver, const kf_pose *pose, double slope, double missed[3]);
 void kf_bridge_difference(kf_solver *solver, int number, double u, double *z, double *zd, double *zdd);
 int kf_moved(kf_solver *solver, int number, kf_pose *pose, double u);
+
+/* build.c */
 int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero);
 bool kf_secant_zero(double a, double of_a, double b, double of_b, double *zero);
 

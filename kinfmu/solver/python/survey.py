@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .bridge import HALF_WIDTH, build, moved, secant_zero
+from .bridge import moved
+from .build import HALF_WIDTH, build, secant_zero
 from .pose import Model, Pose
 from .singularity_map import Interval, SingularityMap
 from .span import REGULAR

@@ -103,8 +103,8 @@ def assert_same(plan: SolvePlan, samples: Samples, flags: Sequence[str] = QUICK)
 
 
 MODULES = (
-    "advance", "bridge", "continuation", "estimate", "limit",
-    "singularity_map", "solver", "span", "trusted_step", "turns",
+    "advance", "bridge", "build", "continuation", "estimate", "limit",
+    "singularity_map", "solver", "span", "trusted_step",
 )  # fmt: skip
 
 

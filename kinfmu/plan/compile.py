@@ -1,0 +1,208 @@
+"""Compile: from a mechanism and its redundancy to the SolvePlan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from kinfmu.drivers import Driver
+from kinfmu.equations.graph import Node, symbols
+from kinfmu.equations.redundancy import Redundancy, find_redundancy
+from kinfmu.equations.system import System
+from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.measures.arithmetic import Value
+from kinfmu.mechanism import Mechanism, Point
+from kinfmu.plan.anchor import find_anchor
+from kinfmu.plan.block import Block, Rates, build_block
+from kinfmu.plan.conditions import find_conditions, refuse_inconsistent, refuse_mobility, refuse_negative_distances
+from kinfmu.plan.origin import localized
+from kinfmu.plan.plan import DriverInfo, Motion, PlanParameter, SolvePlan, nodes_of, position_count
+from kinfmu.plan.structure import RowTracer, find_structure
+from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
+from kinfmu.units import Quantity
+
+
+def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> SolvePlan:
+    """Return the plan of a mechanism.
+
+    Args:
+        mechanism: The mechanism.
+        outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
+
+    Returns:
+        The plan, with the parameters of the geometry and the constants of the laws settable.
+
+    Raises:
+        InconsistentError: Joints contradict each other.
+        MobilityError: There are not as many drivers as degrees of freedom, or the drivers do not determine the motion.
+        AssemblyError: The mechanism does not close near its start pose.
+        AmbiguousStartError: The start pose is singular and several branches leave it.
+        RequestError: An output is unknown.
+
+    """
+    local, origin = localized(mechanism)
+    system = System(local)
+    return plan_from(mechanism, system, origin, find_redundancy(system), outputs)
+
+
+def plan_from(
+    mechanism: Mechanism,
+    system: System,
+    origin: Point,
+    redundancy: Redundancy,
+    outputs: Sequence[str] | None = None,
+) -> SolvePlan:
+    """Return the plan of a mechanism whose redundancy is known.
+
+    Args:
+        mechanism: The mechanism in the world.
+        system: The equations of the mechanism as seen from `origin`.
+        origin: The plan's own origin in the world, as `localized` returns it.
+        redundancy: Of the system, with its assembly.
+        outputs: As in `compile_plan`.
+
+    Returns:
+        The plan.
+
+    Raises:
+        KinfmuError: As in `compile_plan`.
+
+    """
+    local = system.mechanism
+    refuse_inconsistent(system, redundancy)
+    refuse_mobility(system, redundancy)
+    refuse_negative_distances(system, redundancy.assembly.start)
+    anchor = find_anchor(system, redundancy.assembly)
+    tracer = Tracer(local)
+    set_aside = [row.index for row in redundancy.redundant]
+    structure = find_structure(system, tracer, redundancy, anchor.q)
+    known = structure.fixed
+    rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
+    motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
+    if outputs is not None:
+        motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
+    parameters = _parameters(mechanism)
+    at_anchor = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
+    at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in parameters}
+    blocks = _needed(
+        [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
+        [motion.position for motion in motions],
+    )
+    solved = {name for block in blocks for name in block.coordinates}
+    watches = []
+    for index in set_aside:
+        node = row(index, known)
+        if all(symbol.name in solved for symbol in symbols([node]) if not is_parameter(symbol)):
+            watches.append((system.rows[index].name, node / (system.rows[index].scale * system.size)))
+    return SolvePlan(
+        mechanism=mechanism,
+        size=system.size,
+        origin=origin,
+        drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
+        law_constants=mechanism.law_constants,
+        parameters=parameters,
+        laws=_laws(mechanism, tracer),
+        jumps=_jumps(mechanism, tracer),
+        blocks=tuple(blocks),
+        outputs_motion=tuple(motions),
+        coordinate_count=coordinate_count,
+        fixed_nodes=fixed,
+        watches=tuple(watches),
+        conditions=find_conditions(mechanism, tracer),
+        anchor=anchor,
+    )
+
+
+def _outputs(
+    mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
+) -> tuple[list[Motion], int, dict[str, Node]]:
+    """Return outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
+    if mechanism.coordinates == "moving":
+        wanted = [name for name in mechanism.coordinate_names if name not in known]
+    elif mechanism.coordinates == "all":
+        wanted = list(mechanism.coordinate_names)
+    else:
+        wanted = list(mechanism.coordinates)
+
+    def in_world(name: str, node: Node) -> Node:
+        offset = {"x": origin.x, "y": origin.y}.get(name.rpartition(".")[2], 0.0)
+        return node + offset
+
+    nodes = [(name, in_world(name, known.get(name, tracer.symbols[name]))) for name in wanted]
+    fixed = {name: in_world(name, node) for name, node in known.items() if name not in wanted}
+    coordinate_count = len(nodes)
+    for name, target in mechanism.points.items():
+        for coordinate, node in zip(("x", "y"), tracer.point(target, known), strict=True):
+            value = in_world(coordinate, node)
+            if all(is_parameter(symbol) for symbol in symbols([value])):
+                fixed[f"{name}.{coordinate}"] = value
+            else:
+                nodes.append((f"{name}.{coordinate}", value))
+    positions = [node for _, node in nodes]
+    motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
+    return [Motion(*motion) for motion in motions], coordinate_count, fixed
+
+
+def _chosen(motions: Sequence[Motion], coordinate_count: int, outputs: Sequence[str]) -> tuple[list[Motion], int]:
+    known = [motion.name for motion in motions]
+    if isinstance(outputs, str):
+        raise RequestError(f"outputs: '{outputs}' must be a list of names, such as ['{known[0]}']")
+    for name in outputs:
+        if name not in known:
+            raise RequestError(f"outputs: '{name}' is not one{suggestion(name, known)}; outputs: {listed(known)}")
+    chosen = [(k, motion) for k, motion in enumerate(motions) if motion.name in outputs]
+    return [motion for _, motion in chosen], sum(k < coordinate_count for k, _ in chosen)
+
+
+def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
+    """The blocks on which the outputs depend, in order."""
+    wanted = {symbol.name for symbol in symbols(positions)}
+    needed = []
+    for block in reversed(blocks):
+        if wanted & set(block.coordinates):
+            wanted |= {symbol.name for symbol in symbols(nodes_of(block)[: position_count(block)])}
+            needed.append(block)
+    return needed[::-1]
+
+
+def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
+    """Return the parameters that are numbers of their own; those with an expression follow from them."""
+    return tuple(
+        PlanParameter(name, float(parameter.value), parameter.quantity or Quantity("number"), parameter.description)
+        for name, parameter in mechanism.parameters.items()
+        if parameter.expression is None
+    )
+
+
+def _law_constants(mechanism: Mechanism, tracer: Tracer) -> Iterator[tuple[Driver, dict[str, Value]]]:
+    """Yield each driver with the constants of its law: symbols, or formulas of parameters if written so."""
+    for driver, traced in zip(mechanism.drivers, tracer.drivers, strict=True):
+        yield (
+            driver,
+            {
+                key: value
+                if ("drivers", driver.name, "law", key) in mechanism.expressions
+                else tracer.graph.symbol(f"{driver.name}.{key}")
+                for key, (value, _) in traced.law.constants().items()
+            },
+        )
+
+
+def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...]:
+    """Return the times at which a law jumps, each with its period."""
+    found = []
+    for driver, constants in _law_constants(mechanism, tracer):
+        jumps = driver.law.jumps(**constants)
+        found += [(tracer.graph.lift(at), tracer.graph.lift(jumps.period)) for at in jumps.at]
+    return tuple(found)
+
+
+def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
+    graph = tracer.graph
+    time, one = graph.symbol("time"), graph.constant(1.0)
+    laws = []
+    for driver, constants in _law_constants(mechanism, tracer):
+        target = graph.lift(driver.law.target(time, **constants))
+        (rate,) = graph.derivative([target], {time: one})
+        (acceleration,) = graph.derivative([rate], {time: one})
+        laws.append(Motion(driver.name, target, rate, acceleration))
+    return tuple(laws)
