@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.mechanism.body import Body, Point, RunSettings, Start
-from kinfmu.mechanism.law_table import LawConstant
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.parameters import LawConstant, Parameter
 
 __all__ = ["Body", "LawConstant", "Mechanism", "Parameter", "Point", "RunSettings", "Start"]

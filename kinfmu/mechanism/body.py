@@ -57,7 +57,7 @@ class Body:
 
     def _point(self, name: str, point: Iterable[float]) -> Point:
         try:
-            x, y = () if isinstance(point, str) else point
+            x, y = () if isinstance(point, str | Mapping) else point
             return Point(x, y)
         except (TypeError, ValueError):
             raise MechanismError(
@@ -87,6 +87,6 @@ class RunSettings:
         for key, value in zip(("start", "stop", "step"), values, strict=True):
             check_number(f"[run] {key}", value)
         if self.step <= 0.0:
-            raise MechanismError(f"[run] step = {self.step!r} must be positive")
+            raise MechanismError(f"[run] step = {float(self.step)!r} must be positive")
         if self.stop < self.start:
-            raise MechanismError(f"[run] stop = {self.stop!r} lies before start = {self.start!r}")
+            raise MechanismError(f"[run] stop = {float(self.stop)!r} lies before start = {float(self.start)!r}")

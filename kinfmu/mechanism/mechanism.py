@@ -15,10 +15,9 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import GROUND_NAME, Body, RunSettings
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression
-from kinfmu.mechanism.law_table import LawConstant, law_constants, with_law_constants
 from kinfmu.mechanism.members import Members, NumberPath
 from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.parameters import Parameter, parameter_values
+from kinfmu.mechanism.parameters import LawConstant, Parameter, law_constants, parameter_values, with_law_constants
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import Quantity

@@ -1,16 +1,18 @@
-"""Parameters of a mechanism: the numbers that geometry refers to by name."""
+"""Parameters of a mechanism: the numbers that geometry refers to by name, and the constants of laws."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
+from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
@@ -46,15 +48,38 @@ class Parameter:
         return self.value.expression if isinstance(self.value, Computed) else None
 
 
-class UnresolvedParameter(NamedTuple):
-    """A parameter whose expression is not yet computed."""
+class LawConstant(NamedTuple):
+    """A constant of a law of motion, settable under its name `<driver>.<key>`."""
 
-    value: float | Expression
-    quantity: Quantity | None
-    description: str
+    name: str
+    value: float
+    quantity: Quantity
+    is_positive: bool = False  # other values are refused
 
 
-def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> UnresolvedParameter:
+def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
+    """Yield the constants of all drivers' laws in file order, without those given by an expression (`computed`)."""
+    for driver in drivers:
+        for key, (value, said) in driver.law.constants().items():
+            if ("drivers", driver.name, "law", key) not in computed:
+                quantity = said.quantity(*driver.law_kinds)
+                yield LawConstant(f"{driver.name}.{key}", float(value), quantity, said.is_positive)
+
+
+def with_law_constants(drivers: Sequence[Driver], values: Mapping[str, float]) -> tuple[Driver, ...]:
+    """Return the drivers with other values of some of those constants."""
+
+    def changed(driver: Driver) -> Driver:
+        named = {key: f"{driver.name}.{key}" for key in driver.law.constants()}
+        new: dict[tuple[str | int, ...], float] = {
+            (key,): values[name] for key, name in named.items() if name in values
+        }
+        return replace(driver, law=driver.law.with_numbers(new)) if new else driver  # type: ignore[type-var]
+
+    return tuple(map(changed, drivers))
+
+
+def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> Parameter:
     """Return a parameter before it is computed, or raise a MechanismError for an invalid name or value."""
     check_name("[parameters]", name)
     if name in WORDS:
@@ -68,12 +93,10 @@ def read_parameter(name: str, parameter: Parameter | float | str, length_unit: s
         literal = Expression(parameter.value, length_unit).literal
         if literal and literal.unit:
             quantity, _ = every_unit(length_unit)[literal.unit]
-    return UnresolvedParameter(value, quantity, parameter.description)
+    return Parameter(value, quantity, parameter.description)  # type: ignore[arg-type]  # computed later
 
 
-def resolve_parameters(
-    parameters: Mapping[str, UnresolvedParameter], alone: Mapping[str, set[Quantity]]
-) -> dict[str, Parameter]:
+def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, set[Quantity]]) -> dict[str, Parameter]:
     """Compute values and quantities of all parameters.
 
     Args:
@@ -87,7 +110,7 @@ def resolve_parameters(
         MechanismError: An unknown name, a parameter that needs itself, or a unit that does not fit.
 
     """
-    expressions = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
+    expressions: dict[str, Any] = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
     order = _in_order(parameters, expressions)
     quantities = {name: parameter.quantity for name, parameter in parameters.items()}
     wanted = {name: set(alone.get(name, ())) for name in parameters}
@@ -103,8 +126,8 @@ def resolve_parameters(
     for name in order:
         said, quantity = parameters[name], quantities[name]
         dimensions[name] = Dimension.of(quantity) if quantity and quantity != NUMBER else UNKNOWN
-        if isinstance(said.value, Expression):
-            number, found = _computed(name, said.value, values, dimensions)
+        if name in expressions:
+            number, found = compute(f"[parameters] {name}", expressions[name], values, dimensions, dimensions[name])
             if found.is_known and not found.is_open:
                 dimensions[name], quantity = found, quantity or found.quantity
             elif quantity is None and len(wanted[name]) == 1:
@@ -117,19 +140,22 @@ def resolve_parameters(
     return {name: done[name] for name in parameters}
 
 
-def _computed(
-    name: str, expression: Expression, values: Mapping[str, float], dimensions: Mapping[str, Dimension]
+def compute(
+    where: str,
+    expression: Expression,
+    values: Mapping[str, float],
+    dimensions: Mapping[str, Dimension],
+    needed: Dimension,
 ) -> tuple[Computed, Dimension]:
-    """Return number and dimension of a parameter's expression, which must fit the declared quantity."""
-    where = f"[parameters] {name} ="
+    """Return number and dimension of an expression, or raise a MechanismError; `where` is its key in messages."""
     try:
         found = expression.dimension(dimensions)
         number = float(expression.value(values))
     except MechanismError as error:
-        raise MechanismError(f"{where} {error}") from None
-    check_number(f"{where} {quoted(expression.text)}", number)
-    if not found.fits(dimensions[name]):
-        raise MechanismError(f"{where} {quoted(expression.text)} is {found} and must be {dimensions[name]}")
+        raise MechanismError(f"{where} = {error}") from None
+    if not found.fits(needed):
+        raise MechanismError(f"{where} = {quoted(expression.text)} is {found} and must be {needed}")
+    check_number(f"{where} = {quoted(expression.text)}", number)
     return Computed(number, expression), found
 
 

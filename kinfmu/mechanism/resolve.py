@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism.dimension import Dimension
-from kinfmu.mechanism.expression import Computed, Expression
+from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import Members, NumberPath, path_text
 from kinfmu.mechanism.number import expression_error, read_number
-from kinfmu.mechanism.parameters import Parameter, dimensions_of, read_parameter, resolve_parameters
-from kinfmu.mechanism.valid import check_number, quoted
+from kinfmu.mechanism.parameters import Parameter, compute, dimensions_of, read_parameter, resolve_parameters
 from kinfmu.units import Quantity
 
 MOST_PARAMETERS = 10_000
@@ -59,19 +58,11 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     def computed(place: NumberPath, value: Any, quantity: Quantity) -> Any:
         if not isinstance(value, Expression):
             return value
+        where = path_text(place)
         try:
             value.refuse_unknown(values)
         except MechanismError as error:
-            raise expression_error(path_text(place), value.text, quantity, unit, error) from None
-        try:
-            found = value.dimension(dimensions)
-            number = float(value.value(values))
-        except MechanismError as error:
-            raise MechanismError(f"{path_text(place)} = {error}") from None
-        needed = Dimension.of(quantity)
-        if not found.fits(needed):
-            raise MechanismError(f"{path_text(place)} = {quoted(value.text)} is {found} and must be {needed}")
-        check_number(f"{path_text(place)} = {quoted(value.text)}", number)
-        return Computed(number, value)
+            raise expression_error(where, value.text, quantity, unit, error) from None
+        return compute(where, value, values, dimensions, Dimension.of(quantity))[0]
 
     return Resolved(members.changed(computed), parameters, expressions)

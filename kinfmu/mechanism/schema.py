@@ -13,12 +13,12 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, LawQuantity, Spline
 from kinfmu.laws.sequence import DWELL
-from kinfmu.measures import MEASURES, Measure
+from kinfmu.measures import MEASURES
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST
-from kinfmu.mechanism.law_table import law_keys
+from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]
@@ -100,7 +100,7 @@ def _definitions() -> Schema:
         "body": _body(),
         "segment": _segment(),
         **{f"law_{law.type}": _law(law) for law in LAWS},
-        "measure": {"oneOf": [_measure(cls) for cls in MEASURES]},
+        "measure": {"oneOf": [_member(cls, (), "measure") for cls in MEASURES]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},
         "driver": {"oneOf": [_member(cls, LAWS) for cls in DRIVERS]},
     }
@@ -149,35 +149,30 @@ def _segment() -> Schema:
     }
 
 
-def _member(cls: Any, laws: Iterable[type[Law]]) -> Schema:
-    """Describe the table of a joint or driver, with the keys of its law if it has one."""
+def _own_keys(cls: Any, word: str) -> tuple[Schema, list[str]]:
+    """Return the keys of a class without `law`, after `word` with its type, and the names of the required ones."""
     keys = [key for key in keys_of(cls) if key.takes != "law"]
-    own = {"type": {"const": cls.type}, **{key.name: _value(key) for key in keys}}
-    required = ["type", *(key.name for key in keys if key.default is REQUIRED)]
-    if len(keys) == len(keys_of(cls)):
+    own = {word: {"const": cls.type}, **{key.name: _value(key) for key in keys}}
+    return own, [word, *(key.name for key in keys if key.default is REQUIRED)]
+
+
+def _member(cls: Any, laws: Iterable[type[Law]], word: str = "type") -> Schema:
+    """Describe the table of a joint, driver or measure, with the keys of its law if it has one."""
+    own, required = _own_keys(cls, word)
+    if all(key.takes != "law" for key in keys_of(cls)):
         return {"description": summary_of(cls), **_table(own, required)}
     return {
         "description": summary_of(cls),
         "type": "object",
         "properties": own,
         "required": [*required, "law"],
-        "oneOf": [_ref(f"law_{law.type}", propertyNames={"enum": [*own, "law", *law_keys(law)]}) for law in laws],
+        "oneOf": [_ref(f"law_{law.type}", propertyNames={"enum": [*own, "law", *table_keys(law)]}) for law in laws],
     }
-
-
-def _measure(cls: type[Measure]) -> Schema:
-    """Describe the table of a measured quantity."""
-    keys = keys_of(cls)
-    required = ["measure", *(key.name for key in keys if key.default is REQUIRED)]
-    own = {"measure": {"const": cls.type}, **{key.name: _value(key) for key in keys}}
-    return {"description": summary_of(cls), **_table(own, required)}
 
 
 def _law(law: type[Law]) -> Schema:
     """Describe the keys of a law, which belong to the table of the joint or driver."""
-    keys = keys_of(law)
-    properties = {"law": {"const": law.type}, **{key.name: _value(key) for key in keys}}
-    required = ["law", *(key.name for key in keys if key.default is REQUIRED)]
+    properties, required = _own_keys(law, "law")
     found: Schema = {"description": summary_of(law), "type": "object", "properties": properties, "required": required}
     if law is Spline:
         properties["file"] = {"type": "string", "description": "A CSV file of two columns, instead of points"}

@@ -8,29 +8,27 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from kinfmu.drivers import DRIVERS, Driver
-from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.joints import JOINTS, Joint
-from kinfmu.laws import LAWS, External, Law
+from kinfmu.drivers import DRIVERS
+from kinfmu.errors import MechanismError, listed
+from kinfmu.joints import JOINTS
+from kinfmu.laws import LAWS, RISES, External, Law, Segment, Spline
 from kinfmu.measures import MEASURES, Measure
-from kinfmu.mechanism.body import Body, Point, RunSettings, Start
-from kinfmu.mechanism.declared import REQUIRED, keys_of
-from kinfmu.mechanism.law_table import law_keys, read_law
+from kinfmu.mechanism.body import Body, RunSettings, Start
+from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.mechanism import Mechanism
-from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.parameters import Parameter
+from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_tables import (
     check_keys,
     class_of_type,
-    member_keys,
     named_tables,
     named_values,
     subtable,
+    table_keys,
     table_of,
     text_of,
 )
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.units import METRES, Quantity
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
@@ -45,8 +43,8 @@ _TOKEN = re.compile(
     r"""|[^\w"'#-]++""",
     re.DOTALL,
 )
+_SEGMENT = ("law", "rise", "duration")
 _TABLES = ("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "points", "outputs")
-_ANGLE, _LENGTH, _TIME = Quantity("angle"), Quantity("length"), Quantity("time")
 
 
 def read(path: str | Path) -> Mechanism:
@@ -108,7 +106,6 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
     check_keys("", document, _TABLES)
     units = table_of(document, "units")
     check_keys("[units]", units, ("length",))
-    unit = text_of("[units] length", units.get("length", "m"))
     outputs = table_of(document, "outputs")
     check_keys("[outputs]", outputs, ("coordinates",))
     coordinates = outputs.get("coordinates", "moving")
@@ -120,119 +117,135 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
         )
     if "name" not in document:
         raise MechanismError("name is missing; the first line should be such as name = 'fourbar'")
-    reader = _Reader(_checked_unit(unit), folder)
+    laws_of_joints = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
     return Mechanism(
         name=text_of("name", document["name"]),
         title=text_of("title", document.get("title", "")),
-        length_unit=unit,
-        bodies=tuple(reader.body(name, body) for name, body in named_tables(document, "bodies")),
-        joints=tuple(reader.joint(name, joint) for name, joint in named_tables(document, "joints")),
-        drivers=tuple(reader.driver(name, driver) for name, driver in named_tables(document, "drivers")),
+        length_unit=text_of("[units] length", units.get("length", "m")),
+        bodies=tuple(_body(name, body) for name, body in named_tables(document, "bodies")),
+        joints=tuple(
+            _member(f"[joints.{name}]", name, joint, JOINTS, laws_of_joints, folder)
+            for name, joint in named_tables(document, "joints")
+        ),
+        drivers=tuple(
+            _member(f"[drivers.{name}]", name, driver, DRIVERS, LAWS, folder)
+            for name, driver in named_tables(document, "drivers")
+        ),
         points={
             name: text_of(f"[points] {name}", target, "text such as 'body.point'")
             for name, target in named_values(document, "points")
         },
         coordinates=coordinates,
         parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
-        run=reader.run(table_of(document, "run")),
+        run=_run(table_of(document, "run")),
     )
 
 
-def _checked_unit(unit: str) -> str:
-    """Return the unit if it is a unit of length; Mechanism repeats this check for mechanisms written in Python."""
-    if unit not in METRES:
-        near = suggestion(unit, METRES) if isinstance(unit, str) else ""
-        raise MechanismError(f"[units] length = {quoted(unit)} is not a unit of length{near}; known: {listed(METRES)}")
-    return unit
+def _body(name: str, table: Mapping[str, Any]) -> Body:
+    where = f"[bodies.{name}]"
+    check_keys(where, table, ("points", "start"))
+    points, start = subtable(where, table, "points"), subtable(where, table, "start")
+    for point in points:
+        check_name(f"{where} points", point)
+    check_keys(f"{where} start", start, Start._fields)
+    return Body(name, points, Start(**start))
 
 
-class _Reader:
-    """Reads tables whose numbers may carry units."""
+def _member(
+    where: str,
+    name: str,
+    table: Mapping[str, Any],
+    classes: Iterable[Any],
+    laws: Iterable[type[Law]],
+    folder: Path | None,
+) -> Any:
+    """Return a joint or driver; the keys of its law, if it has one, are in the same table."""
+    cls = class_of_type(where, table, "type", classes)
+    keys = table_keys(cls)
+    values: dict[str, Any] = {}
+    if "law" in keys:
+        law = class_of_type(where, table, "law", laws)
+        check_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *table_keys(law)))
+        values["law"] = law(**_values(where, law, table, folder))
+    else:
+        check_keys(where, table, ("type", *keys))
+    return cls(name=name, **values, **_values(where, cls, table, folder))
 
-    def __init__(self, length_unit: str, folder: Path | None) -> None:
-        self.length_unit = length_unit
-        self.folder = folder
 
-    def number(self, where: str, value: object, quantity: Quantity) -> Any:
-        """Return a number, also from text such as '60 deg', or an expression that the mechanism resolves."""
-        return read_number(where, value, quantity, self.length_unit)
+def _values(where: str, cls: Any, table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the fields of a joint, driver, measure or law from its table, without `law`.
 
-    def body(self, name: str, table: Mapping[str, Any]) -> Body:
-        where = f"[bodies.{name}]"
-        check_keys(where, table, ("points", "start"))
-        points = {}
-        for point, value in subtable(where, table, "points").items():
-            check_name(f"{where} points", point)
-            if not isinstance(value, list) or len(value) != 2:
-                raise MechanismError(f"{where} points.{point} = {quoted(value)} must be two numbers [x, y]")
-            points[point] = Point(*(self.number(f"{where} points.{point}", v, _LENGTH) for v in value))
-        start = subtable(where, table, "start")
-        check_keys(f"{where} start", start, ("x", "y", "phi"))
-        quantities = {"x": _LENGTH, "y": _LENGTH, "phi": _ANGLE}
-        return Body(
-            name, points, Start(**{k: self.number(f"{where} start.{k}", v, quantities[k]) for k, v in start.items()})
-        )
+    Numbers stay as written; the mechanism converts and checks them.
+    """
+    keys = [key for key in keys_of(cls) if key.takes != "law"]
+    values = {key.name: _value(f"{where} {key.name}", table[key.name], key.takes) for key in keys if key.name in table}
+    if cls is Spline and "file" in table:
+        if "points" in values:
+            raise MechanismError(f"{where} has both 'points' and 'file'; the table is one or the other")
+        values["points"] = read_table(f"{where} file", table["file"], folder)
+    for key in keys:
+        if key.name not in values and key.default is REQUIRED:
+            or_file = " or 'file'" if key.name == "points" else ""
+            raise MechanismError(f"{where} needs the key '{key.name}'{or_file}; keys: {listed(table_keys(cls))}")
+    return values
 
-    def joint(self, name: str, table: Mapping[str, Any]) -> Joint:
-        laws = [law for law in LAWS if law is not External]  # nothing from outside moves a cam
-        joint: Joint = self.member(f"[joints.{name}]", name, table, JOINTS, laws)
-        return joint
 
-    def driver(self, name: str, table: Mapping[str, Any]) -> Driver:
-        driver: Driver = self.member(f"[drivers.{name}]", name, table, DRIVERS, LAWS)
-        return driver
+def _value(where: str, value: Any, takes: Takes) -> Any:
+    """Return the value of one key, lists as tuples."""
+    if takes == "text":
+        return text_of(where, value)
+    if takes == "truth" and not isinstance(value, bool):
+        raise MechanismError(f"{where} = {quoted(value)} must be true or false")
+    if takes == "measure":
+        return _measure(where, value)
+    if takes == "segments":
+        return _segments(where, value)
+    if takes == "pair":
+        if not isinstance(value, list) or len(value) != 2:
+            raise MechanismError(f"{where} = {quoted(value)} must be two points ['body.point', 'body.point']")
+        return tuple(text_of(where, one, "text such as 'body.point'") for one in value)
+    if takes == "numbers":
+        if not isinstance(value, list):
+            raise MechanismError(f"{where} = {quoted(value)} must be a list of numbers [c0, c1, ...]")
+        return tuple(value)
+    if takes == "points":
+        if not isinstance(value, list) or any(not isinstance(point, list) or len(point) != 2 for point in value):
+            raise MechanismError(f"{where} = {quoted(value)} must be a list of points [[x, u], [x, u], ...]")
+        return tuple(map(tuple, value))
+    return value
 
-    def member(
-        self, where: str, name: str, table: Mapping[str, Any], classes: Iterable[Any], laws: Iterable[type[Law]]
-    ) -> Any:
-        """Return a joint or driver; the keys of its law, if it has one, are in the same table."""
-        cls = class_of_type(where, table, "type", classes)
-        keys = member_keys(cls)
-        values: dict[str, Any] = {}
-        if "law" in keys:
-            law = class_of_type(where, table, "law", laws)
-            check_keys(where, table, ("type", "law", *(key for key in keys if key != "law"), *law_keys(law)))
-            values["law"] = read_law(where, table, law, self.folder)
-        else:
-            check_keys(where, table, ("type", *keys))
-        return cls(name=name, **values, **self.values(where, cls, table))
 
-    def run(self, table: Mapping[str, Any]) -> RunSettings:
-        check_keys("[run]", table, ("start", "stop", "step"))
-        return RunSettings(**{key: self.number(f"[run] {key}", value, _TIME) for key, value in table.items()})
+def _measure(where: str, table: Any) -> Measure:
+    """Return a measure from a table such as { measure = "angle", of = "rocker" }."""
+    if not isinstance(table, dict):
+        example = '{ measure = "angle", of = "rocker" }'
+        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
+    cls = class_of_type(where, table, "measure", MEASURES)
+    check_keys(where, table, ("measure", *table_keys(cls)))
+    measure: Measure = cls(**_values(where, cls, table, None))
+    return measure
 
-    def values(self, where: str, cls: type, table: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the fields of a joint, driver or measure from its table, without the law."""
-        values: dict[str, Any] = {}
-        for key in keys_of(cls):
-            if key.takes == "law":
-                continue
-            if key.name not in table:
-                if key.default is REQUIRED:
-                    raise MechanismError(f"{where} needs the key '{key.name}'; keys: {listed(member_keys(cls))}")
-                continue
-            value, spot = table[key.name], f"{where} {key.name}"
-            if isinstance(key.measures, Quantity):
-                values[key.name] = self.number(spot, value, key.measures)
-            elif key.takes == "measure":
-                values[key.name] = self.measure(spot, value)
-            elif key.takes == "text":
-                values[key.name] = text_of(spot, value)
-            else:
-                if not isinstance(value, list) or len(value) != 2:
-                    raise MechanismError(f"{spot} = {quoted(value)} must be two points ['body.point', 'body.point']")
-                values[key.name] = tuple(text_of(spot, v, "text such as 'body.point'") for v in value)
-        return values
 
-    def measure(self, where: str, table: Any) -> Measure:
-        """Return a measure from a table such as { measure = "angle", of = "rocker" }."""
-        if not isinstance(table, dict):
-            example = '{ measure = "angle", of = "rocker" }'
-            raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
-        cls = class_of_type(where, table, "measure", MEASURES)
-        check_keys(where, table, ("measure", *member_keys(cls)))
-        measure: Measure = cls(**self.values(where, cls, table))
-        return measure
+def _segments(where: str, value: Any) -> tuple[Segment, ...]:
+    example = '{ law = "cycloidal", rise = 1, duration = 2 }'
+    if not isinstance(value, list) or any(not isinstance(segment, dict) for segment in value):
+        raise MechanismError(f"{where} = {quoted(value)} must be a list of tables such as {example}")
+    return tuple(_segment(f"{where}, segment {k}:", table) for k, table in enumerate(value, start=1))
+
+
+def _segment(where: str, table: Mapping[str, Any]) -> Segment:
+    check_keys(where, table, _SEGMENT)
+    text_of(f"{where} law", table.get("law", ""))
+    is_rise = table.get("law") in [rise.type for rise in RISES]
+    for key in _SEGMENT if is_rise else ("law", "duration"):
+        if key not in table:
+            raise MechanismError(f"{where} needs the key '{key}'; keys: {listed(_SEGMENT)}")
+    return Segment(**table)
+
+
+def _run(table: Mapping[str, Any]) -> RunSettings:
+    check_keys("[run]", table, ("start", "stop", "step"))
+    return RunSettings(**table)
 
 
 def _parameter(name: str, value: Any) -> Parameter:

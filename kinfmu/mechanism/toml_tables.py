@@ -6,13 +6,14 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.laws import Spline
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.valid import check_name, quoted
 
 
-def member_keys(cls: type) -> list[str]:
-    """Return the names of the keys of a joint, driver or measure in its table."""
-    return [key.name for key in keys_of(cls)]
+def table_keys(cls: type) -> list[str]:
+    """Return the names of the keys of a joint, driver, measure or law; the points of a spline can be in a `file`."""
+    return [key.name for key in keys_of(cls)] + (["file"] if cls is Spline else [])
 
 
 def class_of_type(where: str, table: Mapping[str, Any], key: str, classes: Iterable[Any]) -> Any:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields
+from typing import Any
 
+from kinfmu.laws.sequence import DWELL
 from kinfmu.measures import Measure
 from kinfmu.mechanism.body import RunSettings
+from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
-from kinfmu.mechanism.law_table import law_lines
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
-from kinfmu.mechanism.toml_tables import member_keys
 from kinfmu.units import unit_of
 
 
@@ -21,7 +23,7 @@ def text(mechanism: Mechanism) -> str:
         lines.append(f"title = {_toml(mechanism.title)}")
     lines += ["", "[units]", f"length = {_toml(mechanism.length_unit)}"]
     if mechanism.parameters:
-        lines += ["", "[parameters]", *(_written(name, p, mechanism) for name, p in mechanism.parameters.items())]
+        lines += ["", "[parameters]", *(_parameter(name, p, mechanism) for name, p in mechanism.parameters.items())]
     lines += ["", "[run]"]
     lines += [f"{key.name} = {_toml(getattr(mechanism.run, key.name))}" for key in fields(RunSettings)]
     for body in mechanism.bodies:
@@ -33,20 +35,32 @@ def text(mechanism: Mechanism) -> str:
             lines.append(f"start = {{ {start} }}")
     for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
         for member in members:
-            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}"]
-            for key in member_keys(type(member)):
-                value = getattr(member, key)
-                if key == "law":
-                    lines += law_lines(value, _toml)
-                else:
-                    lines.append(f"{key} = {_toml(value)}")
+            lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member)]
     if mechanism.points:
         lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
     lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
     return "\n".join(lines) + "\n"
 
 
-def _written(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
+def _keys(member: Any) -> Iterator[str]:
+    """Yield the lines of a joint, a driver or its law."""
+    cls: object = type(member)  # object: mypy does not take type[Any] for hashable
+    for key in keys_of(cls):
+        value = getattr(member, key.name)
+        if key.takes == "law":
+            yield f"law = {_toml(value.type)}"
+            yield from _keys(value)
+        elif key.takes == "segments":
+            yield "segments = ["
+            for law, duration, rise in value:
+                of_rise = f"rise = {_toml(rise)}, " if law != DWELL else ""
+                yield f"    {{ law = {_toml(law)}, {of_rise}duration = {_toml(duration)} }},"
+            yield "]"
+        else:
+            yield f"{key.name} = {_toml(value)}"
+
+
+def _parameter(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
     """Return the line of a parameter: its expression, or its number with its unit."""
     value: object = parameter.value
     if parameter.expression is None and parameter.quantity and parameter.kind != "number":
@@ -60,7 +74,7 @@ def _toml(value: object) -> str:
     if isinstance(value, Computed):
         value = value.expression.text
     if isinstance(value, Measure):
-        keys = {key: getattr(value, key) for key in member_keys(type(value))}
+        keys = {key.name: getattr(value, key.name) for key in keys_of(type(value))}
         table = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in table.items()) + " }"
     if isinstance(value, str):

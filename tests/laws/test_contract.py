@@ -21,8 +21,8 @@ from kinfmu.equations.graph import Graph, evaluate
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Spline
-from kinfmu.mechanism.law_table import law_keys
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 from kinfmu.solver.python.status import Status
 from tests.joints.drawn import coordinates, laws, splines
@@ -58,7 +58,7 @@ def test_a_law_is_a_frozen_dataclass_that_is_exported_and_shows_its_equation(cls
 @every_law
 def test_no_key_of_a_law_is_a_key_of_a_joint_or_driver(cls: type[Law]) -> None:
     theirs = {field.name for member in (*JOINTS, *DRIVERS) for field in dataclasses.fields(member)}  # type: ignore[arg-type]
-    assert not set(law_keys(cls)) & (theirs | {"type", "law"})
+    assert not set(table_keys(cls)) & (theirs | {"type", "law"})
 
 
 @every_law

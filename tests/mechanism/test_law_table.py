@@ -21,8 +21,8 @@ from kinfmu import (
 )
 from kinfmu.errors import MechanismError
 from kinfmu.laws import Law
-from kinfmu.mechanism.law_table import law_keys
 from kinfmu.mechanism.toml_file import parse, read
+from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.mechanism.toml_text import text
 
 ARM = """name = "arm"
@@ -229,7 +229,7 @@ WRONG = {
     ),
     "a misspelt key of a segment": (
         f'{SEQUENCE}segments = [{{ law = "dwell", duraton = 1 }}]',
-        "segments, segment 1: 'duraton' is not a key; did you mean 'duration'?; keys: law, rise, duration",
+        "segments, segment 1: duraton: unknown key; did you mean 'duration'?; keys: law, rise, duration",
     ),
     "a segment of no duration": (
         f'{SEQUENCE}segments = [{SEGMENT}, {{ law = "dwell", duration = -1 }}]',
@@ -318,5 +318,5 @@ def test_laws_made_in_python_are_checked_by_the_mechanism() -> None:
 
 
 def test_keys_of_a_spline_name_the_file() -> None:
-    assert law_keys(Spline) == ["points", "ends", "file"]
-    assert law_keys(Cycloidal) == ["rise", "duration", "start", "begin"]
+    assert table_keys(Spline) == ["points", "ends", "file"]
+    assert table_keys(Cycloidal) == ["rise", "duration", "start", "begin"]
