@@ -6,11 +6,11 @@ from collections.abc import Callable
 from importlib import import_module
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import click
 
 from kinfmu import gallery
+from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.group import main
 from kinfmu.cli.progress import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
@@ -28,7 +28,7 @@ MEASUREMENTS = ("accuracy", *TEXTS)
 ALL = "all"
 
 
-class Named(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic in newer clicks only
+class Named(ArgumentType):
     """One of a few names; the message for an unknown name suggests the nearest."""
 
     def __init__(self, name: str, what: str, known: Callable[[], list[str]]) -> None:
@@ -36,12 +36,11 @@ class Named(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
         self.what = what
         self.known = known
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def read(self, text: str) -> str:
         known = self.known()
-        if value in known:
-            return str(value)
-        message = f"'{value}' is not {self.what}{suggestion(str(value), known)}; known: {listed(known)}"
-        return self.fail(message, param, ctx)
+        if text not in known:
+            raise ValueError(f"'{text}' is not {self.what}{suggestion(text, known)}; known: {listed(known)}")
+        return text
 
 
 def _with_reference() -> list[str]:

@@ -8,15 +8,15 @@ from typing import Any
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, names_in, set_option
+from kinfmu.cli.arguments import mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import checked_settings
+from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import listed
 
 
 @main.command(epilog="Example: kinfmu build fourbar --fmi 3 -o fourbar.fmu")
-@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@mechanism_argument
 @click.option(
     "-o",
     "output",
@@ -50,7 +50,7 @@ from kinfmu.errors import listed
     help="What moves the drivers: time, by the laws of the file, or inputs such as crank_angle. Default: time, or "
     "inputs if a law is external. The FMU's parameter driven_by_time changes it.",
 )
-@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; only what they need is solved.")
+@outputs_option
 @set_option
 def build(
     mechanism: str,

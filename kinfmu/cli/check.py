@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, driver_value, set_option
-from kinfmu.cli.files import OutputFile
+from kinfmu.cli.arguments import OutputFile, mechanism_argument
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.settings import checked_settings
+from kinfmu.cli.quantities import driver_value
+from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import KinfmuError, listed
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ FIGURES = (".svg", ".png")
 
 
 @main.command(epilog="Example: kinfmu check fourbar --figure fourbar.svg")
-@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@mechanism_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, for programs.")
 @click.option("--matrices", is_flag=True, help="Also print the Jacobians at the start pose and at singular points.")
 @click.option("--assemblies", is_flag=True, help="List the ways to assemble the mechanism, and how to choose one.")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import along, names_in
-from kinfmu.cli.files import InputFile, OutputFile
+from kinfmu.cli.arguments import InputFile, OutputFile, names_in
 from kinfmu.cli.group import main
+from kinfmu.cli.quantities import on_axis
 from kinfmu.errors import RequestError, listed
 from kinfmu.files.whole_file import suffix_of
 
@@ -56,10 +56,14 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
 
     from kinfmu.run.axis import axis_of
 
-    axis, ends = axis_of(run), (along(start, "--start", run), along(stop, "--stop", run))
-    first, last = (
-        free if end is None else end / axis.factor for free, end in zip((-math.inf, math.inf), ends, strict=True)
-    )
+    axis = axis_of(run)
+
+    def end(option: str, text: str | None, default: float) -> float:
+        if text is None:
+            return default
+        return on_axis(option, text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
+
+    first, last = end("--start", start, -math.inf), end("--stop", stop, math.inf)
     edge = 0.0 if axis.is_time else 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1])) if len(run) else 0.0
     rows = (axis.values >= first - edge) & (axis.values <= last + edge)
     if not rows.any():

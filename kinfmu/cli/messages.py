@@ -1,4 +1,4 @@
-"""Notes and warnings on stderr, one line each."""
+"""Messages: notes, warnings and errors of a run on stderr, one line each; its verdict on stdout."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import unicodedata
 from typing import TYPE_CHECKING
 
 import click
+
+from kinfmu.errors import KinfmuError
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
@@ -27,9 +29,27 @@ def warn(text: str) -> None:
     click.echo(f"kinfmu: warning: {printable(text)}", err=True)
 
 
-def print_events(run: Run) -> None:
-    """Print the notes and warnings of a run, each once; `fail_if_failed` reports errors."""
+def report(run: Run, *after: str, by_samples: bool = False) -> None:
+    """Print the notes and warnings of a finished run, each once, and its verdict.
+
+    Args:
+        run: The run.
+        after: What follows the verdict: the end of its line, then other lines.
+        by_samples: True: the times of the run are sample numbers, from 0.
+
+    Raises:
+        KinfmuError: The first event of level "error", with its time [s].
+
+    """
+    from kinfmu.log.verdict import sentence
+
     printers = {"info": note, "warning": warn}
     for level, text in dict.fromkeys((event.level, event.text) for event in run.events):
         if level in printers:
             printers[level](text)
+    click.echo("\n".join(["; ".join([sentence(run), *after[:1]]), *after[1:]]))
+    for event in run.events:
+        if event.level == "error":
+            has_time = event.text.startswith("at t = ")  # an FMU writes the time itself
+            when = f"sample {event.t:.0f}" if by_samples else f"at t = {event.t:g} s"
+            raise KinfmuError(event.text if has_time else f"{when}: {event.text}")

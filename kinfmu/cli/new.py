@@ -7,15 +7,14 @@ from pathlib import Path
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM
-from kinfmu.cli.files import OutputFile, exists
+from kinfmu.cli.arguments import OutputFile, exists, mechanism_argument
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 from kinfmu.files.whole_file import write_whole
 
 
 @main.command(epilog="Example: kinfmu new fourbar mine.toml")
-@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@mechanism_argument
 @click.argument("file", type=OutputFile(".toml"))
 def new(mechanism: str, file: Path) -> None:
     """Write a commented mechanism file to start from.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from kinfmu.cli.files import InputFile, OutputFile
+from kinfmu.cli.arguments import InputFile, OutputFile
 from kinfmu.cli.group import main
 
 
@@ -24,8 +24,8 @@ def recover(run: Path, output: Path | None) -> None:
     RUN is a truncated or damaged record (.mcap). It is not changed.
     """
     from kinfmu.cli.messages import printable
-    from kinfmu.cli.verdict import verdict
     from kinfmu.log import recover as recovered
+    from kinfmu.log.verdict import sentence
     from kinfmu.run.axis import axis_of
 
     target = output or run.with_name(f"{run.stem}-recovered.mcap")
@@ -33,4 +33,4 @@ def recover(run: Path, output: Path | None) -> None:
     for event in found.events[-1:]:
         if event.level == "warning":
             click.echo(printable(f"at {axis_of(found).place(event.t)}: {event.text}"))
-    click.echo(f"{verdict(found)}; written to {target}")
+    click.echo(f"{sentence(found)}; written to {target}")

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinfmu.cli.arguments import on_axis
-from kinfmu.cli.files import InputFile, OutputFile
+from kinfmu.cli.arguments import InputFile, OutputFile
 from kinfmu.cli.group import main
 from kinfmu.cli.messages import note
+from kinfmu.cli.quantities import on_axis
 from kinfmu.errors import listed
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def review(run: Path, other: Path | None, save: Path | None, screenshot: Path | 
         raise click.UsageError("--at needs --screenshot")
 
     def moment(timeline: Timeline) -> float:
-        return on_axis(at or "", "--at", timeline.label, timeline.unit)
+        return on_axis("--at", at or "", timeline.label, timeline.unit)
 
     place = None if at is None else moment
     recording = reviewed(run, other, save=save, screenshot=screenshot, at=place, report=note)

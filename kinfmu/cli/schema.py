@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from kinfmu.cli.files import OutputFile
+from kinfmu.cli.arguments import OutputFile
 from kinfmu.cli.group import main
 from kinfmu.errors import KinfmuError
 from kinfmu.files.whole_file import write_whole

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.messages import note
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
@@ -24,6 +25,27 @@ _ELSEWHERE = {
     DRIVEN_BY_TIME: "it belongs to an FMU; use simulate, or set its default with build --drive",
     RATES: "it belongs to an FMU; use simulate, with auto, estimated or wired",
 }
+
+
+class Setting(ArgumentType):
+    """NAME=VALUE."""
+
+    name = "NAME=VALUE"
+
+    def read(self, text: str) -> tuple[str, str]:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise ValueError(f"'{text}' must be NAME=VALUE, such as crank.speed=30rpm")
+        return name, value
+
+
+set_option = click.option(
+    "--set",
+    "settings",
+    type=Setting(),
+    multiple=True,
+    help="Set a parameter or a law's constant, such as crank=40mm or crank.speed=30rpm. Repeat for several.",
+)
 
 
 @dataclass(frozen=True)

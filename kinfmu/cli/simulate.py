@@ -10,13 +10,12 @@ from shlex import quote
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MODEL, TIME, set_option
-from kinfmu.cli.files import InputFile, OutputFile
+from kinfmu.cli.arguments import InputFile, ModelName, OutputFile
 from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
-from kinfmu.cli.messages import print_events
+from kinfmu.cli.messages import report
 from kinfmu.cli.progress import Progress
-from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, checked_settings
-from kinfmu.cli.verdict import fail_if_failed, verdict
+from kinfmu.cli.quantities import Time
+from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, checked_settings, set_option
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.files.whole_file import suffix_of
 
@@ -24,10 +23,10 @@ LOGS = Path("logs")
 
 
 @main.command(epilog="Example: kinfmu simulate fourbar --stop 90 --step 0.5")
-@click.argument("model", metavar="FMU|MECH", type=MODEL)
-@click.option("--start", type=TIME, help="Start time [s]. Default: first row of --input, else that of the model.")
-@click.option("--stop", type=TIME, help="Stop time [s]. Default: last row of --input, else that of the model.")
-@click.option("--step", type=TIME, help="Communication step [s]. Default: that of the model.")
+@click.argument("model", metavar="FMU|MECH", type=ModelName())
+@click.option("--start", type=Time(), help="Start time [s]. Default: first row of --input, else that of the model.")
+@click.option("--stop", type=Time(), help="Stop time [s]. Default: last row of --input, else that of the model.")
+@click.option("--step", type=Time(), help="Communication step [s]. Default: that of the model.")
 @click.option(
     "--input",
     "inputs",
@@ -102,12 +101,9 @@ def simulate(
     if recording:
         with on_interrupt(f"stopped before the recording was written; the run is in {record}"):
             write_rrd(run, recording)
-    print_events(run)
     replaced = " (an older run of that name was replaced)" if is_replaced else ""
-    click.echo(f"{verdict(run)}; written to {record} and {recording}{replaced}" if record else verdict(run))
-    if record:
-        click.echo(f"to review it: kinfmu review {quote(str(record))}")
-    fail_if_failed(run)
+    written = [f"written to {record} and {recording}{replaced}", f"to review it: kinfmu review {quote(str(record))}"]
+    report(run, *(written if record else ()))
 
 
 def _fmu(

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kinfmu import gallery
-from kinfmu.cli.arguments import MECHANISM, OUTPUTS_HELP, Range, is_bare, names_in, set_option
-from kinfmu.cli.files import OutputFile
+from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main, on_interrupt
-from kinfmu.cli.messages import note, print_events, warn
-from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, tolerance_of
-from kinfmu.cli.verdict import fail_if_failed, verdict
+from kinfmu.cli.messages import note, report, warn
+from kinfmu.cli.quantities import Range, is_bare
+from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
 from kinfmu.errors import listed
 from kinfmu.files.whole_file import suffix_of
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
@@ -28,7 +27,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
 
 
 @main.command(epilog="Example: kinfmu solve fourbar -o run.csv --angle 0deg:360deg:361")
-@click.argument("mechanism", type=MECHANISM, metavar="MECH")
+@mechanism_argument
 @click.option(
     "-o",
     "output",
@@ -51,7 +50,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
     "rad or in the file's unit of length. Rates are derivatives with respect to the driver; time counts the samples.",
 )
 @click.option("--wrap", is_flag=True, help="Unwrap --angle: no step is more than half a turn.")
-@click.option("--outputs", metavar="NAMES", help=f"{OUTPUTS_HELP}; only what they need is solved.")
+@outputs_option
 @click.option(
     "--engine",
     type=click.Choice(["auto", "python", "native"]),
@@ -109,9 +108,7 @@ def solve(
         write_mcap(run, output)
     else:
         write_table(run, output)
-    print_events(run)
-    click.echo(f"{verdict(run)}; written to {output}")
-    fail_if_failed(run, by_samples=angle is not None)
+    report(run, f"written to {output}", by_samples=angle is not None)
 
 
 def _check_one_driver(name: str, given: Settings) -> None:

@@ -107,7 +107,7 @@ def _unwrapped(table: InputTable, quantities: Mapping[str, Quantity]) -> InputTa
     """Return the table with its angles unwrapped."""
     angles = [quantities[name] == Quantity("angle") for name in table.names]
     if not any(angles):
-        raise RequestError(f"{table.source}: wrap follows angles, and no column is one; columns: {listed(table.names)}")
+        raise RequestError(f"{table.source}: wrap unwraps angles, and no column is one; columns: {listed(table.names)}")
     columns = [unwrap(column) if is_angle else column for column, is_angle in zip(table.values.T, angles, strict=True)]
     return replace(table, values=np.column_stack(columns))
 

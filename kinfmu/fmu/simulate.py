@@ -100,7 +100,7 @@ def simulate(
             about = description.read(xml.encode(), str(path))
             interface = about.interface
             if wrap and inputs is None:
-                raise RequestError("wrap follows angles among the inputs, and no inputs are given")
+                raise RequestError("wrap unwraps angles among the inputs, and no inputs are given")
             table = None if inputs is None else input_table(inputs, interface, wrap=wrap)
             experiment = interface.experiment
             t = _times(table or experiment, start, stop, experiment.step if step is None else step)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,13 +76,20 @@ class LibraryResult:
 class Library:
     """The compiled model and solver of a plan.
 
+    Args:
+        plan: The plan.
+        parameters: Values to set by continuation from those of the plan; default: those of the plan.
+        tolerance: Residual relative to the size above which a sample is not ok.
+
     Raises:
         CompilerError: It cannot be compiled, cached or loaded.
 
     """
 
-    def __init__(self, plan: SolvePlan) -> None:
+    def __init__(self, plan: SolvePlan, parameters: Sequence[float] = (), tolerance: float = TOLERANCE) -> None:
         self.plan = plan
+        self._parameters = parameters
+        self._tolerance = tolerance
         files = emit(plan) | compiler.runtime() | sources(plan)
         library = self._library = compiler.load(files, FLAGS)
         library.kf_sweep_new.restype = ctypes.c_void_p
@@ -97,13 +105,11 @@ class Library:
         library.kf_sweep_message.argtypes = [ctypes.c_void_p]
         library.kf_drive_all.restype = ctypes.c_bool
 
-    def drive(
-        self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return (n, d) driver values, speeds and accelerations at times; default parameters: those of the plan."""
+    def drive(self, times: FloatArray, constants: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return (n, d) driver values, speeds and accelerations at times."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
-        values = parameters or [parameter.value for parameter in self.plan.parameters]
+        values = self._parameters or [parameter.value for parameter in self.plan.parameters]
         given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
         if not self._library.kf_drive_all(ctypes.c_int64(len(times)), _start(times), *given, *map(_start, driven)):
             raise KinfmuError("these parameters have no solution")
@@ -113,8 +119,6 @@ class Library:
         self,
         driven: tuple[FloatArray, FloatArray, FloatArray],
         tables: Sequence[FloatArray | None],
-        parameters: Sequence[float] = (),
-        tolerance: float = TOLERANCE,
         reuse: LibraryResult | None = None,
     ) -> LibraryResult:
         """Fill tables of values, rates and accelerations; NaN for samples that cannot be reached.
@@ -122,8 +126,6 @@ class Library:
         Args:
             driven: (n, d) driver values, speeds and accelerations.
             tables: Three arrays (n, outputs), by samples or by outputs; None: not wanted.
-            parameters: Values to set by continuation; default: those of the plan.
-            tolerance: Residual relative to the size above which a sample is not ok.
             reuse: Result of an earlier sweep of as many samples, whose arrays are overwritten.
 
         Returns:
@@ -152,7 +154,7 @@ class Library:
         job.residual, job.watches = _start(result.residual), _start(result.watch)
         job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
         job.messages = ctypes.cast(messages, ctypes.c_char_p)
-        with _Memory(self._library, self._refusal(count), tolerance, parameters) as memory:
+        with self._memory(count) as memory:
             if not self._library.kf_sweep_run(memory, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(count))
         failed = []
@@ -172,17 +174,29 @@ class Library:
         self,
         driven: tuple[FloatArray, FloatArray, FloatArray],
         outcomes: NDArray[np.int32],
-        parameters: Sequence[float] = (),
-        tolerance: float = TOLERANCE,
     ) -> tuple[FloatArray, FloatArray]:
         """Return margins (n,) and estimated errors (n, 3) of swept samples with these outcomes; NaN if not good."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
         job = self._job(driven, (None, None, None))
         job.outcomes = outcomes.ctypes.data_as(ctypes.c_void_p)
-        with _Memory(self._library, self._refusal(len(margins)), tolerance, parameters) as memory:
+        with self._memory(len(margins)) as memory:
             if not self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors)):
                 raise KinfmuError(self._refusal(len(margins)))
         return margins, errors
+
+    @contextmanager
+    def _memory(self, count: int) -> Iterator[int]:
+        """Yield the memory of a sweep, with the parameters bound."""
+        library, parameters = self._library, self._parameters
+        memory = library.kf_sweep_new(self._tolerance)
+        if not memory:
+            raise KinfmuError(self._refusal(count))
+        try:
+            if parameters and not library.kf_sweep_bind(memory, (_double * len(parameters))(*parameters)):
+                raise KinfmuError(library.kf_sweep_message(memory).decode())
+            yield memory
+        finally:
+            library.kf_sweep_free(memory)
 
     def _refusal(self, count: int) -> str:
         return (
@@ -199,26 +213,6 @@ class Library:
                 row, column = (stride // table.itemsize for stride in table.strides)
                 job.tables[k] = _Table(table.ctypes.data_as(_numbers), row, column)
         return job
-
-
-class _Memory:
-    """Memory of a sweep, with its parameters bound. refusal: the message if there is none."""
-
-    def __init__(self, library: Any, refusal: str, tolerance: float, parameters: Sequence[float]) -> None:
-        self._library = library
-        self._memory = library.kf_sweep_new(tolerance)
-        if not self._memory:
-            raise KinfmuError(refusal)
-        if parameters and not library.kf_sweep_bind(self._memory, (_double * len(parameters))(*parameters)):
-            message = library.kf_sweep_message(self._memory).decode()
-            library.kf_sweep_free(self._memory)
-            raise KinfmuError(message)
-
-    def __enter__(self) -> Any:
-        return self._memory
-
-    def __exit__(self, *_: object) -> None:
-        self._library.kf_sweep_free(self._memory)
 
 
 def _start(array: FloatArray) -> Any:

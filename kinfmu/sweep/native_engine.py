@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinfmu.plan import SolvePlan
 from kinfmu.run import FloatArray
@@ -35,14 +34,12 @@ class NativeEngine:
     def __init__(
         self, plan: SolvePlan, parameters: Sequence[float], fixed: Mapping[str, float], tolerance: float
     ) -> None:
-        self._library = Library(plan)
-        self._parameters = parameters
-        self._tolerance = tolerance
+        self._library = Library(plan, parameters, tolerance)
         self.fixed = fixed
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Return driver values, speeds and accelerations at times, by the laws."""
-        return self._library.drive(times, constants, self._parameters)
+        return self._library.drive(times, constants)
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
@@ -50,39 +47,17 @@ class NativeEngine:
             table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
         )
         filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
-        result = self._library.sweep(driven, filled, self._parameters, self._tolerance)
+        result = self._library.sweep(driven, filled)
         for table, values in zip(tables, filled, strict=True):
             if table is not values:
                 table[:] = values
-        lazy = _LazyDiagnostics(self._library, driven, result.outcomes, self._parameters, self._tolerance)
+        diagnosed = cache(lambda: self._library.diagnose(driven, result.outcomes))  # both, when either is first read
         return SweepResult(
             status=result.outcomes[:, 0].astype(np.int64),
             iterations=result.outcomes[:, 1].astype(np.int64),
             residual=result.residual,
             watch=result.watch,
-            margin=lambda: lazy.diagnosed[0],
-            error=lambda: lazy.diagnosed[1],
+            margin=lambda: diagnosed()[0],
+            error=lambda: diagnosed()[1],
             failures=result.failures,
         )
-
-
-class _LazyDiagnostics:
-    """Margins and errors of a sweep, which are computed together when either is first read."""
-
-    def __init__(
-        self,
-        library: Library,
-        driven: Driven,
-        outcomes: NDArray[np.int32],
-        parameters: Sequence[float],
-        tolerance: float,
-    ) -> None:
-        self._library = library
-        self._driven = driven
-        self._outcomes = outcomes
-        self._parameters = parameters
-        self._tolerance = tolerance
-
-    @cached_property
-    def diagnosed(self) -> tuple[FloatArray, FloatArray]:
-        return self._library.diagnose(self._driven, self._outcomes, self._parameters, self._tolerance)

@@ -95,7 +95,7 @@ def solve(
         times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
         driven, axis = (u, ud, udd), axis_for(u, tuple(driver.inputs[0] for driver in plan.drivers))
     elif wrap:
-        raise RequestError("wrap follows angles given as inputs, such as crank_angle; times by a law have no jumps")
+        raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
     elif inputs:
         raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     else:
@@ -224,7 +224,7 @@ def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: 
     columns = {name: _column(name, value) for name, value in inputs.items()}
     angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
     if wrap and not angles:
-        raise RequestError(f"wrap follows angles, and no input is one; inputs: {listed(known)}")
+        raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
     columns |= {name: unwrap(columns[name]) for name in angles if wrap}
     lengths = {len(column) for column in columns.values() if len(column) > 1}
     if len(lengths) > 1:

@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 def program(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """The command in a process of its own."""
     return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "kinfmu.cli", *arguments],
+        [sys.executable, "-W", "error", "-m", "kinfmu", *arguments],
         cwd=cwd,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -90,7 +90,7 @@ def test_build_and_simulate_step_an_fmu_into_logs(command: Command, tmp_path: Pa
     result = command("simulate", "four.fmu", "--start", "20", "--stop", "30", "--step", "5", *logs)
     assert result.exit_code == 0
     assert result.stdout.splitlines()[1:] == ["to review it: kinfmu review four.mcap"]
-    assert result.stdout.startswith("3 samples: 3 ok; largest residual ")
+    assert result.stdout.startswith("3 samples: 3 ok; worst residual ")
     run = log.read(tmp_path / "four.mcap")
     assert run.t.tolist() == [20.0, 25.0, 30.0]
     assert run["coupler.y"][2] == pytest.approx(0.5, abs=1e-12)
@@ -378,7 +378,7 @@ def test_native_fmus_are_built_and_simulated(command: Command, tmp_path: Path, f
     )
     logs = ("--mcap", "four.mcap", "--rrd", "four.rrd")
     result = command("simulate", "four.fmu", "--start", "20", "--stop", "21", *logs)
-    assert result.stdout.startswith("2 samples: 2 ok; largest residual ")
+    assert result.stdout.startswith("2 samples: 2 ok; worst residual ")
     phi = log.read(tmp_path / "four.mcap")["crank.phi"].tolist()
     assert phi == pytest.approx([math.radians(20.0), math.radians(21.0)])
 

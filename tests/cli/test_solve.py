@@ -17,8 +17,8 @@ from tests.cli.conftest import Command, read_csv
 def test_the_run_of_the_file_is_solved_to_its_end(command: Command, tmp_path: Path) -> None:
     result = command("solve", "fourbar", "-o", "run.csv")
     assert result.exit_code == 0
-    assert result.stdout.startswith("181 samples: 175 ok, 6 bridged; largest residual ")
-    assert result.stdout.endswith("of the size; written to run.csv\n")
+    assert result.stdout.startswith("181 samples: 175 ok, 6 bridged; worst residual ")
+    assert result.stdout.endswith(" s; written to run.csv\n")
     table = read_csv(tmp_path / "run.csv")
     assert table["time"].tolist() == list(range(181))
     np.testing.assert_allclose(table["coupler.x"], 1.0 + np.cos(np.radians(table["time"])), atol=1e-12)

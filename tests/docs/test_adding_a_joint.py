@@ -60,7 +60,7 @@ def test_the_mechanism_of_the_page_solves_as_the_page_says(project: Path) -> Non
     (mechanism,) = blocks("toml")
     (project / "vice.toml").write_text(mechanism, encoding="utf-8")
     for command in re.findall(r"^    kinfmu (\w+ vice\.toml.*)$", PAGE, re.MULTILINE):
-        done = run(project, "-m", "kinfmu.cli", *command.split())
+        done = run(project, "-m", "kinfmu", *command.split())
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
     with (project / "vice.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
@@ -76,6 +76,6 @@ def test_a_wrong_value_is_reported_in_one_line(project: Path) -> None:
     (project / "wrong.toml").write_text(
         mechanism.replace('other = "right_jaw.P"', 'other = "ground.O"'), encoding="utf-8"
     )
-    done = run(project, "-m", "kinfmu.cli", "check", "wrong.toml")
+    done = run(project, "-m", "kinfmu", "check", "wrong.toml")
     assert done.returncode == 1
     assert done.stderr == ("kinfmu: wrong.toml: [joints.spindle] other = 'ground.O' must be a point of a third body\n")

@@ -169,7 +169,7 @@ def test_arrays_of_unequal_length_are_refused(fourbar: Path) -> None:
         ({"step": 0.0}, "a positive step"),
         ({"start": 9.0, "stop": 1.0}, "start <= stop"),
         ({"inputs": "nowhere.csv"}, r"nowhere\.csv: cannot be read"),
-        ({"wrap": True}, "wrap follows angles among the inputs, and no inputs are given"),
+        ({"wrap": True}, "wrap unwraps angles among the inputs, and no inputs are given"),
         (
             {"inputs": {"time": [0.0, 2.0], "crank_angle": [1.0, 2.0]}, "stop": 3.0},
             "inputs: holds 0 to 2 s, the run goes from 0 to 3 s; choose start and stop within the rows",

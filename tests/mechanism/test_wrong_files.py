@@ -247,7 +247,7 @@ def test_a_separate_process_reports_the_same_line(case: str, tmp_path: Path) -> 
     written, expected = content(case)
     path.write_bytes(written)
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "kinfmu.cli", "check", str(path)],
+        [sys.executable, "-W", "error", "-m", "kinfmu", "check", str(path)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,

@@ -52,8 +52,8 @@ def test_wrap_makes_a_difference_where_a_mechanism_does_not_repeat_each_turn() -
 @pytest.mark.parametrize(
     ("name", "arguments", "message"),
     [
-        ("fourbar", {"t": [0.0]}, "wrap follows angles given as inputs, such as crank_angle; times by a law have no"),
-        ("fourbar", {}, "wrap follows angles given as inputs"),
+        ("fourbar", {"t": [0.0]}, "wrap unwraps angles given as inputs, such as crank_angle; times by a law have no"),
+        ("fourbar", {}, "wrap unwraps angles given as inputs"),
         ("parallel_jaw", {"piston_position": [1.0]}, "no input is one; inputs: piston_position, piston_speed"),
     ],
 )
@@ -72,5 +72,5 @@ def test_simulate_follows_wrapped_angles_between_the_rows_of_a_table(tmp_path: P
     assert np.degrees(as_it_stands["crank.phi"]) == pytest.approx([300.0, 325.0, 350.0, 195.0, 40.0])
     with pytest.raises(KinfmuError, match="no inputs are given"):
         simulate(fmu, wrap=True)
-    with pytest.raises(KinfmuError, match="wrap follows angles, and no column is one; columns: crank_speed"):
+    with pytest.raises(KinfmuError, match="wrap unwraps angles, and no column is one; columns: crank_speed"):
         simulate(fmu, wrap=True, inputs={"time": [0.0, 200.0], "crank_speed": [1.0, 1.0]})
