@@ -34,10 +34,18 @@ static kf_instance *common(fmi2Component c)
     return c ? &((instance2 *)c)->common : NULL;
 }
 
-static fmi2Status unsupported(fmi2Component c, const char *what)
-{
-    return c ? (fmi2Status)kf_answered(common(c), KF_ERROR, "%s", what) : fmi2Error;
-}
+#define FMI(name) fmi2##name
+#define VALUE_COUNT
+#define CHECKED kf_check(common(c), references, values, count)
+#define fmi2FMUState fmi2FMUstate /* names that FMI 3.0 writes otherwise */
+#define fmi2GetFMUState fmi2GetFMUstate
+#define fmi2SetFMUState fmi2SetFMUstate
+#define fmi2FreeFMUState fmi2FreeFMUstate
+#define fmi2SerializedFMUStateSize fmi2SerializedFMUstateSize
+#define fmi2SerializeFMUState fmi2SerializeFMUstate
+#define fmi2DeserializeFMUState fmi2DeSerializeFMUstate
+#define fmi2GetContinuousStateDerivatives fmi2GetDerivatives
+#include "fmi_both.h"
 
 const char *fmi2GetTypesPlatform(void)
 {
@@ -49,12 +57,9 @@ const char *fmi2GetVersion(void)
     return fmi2Version;
 }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
-{
-    return c ? (fmi2Status)kf_set_logging(common(c), loggingOn != fmi2False, nCategories, categories) : fmi2Error;
-}
-
-/* Resources are not read, so any path is accepted; memory comes from the C library. */
+/* Resources are not read, so any path is accepted; memory comes from the C library. There are no debug messages, so
+ * `loggingOn` has no effect: all messages sent state why a status is not OK.
+ */
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
 {
@@ -62,9 +67,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     const fmi2CallbackLogger logger = functions ? functions->logger : NULL;
     const fmi2ComponentEnvironment environment = functions ? functions->componentEnvironment : NULL;
     instance2 *instance;
-    (void)fmuResourceLocation;
-    (void)visible;
-    (void)loggingOn; /* there are no debug messages: all messages sent state why a status is not OK */
     if (!kf_token_fits(fmuGUID)) {
         if (logger) {
             logger(environment, name, fmi2Error, kf_categories[2], "the guid is not that of this FMU, " KF_TOKEN);
@@ -85,16 +87,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     return instance;
 }
 
-void fmi2FreeInstance(fmi2Component c)
-{
-    free(c);
-}
-
+/* Newton always goes to round-off, whatever the tolerance. */
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    (void)toleranceDefined; /* Newton always goes to round-off, whatever the tolerance */
-    (void)tolerance;
     return c ? (fmi2Status)kf_set_experiment(common(c), startTime, stopTimeDefined != fmi2False, stopTime) : fmi2Error;
 }
 
@@ -103,62 +99,9 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     return c ? (fmi2Status)kf_enter_initialization(common(c)) : fmi2Error;
 }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c)
-{
-    return c ? (fmi2Status)kf_exit_initialization(common(c)) : fmi2Error;
-}
-
-fmi2Status fmi2Terminate(fmi2Component c)
-{
-    return c ? (fmi2Status)kf_enter(common(c), KF_TERMINATED, "terminate") : fmi2Error;
-}
-
-fmi2Status fmi2Reset(fmi2Component c)
-{
-    if (c == NULL) {
-        return fmi2Error;
-    }
-    kf_start(common(c), common(c)->now.model_exchange);
-    return fmi2OK;
-}
-
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     return (fmi2Status)kf_get_real(common(c), vr, nvr, value);
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        long long number = 0;
-        answer = kf_get_count(common(c), vr[k], "Integer", &number);
-        value[k] = (fmi2Integer)number;
-    }
-    return (fmi2Status)answer;
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        bool flag = false;
-        answer = kf_get_boolean(common(c), vr[k], &flag);
-        value[k] = flag ? fmi2True : fmi2False;
-    }
-    return (fmi2Status)answer;
-}
-
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        answer = kf_get_string(common(c), vr[k], &value[k]);
-    }
-    return (fmi2Status)answer;
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
@@ -166,70 +109,13 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return (fmi2Status)kf_set_real(common(c), vr, nvr, value);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        answer = kf_set_count(common(c), vr[k], "Integer", value[k]);
-    }
-    return (fmi2Status)answer;
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        answer = kf_set_boolean(common(c), vr[k], value[k] != fmi2False);
-    }
-    return (fmi2Status)answer;
-}
+GET_COUNTS(fmi2GetInteger, fmi2Integer, "Integer")
+SET_COUNTS(fmi2SetInteger, fmi2Integer, "Integer")
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
     const kf_answer answer = kf_check(common(c), vr, value, nvr);
     return (fmi2Status)(answer == KF_DONE && nvr ? kf_not_settable(common(c), vr[0], "String") : answer);
-}
-
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
-{
-    return c ? (fmi2Status)kf_copy_state(common(c), FMUstate) : fmi2Error;
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
-{
-    return c ? (fmi2Status)kf_restore_state(common(c), FMUstate) : fmi2Error;
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
-{
-    (void)c;
-    if (FMUstate != NULL) {
-        free(*FMUstate);
-        *FMUstate = NULL;
-    }
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
-{
-    (void)FMUstate;
-    if (c == NULL || size == NULL) {
-        return fmi2Error;
-    }
-    *size = kf_serialized_size();
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
-{
-    return c ? (fmi2Status)kf_serialize(common(c), FMUstate, (unsigned char *)serializedState, size) : fmi2Error;
-}
-
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate)
-{
-    return c ? (fmi2Status)kf_deserialize(common(c), (const unsigned char *)serializedState, size, FMUstate) : fmi2Error;
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
@@ -246,13 +132,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return (fmi2Status)answer;
 }
 
-/* Model exchange: there are no continuous states; events are jumps of drivers over time and changes of status. */
-
-fmi2Status fmi2EnterEventMode(fmi2Component c)
-{
-    return c ? (fmi2Status)kf_enter(common(c), KF_EVENTS, "enterEventMode") : fmi2Error;
-}
-
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
 {
     if (c == NULL || eventInfo == NULL) {
@@ -263,100 +142,17 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
-{
-    return c ? (fmi2Status)kf_enter(common(c), KF_CONTINUOUS, "enterContinuousTimeMode") : fmi2Error;
-}
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
-{
-    bool wants_event = false;
-    const kf_answer answer = c ? kf_complete_integrator_step(common(c), &wants_event) : KF_ERROR;
-    (void)noSetFMUStatePriorToCurrentPoint;
-    if (enterEventMode) {
-        *enterEventMode = wants_event ? fmi2True : fmi2False;
-    }
-    if (terminateSimulation) {
-        *terminateSimulation = fmi2False;
-    }
-    return (fmi2Status)answer;
-}
-
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
-{
-    return c ? (fmi2Status)kf_set_time(common(c), time) : fmi2Error;
-}
-
-static fmi2Status no_states(fmi2Component c, size_t count)
-{
-    return count == 0 && c ? fmi2OK : unsupported(c, "there are no continuous states and no event indicators");
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
-{
-    (void)x;
-    return no_states(c, nx);
-}
-
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
-{
-    (void)derivatives;
-    return no_states(c, nx);
-}
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
-{
-    (void)eventIndicators;
-    return no_states(c, ni);
-}
-
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
-{
-    (void)x;
-    return no_states(c, nx);
-}
-
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
-{
-    (void)x_nominal;
-    return no_states(c, nx);
-}
-
 /* Co-simulation. */
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
-                                       const fmi2Real value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    if (answer == KF_DONE && nvr && order == NULL) {
-        answer = kf_no_array(common(c), nvr);
-    }
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        answer = kf_set_input_derivative(common(c), vr[k], order[k], value[k]);
-    }
-    return (fmi2Status)answer;
-}
+OUTPUT_DERIVATIVES(fmi2GetRealOutputDerivatives, fmi2Integer)
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
-                                        fmi2Real value[])
-{
-    kf_answer answer = kf_check(common(c), vr, value, nvr);
-    size_t k;
-    if (answer == KF_DONE && nvr && order == NULL) {
-        answer = kf_no_array(common(c), nvr);
-    }
-    for (k = 0; answer == KF_DONE && k < nvr; ++k) {
-        answer = kf_output_derivative(common(c), vr[k], order[k], &value[k]);
-    }
-    return (fmi2Status)answer;
-}
+FOR_EACH(fmi2SetRealInputDerivatives, answer = orders ? kf_set_input_derivative(common(c), references[k], orders[k], values[k])
+                                                      : kf_no_array(common(c), count),
+         const fmi2Integer orders[], const fmi2Real values[])
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
-    (void)noSetFMUStatePriorToCurrentPoint;
     return c ? (fmi2Status)kf_step(common(c), currentCommunicationPoint, communicationStepSize) : fmi2Error;
 }
 
@@ -369,8 +165,6 @@ fmi2Status fmi2CancelStep(fmi2Component c)
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
 {
-    (void)s;
-    (void)value;
     return c ? fmi2Discard : fmi2Error;
 }
 
@@ -385,8 +179,6 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
 {
-    (void)s;
-    (void)value;
     return c ? fmi2Discard : fmi2Error;
 }
 
@@ -401,7 +193,5 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
 {
-    (void)s;
-    (void)value;
     return c ? fmi2Discard : fmi2Error;
 }

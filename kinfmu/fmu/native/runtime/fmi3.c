@@ -23,22 +23,33 @@ static kf_instance *common(fmi3Instance instance)
     return instance ? &((instance3 *)instance)->common : NULL;
 }
 
-static fmi3Status unsupported(fmi3Instance instance, const char *what)
+static KF_RARE kf_answer wrong_count(fmi3Instance instance, size_t references, size_t values)
 {
-    return instance ? (fmi3Status)kf_answered(common(instance), KF_ERROR, "%s", what) : fmi3Error;
+    return instance == NULL ? KF_ERROR
+                            : kf_answered(common(instance), KF_ERROR,
+                                          "%zu value references, but %zu values: every variable is a scalar", references, values);
 }
+
+/* Every variable is a scalar: as many values as references. */
+static kf_answer check(fmi3Instance instance, const void *references, size_t count, const void *values, size_t value_count)
+{
+    return count == value_count ? kf_check(common(instance), references, values, count)
+                                : wrong_count(instance, count, value_count);
+}
+
+#define FMI(name) fmi3##name
+#define VALUE_COUNT , size_t value_count
+#define CHECKED check(c, references, count, values, value_count)
+#include "fmi_both.h"
 
 const char *fmi3GetVersion(void)
 {
     return fmi3Version;
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[])
-{
-    return instance ? (fmi3Status)kf_set_logging(common(instance), loggingOn, nCategories, categories) : fmi3Error;
-}
-
-/* Resources are not read, so any path is accepted. */
+/* Resources are not read, so any path is accepted. There are no debug messages, so `loggingOn` has no effect: all messages
+ * sent state why a status is not OK. Nothing happens inside a step, so there is no early return.
+ */
 static fmi3Instance instantiate(const char *token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                 const char *refusal, bool model_exchange)
 {
@@ -68,10 +79,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3Boolean visible, fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage)
 {
-    (void)instanceName;
-    (void)resourcePath;
-    (void)visible;
-    (void)loggingOn; /* there are no debug messages: all messages sent state why a status is not OK */
     return instantiate(instantiationToken, instanceEnvironment, logMessage, NULL, true);
 }
 
@@ -83,14 +90,6 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    (void)instanceName;
-    (void)resourcePath;
-    (void)visible;
-    (void)loggingOn;
-    (void)earlyReturnAllowed; /* nothing happens inside a step */
-    (void)requiredIntermediateVariables;
-    (void)nRequiredIntermediateVariables;
-    (void)intermediateUpdate;
     return instantiate(instantiationToken, instanceEnvironment, logMessage,
                        eventModeUsed ? "this FMU has no event mode in co-simulation" : NULL, false);
 }
@@ -102,27 +101,14 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                                                fmi3LockPreemptionCallback lockPreemption,
                                                fmi3UnlockPreemptionCallback unlockPreemption)
 {
-    (void)instanceName;
-    (void)resourcePath;
-    (void)visible;
-    (void)loggingOn;
-    (void)clockUpdate;
-    (void)lockPreemption;
-    (void)unlockPreemption;
     return instantiate(instantiationToken, instanceEnvironment, logMessage,
                        "this FMU is for co-simulation and model exchange, not for scheduled execution", false);
 }
 
-void fmi3FreeInstance(fmi3Instance instance)
-{
-    free(instance);
-}
-
+/* Newton always goes to round-off, whatever the tolerance. */
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    (void)toleranceDefined; /* Newton always goes to round-off, whatever the tolerance */
-    (void)tolerance;
     if (instance == NULL) {
         return fmi3Error;
     }
@@ -130,44 +116,6 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
         return fmi3Error;
     }
     return (fmi3Status)kf_enter_initialization(common(instance));
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
-{
-    return instance ? (fmi3Status)kf_exit_initialization(common(instance)) : fmi3Error;
-}
-
-fmi3Status fmi3EnterEventMode(fmi3Instance instance)
-{
-    return instance ? (fmi3Status)kf_enter(common(instance), KF_EVENTS, "enterEventMode") : fmi3Error;
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    return instance ? (fmi3Status)kf_enter(common(instance), KF_TERMINATED, "terminate") : fmi3Error;
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance)
-{
-    if (instance == NULL) {
-        return fmi3Error;
-    }
-    kf_start(common(instance), common(instance)->now.model_exchange);
-    return fmi3OK;
-}
-
-static KF_RARE kf_answer wrong_count(fmi3Instance instance, size_t references, size_t values)
-{
-    return instance == NULL ? KF_ERROR
-                            : kf_answered(common(instance), KF_ERROR,
-                                          "%zu value references, but %zu values: every variable is a scalar", references, values);
-}
-
-/* Every variable is a scalar: as many values as references. */
-static kf_answer check(fmi3Instance instance, const void *references, size_t count, const void *values, size_t value_count)
-{
-    return count == value_count ? kf_check(common(instance), references, values, count)
-                                : wrong_count(instance, count, value_count);
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -187,66 +135,9 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
 }
 
 /* solver.status and rates are enumerations, which FMI 3.0 gets as Int64; solver.iterations is an Int32. */
-#define GET_COUNT(word)                                                                                                \
-    fmi3Status fmi3Get##word(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,  \
-                             fmi3##word values[], size_t nValues)                                                       \
-    {                                                                                                                  \
-        kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);                        \
-        size_t k;                                                                                                      \
-        for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {                                                  \
-            long long number = 0;                                                                                      \
-            answer = kf_get_count(common(instance), valueReferences[k], #word, &number);                               \
-            values[k] = (fmi3##word)number;                                                                            \
-        }                                                                                                              \
-        return (fmi3Status)answer;                                                                                     \
-    }
-
-GET_COUNT(Int32)
-GET_COUNT(Int64)
-
-fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                          fmi3Boolean values[], size_t nValues)
-{
-    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
-        answer = kf_get_boolean(common(instance), valueReferences[k], &values[k]);
-    }
-    return (fmi3Status)answer;
-}
-
-fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                          const fmi3Boolean values[], size_t nValues)
-{
-    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
-        answer = kf_set_boolean(common(instance), valueReferences[k], values[k]);
-    }
-    return (fmi3Status)answer;
-}
-
-fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                         fmi3String values[], size_t nValues)
-{
-    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
-        answer = kf_get_string(common(instance), valueReferences[k], &values[k]);
-    }
-    return (fmi3Status)answer;
-}
-
-fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        const fmi3Int64 values[], size_t nValues)
-{
-    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    size_t k;
-    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
-        answer = kf_set_count(common(instance), valueReferences[k], "Int64", values[k]);
-    }
-    return (fmi3Status)answer;
-}
+GET_COUNTS(fmi3GetInt32, fmi3Int32, "Int32")
+GET_COUNTS(fmi3GetInt64, fmi3Int64, "Int64")
+SET_COUNTS(fmi3SetInt64, fmi3Int64, "Int64")
 
 /* Types that no variable has, or none that can be set. */
 static fmi3Status none_to_get(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
@@ -261,78 +152,46 @@ static fmi3Status none_to_set(fmi3Instance instance, const fmi3ValueReference *r
     return (fmi3Status)(answer == KF_DONE && count ? kf_not_settable(common(instance), references[0], type) : answer);
 }
 
-#define NONE_TO_GET(word)                                                                                              \
-    fmi3Status fmi3Get##word(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,  \
-                             fmi3##word values[], size_t nValues)                                                       \
+/* Define a function for such a type, which has the parameters given after the list of variables. */
+#define NONE(function, refuse, type, ...)                                                                              \
+    fmi3Status function(fmi3Instance instance, const fmi3ValueReference references[], size_t count, __VA_ARGS__)       \
     {                                                                                                                  \
-        (void)values;                                                                                                  \
-        (void)nValues;                                                                                                 \
-        return none_to_get(instance, valueReferences, nValueReferences, #word);                                        \
+        return refuse(instance, references, count, type);                                                              \
     }
 
-#define NONE_TO_SET(word)                                                                                              \
-    fmi3Status fmi3Set##word(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,  \
-                             const fmi3##word values[], size_t nValues)                                                 \
-    {                                                                                                                  \
-        (void)values;                                                                                                  \
-        (void)nValues;                                                                                                 \
-        return none_to_set(instance, valueReferences, nValueReferences, #word);                                        \
-    }
-
-NONE_TO_GET(Float32)
-NONE_TO_GET(Int8)
-NONE_TO_GET(UInt8)
-NONE_TO_GET(Int16)
-NONE_TO_GET(UInt16)
-NONE_TO_GET(UInt32)
-NONE_TO_GET(UInt64)
-NONE_TO_SET(Float32)
-NONE_TO_SET(Int8)
-NONE_TO_SET(UInt8)
-NONE_TO_SET(Int16)
-NONE_TO_SET(UInt16)
-NONE_TO_SET(Int32)
-NONE_TO_SET(UInt32)
-NONE_TO_SET(UInt64)
-NONE_TO_SET(String)
-
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                         size_t valueSizes[], fmi3Binary values[], size_t nValues)
-{
-    (void)valueSizes;
-    (void)values;
-    (void)nValues;
-    return none_to_get(instance, valueReferences, nValueReferences, "Binary");
-}
-
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                         const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
-{
-    (void)valueSizes;
-    (void)values;
-    (void)nValues;
-    return none_to_set(instance, valueReferences, nValueReferences, "Binary");
-}
-
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        fmi3Clock values[])
-{
-    (void)values;
-    return none_to_get(instance, valueReferences, nValueReferences, "Clock");
-}
-
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        const fmi3Clock values[])
-{
-    (void)values;
-    return none_to_set(instance, valueReferences, nValueReferences, "Clock");
-}
+NONE(fmi3GetFloat32, none_to_get, "Float32", fmi3Float32 values[], size_t value_count)
+NONE(fmi3GetInt8, none_to_get, "Int8", fmi3Int8 values[], size_t value_count)
+NONE(fmi3GetUInt8, none_to_get, "UInt8", fmi3UInt8 values[], size_t value_count)
+NONE(fmi3GetInt16, none_to_get, "Int16", fmi3Int16 values[], size_t value_count)
+NONE(fmi3GetUInt16, none_to_get, "UInt16", fmi3UInt16 values[], size_t value_count)
+NONE(fmi3GetUInt32, none_to_get, "UInt32", fmi3UInt32 values[], size_t value_count)
+NONE(fmi3GetUInt64, none_to_get, "UInt64", fmi3UInt64 values[], size_t value_count)
+NONE(fmi3GetBinary, none_to_get, "Binary", size_t sizes[], fmi3Binary values[], size_t value_count)
+NONE(fmi3GetClock, none_to_get, "Clock", fmi3Clock values[])
+NONE(fmi3SetFloat32, none_to_set, "Float32", const fmi3Float32 values[], size_t value_count)
+NONE(fmi3SetInt8, none_to_set, "Int8", const fmi3Int8 values[], size_t value_count)
+NONE(fmi3SetUInt8, none_to_set, "UInt8", const fmi3UInt8 values[], size_t value_count)
+NONE(fmi3SetInt16, none_to_set, "Int16", const fmi3Int16 values[], size_t value_count)
+NONE(fmi3SetUInt16, none_to_set, "UInt16", const fmi3UInt16 values[], size_t value_count)
+NONE(fmi3SetInt32, none_to_set, "Int32", const fmi3Int32 values[], size_t value_count)
+NONE(fmi3SetUInt32, none_to_set, "UInt32", const fmi3UInt32 values[], size_t value_count)
+NONE(fmi3SetUInt64, none_to_set, "UInt64", const fmi3UInt64 values[], size_t value_count)
+NONE(fmi3SetString, none_to_set, "String", const fmi3String values[], size_t value_count)
+NONE(fmi3SetBinary, none_to_set, "Binary", const size_t sizes[], const fmi3Binary values[], size_t value_count)
+NONE(fmi3SetClock, none_to_set, "Clock", const fmi3Clock values[])
+NONE(fmi3GetIntervalDecimal, none_to_get, "Clock", fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+NONE(fmi3GetIntervalFraction, none_to_get, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+     fmi3IntervalQualifier qualifiers[])
+NONE(fmi3GetShiftDecimal, none_to_get, "Clock", fmi3Float64 shifts[])
+NONE(fmi3GetShiftFraction, none_to_get, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+NONE(fmi3SetIntervalDecimal, none_to_get, "Clock", const fmi3Float64 intervals[])
+NONE(fmi3SetIntervalFraction, none_to_get, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NONE(fmi3SetShiftDecimal, none_to_get, "Clock", const fmi3Float64 shifts[])
+NONE(fmi3SetShiftFraction, none_to_get, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
                                                size_t *nDependencies)
 {
-    (void)valueReference;
-    (void)nDependencies;
     return unsupported(instance, "getNumberOfVariableDependencies: dependencies are those in the model description");
 }
 
@@ -341,54 +200,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
                                        size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[],
                                        size_t nDependencies)
 {
-    (void)dependent;
-    (void)elementIndicesOfDependent;
-    (void)independents;
-    (void)elementIndicesOfIndependents;
-    (void)dependencyKinds;
-    (void)nDependencies;
     return unsupported(instance, "getVariableDependencies: dependencies are those in the model description");
-}
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    return instance ? (fmi3Status)kf_copy_state(common(instance), FMUState) : fmi3Error;
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
-{
-    return instance ? (fmi3Status)kf_restore_state(common(instance), FMUState) : fmi3Error;
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    (void)instance;
-    if (FMUState != NULL) {
-        free(*FMUState);
-        *FMUState = NULL;
-    }
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
-{
-    (void)FMUState;
-    if (instance == NULL || size == NULL) {
-        return fmi3Error;
-    }
-    *size = kf_serialized_size();
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
-{
-    return instance ? (fmi3Status)kf_serialize(common(instance), FMUState, serializedState, size) : fmi3Error;
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-                                   fmi3FMUState *FMUState)
-{
-    return instance ? (fmi3Status)kf_deserialize(common(instance), serializedState, size, FMUState) : fmi3Error;
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -409,14 +221,6 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    (void)unknowns;
-    (void)nUnknowns;
-    (void)knowns;
-    (void)nKnowns;
-    (void)seed;
-    (void)nSeed;
-    (void)sensitivity;
-    (void)nSensitivity;
     return unsupported(instance, "getAdjointDerivative: there are none; getDirectionalDerivative has the others");
 }
 
@@ -430,80 +234,8 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
     return unsupported(instance, "exitConfigurationMode: there are no structural parameters");
 }
 
-/* Clocks: there are none. */
-
-static fmi3Status no_clock(fmi3Instance instance, const fmi3ValueReference *references, size_t count)
-{
-    return none_to_get(instance, references, count, "Clock");
-}
-
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                  fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-{
-    (void)intervals;
-    (void)qualifiers;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-                                   fmi3IntervalQualifier qualifiers[])
-{
-    (void)counters;
-    (void)resolutions;
-    (void)qualifiers;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                               fmi3Float64 shifts[])
-{
-    (void)shifts;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-{
-    (void)counters;
-    (void)resolutions;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                  const fmi3Float64 intervals[])
-{
-    (void)intervals;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-{
-    (void)counters;
-    (void)resolutions;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                               const fmi3Float64 shifts[])
-{
-    (void)shifts;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-{
-    (void)counters;
-    (void)resolutions;
-    return no_clock(instance, valueReferences, nValueReferences);
-}
-
 fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime)
 {
-    (void)clockReference;
-    (void)activationTime;
     return unsupported(instance, "activateModelPartition: this FMU is not for scheduled execution");
 }
 
@@ -512,13 +244,6 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
     return instance ? fmi3OK : fmi3Error;
-}
-
-static void put(fmi3Boolean *place, fmi3Boolean value)
-{
-    if (place) {
-        *place = value;
-    }
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
@@ -540,79 +265,23 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     return instance ? fmi3OK : fmi3Error;
 }
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
+static fmi3Status zero(fmi3Instance instance, size_t *count)
 {
-    return instance ? (fmi3Status)kf_enter(common(instance), KF_CONTINUOUS, "enterContinuousTimeMode") : fmi3Error;
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
-{
-    bool wants_event = false;
-    const kf_answer answer = instance ? kf_complete_integrator_step(common(instance), &wants_event) : KF_ERROR;
-    (void)noSetFMUStatePriorToCurrentPoint;
-    put(enterEventMode, wants_event);
-    put(terminateSimulation, fmi3False);
-    return (fmi3Status)answer;
-}
-
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
-{
-    return instance ? (fmi3Status)kf_set_time(common(instance), time) : fmi3Error;
-}
-
-static fmi3Status no_states(fmi3Instance instance, size_t count)
-{
-    return count == 0 && instance ? fmi3OK
-                                  : unsupported(instance, "there are no continuous states and no event indicators");
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates)
-{
-    (void)continuousStates;
-    return no_states(instance, nContinuousStates);
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates)
-{
-    (void)derivatives;
-    return no_states(instance, nContinuousStates);
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
-{
-    (void)eventIndicators;
-    return no_states(instance, nEventIndicators);
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
-{
-    (void)continuousStates;
-    return no_states(instance, nContinuousStates);
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates)
-{
-    (void)nominals;
-    return no_states(instance, nContinuousStates);
+    if (instance == NULL || count == NULL) {
+        return fmi3Error;
+    }
+    *count = 0;
+    return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
 {
-    if (instance == NULL || nEventIndicators == NULL) {
-        return fmi3Error;
-    }
-    *nEventIndicators = 0;
-    return fmi3OK;
+    return zero(instance, nEventIndicators);
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates)
 {
-    if (instance == NULL || nContinuousStates == NULL) {
-        return fmi3Error;
-    }
-    *nContinuousStates = 0;
-    return fmi3OK;
+    return zero(instance, nContinuousStates);
 }
 
 /* Co-simulation. */
@@ -622,26 +291,13 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     return unsupported(instance, "enterStepMode: this FMU has no event mode in co-simulation");
 }
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
-{
-    kf_answer answer = check(instance, valueReferences, nValueReferences, values, nValues);
-    size_t k;
-    if (answer == KF_DONE && nValueReferences && orders == NULL) {
-        answer = kf_no_array(common(instance), nValueReferences);
-    }
-    for (k = 0; answer == KF_DONE && k < nValueReferences; ++k) {
-        answer = kf_output_derivative(common(instance), valueReferences[k], orders[k], &values[k]);
-    }
-    return (fmi3Status)answer;
-}
+OUTPUT_DERIVATIVES(fmi3GetOutputDerivatives, fmi3Int32)
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
     kf_answer answer;
-    (void)noSetFMUStatePriorToCurrentPoint;
     if (instance == NULL) {
         return fmi3Error;
     }
