@@ -68,13 +68,13 @@ def build(
     path = _file(path, mechanism.name)
     plan = compile_plan(mechanism, outputs)
     if flavour == "python":
-        from kinfmu.fmu.python_flavour import archive
+        from kinfmu.fmu import python_flavour
 
-        data = archive(plan, drive, VERSION)
+        data = python_flavour.archive(plan, drive, VERSION)
     else:
-        from kinfmu.fmu import native
+        from kinfmu.fmu.native import archive
 
-        data = native.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress)
+        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress)
     _write(path, data)
     return path
 

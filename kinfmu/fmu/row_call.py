@@ -38,7 +38,7 @@ class RowCall:
         self._address = c_void_p()
         variables = (c_uint * len(references))(*references)
         more = (count,) if has_value_count else ()
-        self._function = function_of(fmu, function, variables, count, self._address, *more)
+        self._function = _function_of(fmu, function, variables, count, self._address, *more)
         self._rows, self._base, self._stride = rows, rows.ctypes.data, rows.strides[0]
 
     def __call__(self, row: int) -> None:
@@ -66,13 +66,13 @@ class StepCall:
     def __init__(self, fmu: Any, function: str, *more: Any) -> None:
         self.name = function
         self._time, self._step = c_double(), c_double()
-        self._function = function_of(fmu, function, self._time, self._step, *more)
+        self._function = _function_of(fmu, function, self._time, self._step, *more)
 
     def __call__(self, time: float, step: float) -> int:
         self._time.value, self._step.value = time, step
         return self._function()
 
 
-def function_of(fmu: Any, name: str, *arguments: Any) -> partial[int]:
+def _function_of(fmu: Any, name: str, *arguments: Any) -> partial[int]:
     """Return a C function of an FMU bound to its instance and these arguments, values of ctypes."""
     return partial(CFUNCTYPE(c_int)((name, fmu.dll)), c_void_p.from_param(fmu.component), *arguments)

@@ -22,17 +22,31 @@ Log = Callable[[int, str], None]  # status and text of a message
 
 
 class Slave(ABC):
-    """A slave of an FMU; `fmpy` is fmpy's object, for calls that are not wrapped here.
+    """A slave of an FMU unpacked into a folder; raises what fmpy raises.
 
     Calls that are made in every step go to the C functions directly: fmpy's methods take longer than a native step.
+
+    Attributes:
+        fmpy: fmpy's object, for calls that are not wrapped here.
+        references: Value references by name.
+
     """
 
     fmpy: Any
+    _functions: str  # prefix of the names of C functions
+    _real: str  # FMI's name of the type of Real variables
+    _enumeration: str  # FMI's name of the type by which enumerations are set
+    _has_value_count: bool  # of lists of values
     _do_step: StepCall
 
-    def __init__(self, about: Description) -> None:
+    def __init__(self, fmpy_class: Callable[..., Any], about: Description, folder: Path) -> None:
         self.references = about.interface.value_references()
-        self._message = [self.references["solver.message"]]
+        self.fmpy = fmpy_class(
+            instanceName=about.interface.name,
+            guid=about.token,
+            modelIdentifier=about.model_identifier,
+            unzipDirectory=str(folder),
+        )
 
     def free(self) -> None:
         self.fmpy.freeInstance()
@@ -41,35 +55,40 @@ class Slave(ABC):
     def initialize(self, start: float) -> None:
         """Go through initialization mode."""
 
-    @abstractmethod
     def get(self, references: Sequence[int]) -> list[float]:
         """Return the numbers of these value references."""
+        return list(getattr(self.fmpy, f"get{self._real}")(references))
 
-    @abstractmethod
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         """Set the numbers of these value references."""
+        getattr(self.fmpy, f"set{self._real}")(references, values)
 
     def set_boolean(self, reference: int, value: bool) -> None:
         self.fmpy.setBoolean([reference], [value])
 
-    @abstractmethod
-    def set_enumeration(self, reference: int, value: int) -> None: ...
+    def set_enumeration(self, reference: int, value: int) -> None:
+        getattr(self.fmpy, f"set{self._enumeration}")([reference], [value])
 
-    @abstractmethod
     def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         """Return a call that reads Real variables into a row of the table (n, len(references))."""
+        return self._row_call(f"Get{self._real}", references, rows)
 
-    @abstractmethod
     def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
         """Return a call that sets Real variables to the values in a row of the table (n, len(references))."""
+        return self._row_call(f"Set{self._real}", references, rows)
+
+    def _row_call(self, function: str, references: Sequence[int], rows: NDArray[Any]) -> RowCall:
+        name = f"{self._functions}{function}"
+        return RowCall(self.fmpy, name, references, rows, has_value_count=self._has_value_count)
 
     @abstractmethod
     def counts(self) -> tuple[int, int]:
         """Return solver.status and solver.iterations."""
 
-    @abstractmethod
     def message(self) -> str:
         """Return solver.message."""
+        (text,) = self.fmpy.getString([self.references["solver.message"]])
+        return text.decode() if isinstance(text, bytes) else str(text)
 
     def step(self, time: float, step: float) -> bool:
         """Call DoStep; return False if it is discarded. Raise an FmuError for any other failure."""
@@ -84,23 +103,19 @@ class Slave(ABC):
 
 
 class Slave2(Slave):
-    """A slave of FMI 2.0, of an FMU unpacked into a folder; raises what fmpy raises."""
+    """A slave of FMI 2.0."""
+
+    _functions, _real, _enumeration, _has_value_count = "fmi2", "Real", "Integer", False
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi2 import FMU2Slave
 
-        super().__init__(about)
-        self.fmpy = FMU2Slave(
-            instanceName=about.interface.name,
-            guid=about.token,
-            modelIdentifier=about.model_identifier,
-            unzipDirectory=str(folder),
-        )
+        super().__init__(FMU2Slave, about, folder)
         self._instantiate(folder, fmi2_callbacks(log))
         self._do_step = StepCall(self.fmpy, "fmi2DoStep", c_int(1))  # the state before is not needed
         found = np.zeros((1, 2), np.int32)
         counts = [self.references[name] for name in ("solver.status", "solver.iterations")]
-        self._read_counts = RowCall(self.fmpy, "fmi2GetInteger", counts, found, has_value_count=False)
+        self._read_counts = self._row_call("GetInteger", counts, found)
         self._found = found[0].data
 
     def _instantiate(self, folder: Path, callbacks: Any) -> None:
@@ -127,42 +142,20 @@ class Slave2(Slave):
         self.fmpy.enterInitializationMode()
         self.fmpy.exitInitializationMode()
 
-    def get(self, references: Sequence[int]) -> list[float]:
-        return list(self.fmpy.getReal(references))
-
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        self.fmpy.setReal(references, values)
-
-    def set_enumeration(self, reference: int, value: int) -> None:
-        self.fmpy.setInteger([reference], [value])
-
-    def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        return RowCall(self.fmpy, "fmi2GetReal", references, rows, has_value_count=False)
-
-    def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        return RowCall(self.fmpy, "fmi2SetReal", references, rows, has_value_count=False)
-
     def counts(self) -> tuple[int, int]:
         self._read_counts(0)
         return self._found[0], self._found[1]
 
-    def message(self) -> str:
-        return str(self.fmpy.getString(self._message)[0].decode())
-
 
 class Slave3(Slave):
-    """A slave of FMI 3.0, of an FMU unpacked into a folder; raises what fmpy raises."""
+    """A slave of FMI 3.0."""
+
+    _functions, _real, _enumeration, _has_value_count = "fmi3", "Float64", "Int64", True
 
     def __init__(self, about: Description, folder: Path, log: Log) -> None:
         from fmpy.fmi3 import FMU3Slave
 
-        super().__init__(about)
-        self.fmpy = FMU3Slave(
-            instanceName=about.interface.name,
-            guid=about.token,
-            modelIdentifier=about.model_identifier,
-            unzipDirectory=str(folder),
-        )
+        super().__init__(FMU3Slave, about, folder)
 
         def logger(_environment: object, status: int, _category: bytes, message: bytes) -> None:
             log(status, (message or b"").decode("utf-8", errors="replace"))
@@ -172,41 +165,18 @@ class Slave3(Slave):
         self._do_step = StepCall(self.fmpy, "fmi3DoStep", c_bool(True), *found)
         status, iterations = np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int32)
         self._found = status[0].data, iterations[0].data
-        self._read_status, self._read_iterations = (
-            RowCall(self.fmpy, function, [self.references[name]], found, has_value_count=True)
-            for function, name, found in (
-                ("fmi3GetInt64", "solver.status", status),
-                ("fmi3GetInt32", "solver.iterations", iterations),
-            )
-        )
+        self._read_status = self._row_call("GetInt64", [self.references["solver.status"]], status)
+        self._read_iterations = self._row_call("GetInt32", [self.references["solver.iterations"]], iterations)
 
     def initialize(self, start: float) -> None:
         self.fmpy.enterInitializationMode(startTime=start)
         self.fmpy.exitInitializationMode()
-
-    def get(self, references: Sequence[int]) -> list[float]:
-        return list(self.fmpy.getFloat64(references))
-
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        self.fmpy.setFloat64(references, values)
-
-    def set_enumeration(self, reference: int, value: int) -> None:
-        self.fmpy.setInt64([reference], [value])
-
-    def reader(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        return RowCall(self.fmpy, "fmi3GetFloat64", references, rows, has_value_count=True)
-
-    def setter(self, references: Sequence[int], rows: NDArray[np.float64]) -> RowCall:
-        return RowCall(self.fmpy, "fmi3SetFloat64", references, rows, has_value_count=True)
 
     def counts(self) -> tuple[int, int]:
         self._read_status(0)
         self._read_iterations(0)
         status, iterations = self._found
         return status[0], iterations[0]
-
-    def message(self) -> str:
-        return str(self.fmpy.getString(self._message)[0])
 
 
 _SLAVES: Mapping[str, type[Slave2 | Slave3]] = {"2.0": Slave2, "3.0": Slave3}

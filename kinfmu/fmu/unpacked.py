@@ -83,7 +83,7 @@ def text_in(path: Path, folder: Path, name: str, largest: int = LARGEST_FILE) ->
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise FmuError(f"{path}: {name} is no text file (byte {error.start} is not UTF-8)") from None
+        raise FmuError(f"{path}: {name} is not a text file (byte {error.start} is not UTF-8)") from None
 
 
 def _check(path: Path, zipped: zipfile.ZipFile) -> None:

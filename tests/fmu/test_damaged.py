@@ -132,7 +132,7 @@ def test_a_file_larger_than_declared_is_not_unpacked_further(whole: bytes, tmp_p
 
 MECHANISMS = {
     "missing": (None, f"{MECHANISM} is missing; kinfmu simulates FMUs that kinfmu built"),
-    "not text": (b"name = '\xff'", f"{MECHANISM} is no text file (byte 8 is not UTF-8)"),
+    "not text": (b"name = '\xff'", f"{MECHANISM} is not a text file (byte 8 is not UTF-8)"),
     "not TOML": (b"name = ", f"{MECHANISM}: not valid TOML: Invalid value (at end of document)"),
     "too large": (b"#" * 4_000_001, f"{MECHANISM} is too large (largest: 4000000 bytes)"),
     "naming a file": (

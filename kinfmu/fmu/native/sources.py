@@ -1,21 +1,22 @@
-"""The C sources of a native FMU: the model, the solver, the instance, and the tables of this FMU's variables."""
+"""The C sources of a native FMU: the model, the solver, the instance, and what is generated for this FMU."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 
 from kinfmu.codegen.c import compiler, emit
-from kinfmu.codegen.c.text import array, booleans, string
+from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
+from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
 from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from kinfmu.fmu.native.events import events
-from kinfmu.fmu.native.names import prefixed
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.trace import parameter_symbol
 
 RUNTIME = Path(__file__).with_name("runtime")
 NOT_REAL = ("counts", "ok", "drive", "rate_source", "message", "time")  # parts after those of Real variables
@@ -55,9 +56,9 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
-    tables |= {"step.c": _step(version), "events.c": events(plan)}
+    tables |= {"step.c": _step(version), "events.c": _events(plan)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
-    return dict(sorted(prefixed(files, version).items()))
+    return dict(sorted(_prefixed(files, version).items()))
 
 
 def _step(version: str) -> str:
@@ -159,3 +160,51 @@ def _tables(variables: Interface) -> str:
 def _numbers(counts: Iterable[int]) -> list[int]:
     """Return as many 0 as the first count, as many 1 as the second, and so on."""
     return [number for number, count in enumerate(counts) for _ in range(count)]
+
+
+def _events(plan: SolvePlan) -> str:
+    """Return events.c: the times at which laws jump, which model exchange announces to its host.
+
+    They are a function of the constants of the laws and of the parameters.
+    """
+    signature = "void kf_jumps(const kf_model *model, const double *constants, double *jumps, double *periods)"
+    writer = Writer(Names(functions=FUNCTIONS), ())
+    body = [f"{line};" for line in writer.statements([node for jump in plan.jumps for node in jump])]
+    for k, (at, period) in enumerate(plan.jumps):
+        body += [f"jumps[{k}] = {writer.expression(at)};", f"periods[{k}] = {writer.expression(period)};"]
+    places = {constant.name: f"constants[{k}]" for k, constant in enumerate(plan.law_constants)}
+    places |= {parameter_symbol(one.name): f"model->parameters[{k}]" for k, one in enumerate(plan.parameters)}
+    used = {node.name for node in writer.used if node.op == "symbol"}
+    loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]
+    lines = [
+        f"/* Jumps of the laws of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
+        '#include "instance.h"',
+        "",
+        *function(signature, [*loads, *body], ("model", "constants", "jumps", "periods")),
+    ]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _prefixed(sources: Mapping[str, str], version: str) -> dict[str, str]:
+    """Return the C files, each including kf_names.h first, and kf_names.h.
+
+    It gives the functions of one FMU unique names, so that several can be linked into one program: FMI puts
+    FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX before its functions, this header before every other name.
+    """
+    names = sorted({name for text in sources.values() for name in re.findall(r"\bkf_\w+", text)})
+    prefix = f"FMI{version[0]}_FUNCTION_PREFIX"
+    header = [
+        f"/* With {prefix} every name begins with it, so that several FMUs can be linked into one program. */",
+        "#ifndef KF_NAMES_H",
+        "#define KF_NAMES_H",
+        "",
+        f"#ifdef {prefix}",
+        "#define KF_PASTE(a, b) a##b",
+        "#define KF_JOIN(a, b) KF_PASTE(a, b)",
+        *(f"#define {name} KF_JOIN({prefix}, {name})" for name in names),
+        "#endif",
+        "",
+        "#endif",
+    ]
+    files = {name: f'#include "kf_names.h"\n{text}' for name, text in sources.items()}
+    return files | {"kf_names.h": "\n".join(header) + "\n"}
