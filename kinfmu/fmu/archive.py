@@ -11,7 +11,15 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip archive can hold
 
 
 def digest(contents: Mapping[str, bytes]) -> str:
-    """Return the SHA-256 of files and their paths as 64 hexadecimal digits."""
+    """Return the SHA-256 of files and their paths.
+
+    Args:
+        contents: Files by path.
+
+    Returns:
+        64 hexadecimal digits.
+
+    """
     return hashlib.sha256(b"".join(name.encode() + b"\0" + data for name, data in contents.items())).hexdigest()
 
 
@@ -21,7 +29,15 @@ def token(digits: str) -> str:
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
-    """Return a zip archive with fixed dates, permissions, system and order; modelDescription.xml is first."""
+    """Return a zip archive with fixed dates, permissions, system and order.
+
+    Args:
+        contents: Files by path.
+
+    Returns:
+        Bytes of the archive, in which modelDescription.xml is first.
+
+    """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in ("modelDescription.xml", *sorted(contents.keys() - {"modelDescription.xml"})):

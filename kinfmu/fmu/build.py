@@ -104,7 +104,16 @@ def default_drive(mechanism: Mechanism) -> Drive:
 
 
 def default_flavour(fmi: int = 2, platforms: str = "host") -> str:
-    """Return 'native' where a C compiler is found or the choices need it, else 'python'."""
+    """Return the default flavour.
+
+    Args:
+        fmi: Version of FMI.
+        platforms: 'host' or 'all'.
+
+    Returns:
+        'native' where a C compiler is found or the choices need it, else 'python'.
+
+    """
     return "native" if (fmi, platforms) != (2, "host") or not native_obstacle() else "python"
 
 

@@ -238,7 +238,15 @@ def _checked(where: str, columns: Mapping[str, NDArray[np.float64]], place: Call
 
 
 def input_notes(interface: Interface, table: InputTable, start: float | None, stop: float | None) -> Iterator[Event]:
-    """Yield events about probable mistakes in a table of inputs; start and stop: of the run [s], if given."""
+    """Yield events about probable mistakes in a table of inputs.
+
+    Args:
+        interface: Variables of the FMU.
+        table: Inputs.
+        start: Start time of the run [s], if given.
+        stop: Stop time of the run [s], if given.
+
+    """
     yield from _span(interface.experiment, table, start, stop)
     for variable in interface.part("inputs")[::3]:
         if variable.unit == "rad" and variable.name in table.names:

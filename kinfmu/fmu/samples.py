@@ -47,12 +47,8 @@ class Samples:
         self._reals = np.empty((0, self._ends[-1]))  # the columns that are read
         self._t = np.empty(self._most)
         self._status, self._iterations = np.empty((2, self._most), np.int64)
-        columns: list[Any] = [
-            self._t.data,
-            self._status.data,
-            self._iterations.data,
-        ]  # assignment to items is faster than with arrays
-        self._columns = columns
+        # Items of memoryviews are assigned faster than those of arrays.
+        self._columns: tuple[Any, Any, Any] = self._t.data, self._status.data, self._iterations.data
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
         self._absent: frozenset[str] = frozenset()

@@ -28,6 +28,10 @@ SAME_TIME = 1e-9  # of a step: rounding errors of times that hosts add up
 LATE = 1e-3  # of a step: a sum of a million steps may end this late
 ROUNDING = 4.44e-16  # of a time: its last digits
 DIGEST = 32  # bytes of a SHA-256
+PLAIN = (  # attributes, without the underscore, that are a number or a truth value: a state has them as they are
+    *("driven_by_time", "rates", "initialized", "running", "touched", "stray_reported"),
+    *("start_time", "time", "stop_time"),
+)
 
 
 def _numbers(values: Sequence[float], like: Sequence[float]) -> Row:
@@ -179,23 +183,14 @@ class MechanismSlave(SlaveSettings):
     # State: all that results depend on, as JSON
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        return {
+        return {name: getattr(self, f"_{name}") for name in PLAIN} | {
             "token": self.layout.token,
             "inputs": list(self._inputs),
             "constants": list(self._constants),
             "parameters": list(self._parameters),
             "tolerance": self._tolerance,
-            "driven_by_time": self._driven_by_time,
-            "rates": self._rates,
-            "initialized": self._initialized,
-            "running": self._running,
-            "start_time": self._start_time,
-            "time": self._time,
-            "stop_time": self._stop_time,
-            "touched": self._touched,
             "wired": sorted(self._wired),
             "refused": dict(self._refused),
-            "stray_reported": self._stray_reported,
             "committed": self._solver.dump(self._committed),
             "committed_inputs": list(self._committed_inputs),
             "history": [[t, list(u)] for t, u in self._history],
@@ -213,21 +208,14 @@ class MechanismSlave(SlaveSettings):
             self._refuse("state", f"is damaged: {type(error).__name__}: {error}")
 
     def _restore(self, state: dict[str, Any]) -> None:
+        for name in PLAIN:
+            setattr(self, f"_{name}", state[name])
         self._inputs = list(_numbers(state["inputs"], self._inputs))
         self._constants = _numbers(state["constants"], self._constants)
+        self._parameters = _numbers(state["parameters"], self._parameters)
         self._tolerance = float(state["tolerance"])
-        self._driven_by_time = state["driven_by_time"]
-        self._rates = state["rates"]
-        self._initialized = state["initialized"]
-        self._running = state["running"]
-        self._start_time = state["start_time"]
-        self._time = state["time"]
-        self._stop_time = state["stop_time"]
-        self._touched = state["touched"]
         self._wired = set(state["wired"])
         self._refused = dict(state["refused"])
-        self._stray_reported = state["stray_reported"]
-        self._parameters = _numbers(state["parameters"], self._parameters)
         self._unbound = False
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
         self._committed = self._solver.restore(state["committed"])

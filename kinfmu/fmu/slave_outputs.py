@@ -15,11 +15,7 @@ from kinfmu.solver.python import Pose, Status, UnsolvableModel, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
 MOST_FETCHES = 256  # lists of value references kept, so that a host that reads at random does not fill the memory
-_COUNTS = {
-    "solver.status": "status",
-    "solver.iterations": "iterations",
-    "rates": "rates",
-}  # attribute of a pose by variable, or "rates"
+_COUNTS = {"solver.status": "status", "solver.iterations": "iterations", "rates": "rates"}  # all but rates: of a pose
 
 
 class Shown:

@@ -184,7 +184,21 @@ _SLAVES: Mapping[str, type[Slave2 | Slave3]] = {"2.0": Slave2, "3.0": Slave3}
 
 @contextmanager
 def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
-    """Start a slave of an FMU unpacked into a folder; at the end free it and restore `sys.path`."""
+    """Start a slave of an FMU; at the end free it and restore `sys.path`.
+
+    Args:
+        about: Model description.
+        folder: Folder into which the FMU is unpacked.
+        log: Called with status and text of each message.
+
+    Yields:
+        The slave.
+
+    Raises:
+        MissingPackageError: If fmpy is not installed.
+        FmuError: If the FMU does not load.
+
+    """
     try:
         import fmpy  # noqa: F401  # only to see if it is installed
     except ImportError:

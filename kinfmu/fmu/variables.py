@@ -331,7 +331,9 @@ _NONE = _Dependence(frozenset(), frozenset())
 def linear_inputs(plan: SolvePlan) -> dict[str, tuple[str, ...]]:
     """Return, for each output of a plan, the driver values in which it is linear, in their order.
 
-    y = sum_k f_k u_k + rest, where f_k depends on parameters and constants alone and the rest on other inputs. Unknowns
+        y = sum_k f_k u_k + rest
+
+    where f_k depends on parameters and constants alone and the rest on other inputs. Unknowns
     of Newton's method count as linear in no input, even if they are.
     """
     inputs = tuple(driver.inputs[0] for driver in plan.drivers)

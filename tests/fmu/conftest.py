@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ import kinfmu
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu import build
 from kinfmu.fmu.interface import Drive
+from kinfmu.fmu.native import archive
 from kinfmu.mechanism import Mechanism, toml_file
 from tests.fmu.host import Host
 
@@ -43,7 +43,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compile libraries without optimization, into a cache of the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        for module in (compiler, import_module("kinfmu.fmu.native.archive")):
+        for module in (compiler, archive):
             quick = ["-O0" if flag.startswith("-O") else flag for flag in module.FLAGS]  # the same numbers
             patch.setattr(module, "FLAGS", quick)
         yield

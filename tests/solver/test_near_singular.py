@@ -17,6 +17,7 @@ import kinfmu
 from kinfmu import Body
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.python import load_model
+from kinfmu.fmu.native import archive
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver, Status
@@ -44,7 +45,7 @@ THERE_AND_BACK = [STRETCHED - gap for gap in (*GAPS, *GAPS[-2::-1])]
 def compiled(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Libraries stay inside the tests, and are compiled quickly."""
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path_factory.getbasetemp() / "compiled"))
-    for module in (compiler, import_module("kinfmu.fmu.native.archive")):
+    for module in (compiler, archive):
         monkeypatch.setattr(module, "FLAGS", ["-O0" if flag.startswith("-O") else flag for flag in module.FLAGS])
 
 

@@ -70,7 +70,18 @@ def _step(version: str) -> str:
 
 
 def headers(version: str) -> dict[str, str]:
-    """Return the headers of FMI by name, from fmpy. FMUs do not contain them: importers have their own."""
+    """Return the headers of FMI, from fmpy. FMUs do not contain them: importers have their own.
+
+    Args:
+        version: Version of FMI, "2.0" or "3.0".
+
+    Returns:
+        Texts by name.
+
+    Raises:
+        MissingPackageError: If fmpy is not installed.
+
+    """
     found = find_spec("fmpy")  # not imported: the import takes longer than compiling a file
     places = found.submodule_search_locations if found is not None else None
     try:

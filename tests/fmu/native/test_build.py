@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -102,7 +101,7 @@ def test_fmpy_compiles_the_sources_inside_and_the_result_is_the_same(
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="other platforms need ziglang")
 def test_all_platforms_are_compiled_with_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quick = tuple(one for one in PLATFORMS if one.suffix != ".dll")  # zig's first library for windows takes minutes
-    monkeypatch.setattr(import_module("kinfmu.fmu.native.archive"), "PLATFORMS", quick)
+    monkeypatch.setattr(archive, "PLATFORMS", quick)
     seen: list[tuple[int, int]] = []
     here = tmp_path / "here"
     here.mkdir()
@@ -147,4 +146,4 @@ def test_invalid_choices_are_refused_in_one_line(arguments: dict[str, object], w
 def test_platforms_that_fmi_has_no_name_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("platform.machine", lambda: "s390x")
     with pytest.raises(FmuError, match="no native FMUs are built for s390x-"):
-        archive(compile_plan(kinfmu.load("fourbar")), "time", "1", "2.0", "host")
+        archive.archive(compile_plan(kinfmu.load("fourbar")), "time", "1", "2.0", "host")
