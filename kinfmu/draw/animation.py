@@ -11,14 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.draw.ground import supports
-from kinfmu.draw.links import links, shortest
-from kinfmu.draw.mark import Mark
-from kinfmu.draw.motion import Cylinder, motion
+from kinfmu.draw.drawing import draw
+from kinfmu.draw.painting import extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import GREY, PAPER, Sheet, ink
-from kinfmu.draw.slides import rails, slots_and_blocks
-from kinfmu.draw.wheels import cams, racks, wheels
 from kinfmu.draw.writing import figure_style, write_bytes
 from kinfmu.errors import FigureError, MechanismError, listed
 from kinfmu.files.whole_file import suffix_of
@@ -31,7 +27,7 @@ from kinfmu.scene import palette
 from kinfmu.scene.completing import remedy
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.placing import poses_of, world
-from kinfmu.scene.slides import rods, slides
+from kinfmu.scene.shapes import shapes
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -149,43 +145,24 @@ def _images(run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], film: 
     """Yield the pictures in order, all of one size."""
     some = slice(None, None, max(-(-len(run) // _SAMPLES), 1))
     directions = {driver.name: 1.0 for driver in mechanism.drivers}
-
-    def shown(row: int) -> Instant:
-        placed = {body: np.vstack([pose[row], pose[some]]) for body, pose in poses.items()}
-        return Instant(mechanism, placed, directions)
-
-    first = shown(int(film.rows[0]))
-    ground = [*supports(first), *rails(first, slides(first))]  # the same in all pictures, so that it does not move
-    scenes = [_marks(shown(int(row)), ground) for row in film.rows]
-    extent = np.vstack([mark.extent() for marks in scenes for mark in marks])
-    thinnest = shortest(scenes[0], float(np.ptp(extent, axis=0).max()))
+    start = int(film.rows[0])
+    whole = Instant(mechanism, {body: np.vstack([pose[start], pose[some]]) for body, pose in poses.items()}, directions)
+    found, tracks = shapes(whole), paths(whole)  # for all pictures; the frames of the shapes move
+    scenes = []
+    for row in film.rows.tolist():
+        shown = Instant(mechanism, {body: pose[row : row + 1] for body, pose in poses.items()}, directions)
+        scenes.append((placed(shown, found), pins(shown)))
+    extents = [part for drawn, places in scenes for part in (extent(drawn), *(mark.extent() for mark in places))]
+    reach = np.vstack([*extents, *(track.extent() for track in tracks)])
+    thinnest = shortest(scenes[0][0], float(np.ptp(reach, axis=0).max()))
     back = max(round(_TRAIL * len(film.rows)), 1)
-    for k, (row, marks) in enumerate(zip(film.rows, scenes, strict=True)):
-        sheet = Sheet(extent, thinnest, None, mechanism.title or mechanism.name)
+    for k, (row, (drawn, places)) in enumerate(zip(film.rows, scenes, strict=True)):
+        sheet = Sheet(reach, thinnest, None, mechanism.title or mechanism.name)
         begun = k - back if k >= back else (k - back + len(film.rows) if film.repeats else 0)
-        for mark in marks:
-            mark.draw(sheet)
+        draw(sheet, drawn, tracks, places)
         _trails(sheet, run, mechanism, poses, (int(film.rows[begun]), int(row)))
         _clock(sheet, run, int(row))
         yield _picture(sheet)
-
-
-def _marks(shown: Instant, ground: Sequence[Mark]) -> list[Mark]:
-    """Return everything to draw of one picture; later marks cover earlier ones."""
-    sliding = slides(shown)
-    plates, bars = links(shown, rods(shown, sliding))
-    return [
-        *wheels(shown),
-        *cams(shown),
-        *ground,
-        *plates,
-        *paths(shown),
-        *bars,
-        *slots_and_blocks(shown, sliding),
-        *racks(shown),
-        *(mark for mark in motion(shown) if isinstance(mark, Cylinder)),
-        *pins(shown, sliding),
-    ]
 
 
 def _trails(sheet: Sheet, run: Run, mechanism: Mechanism, poses: dict[str, FloatArray], ends: tuple[int, int]) -> None:

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from kinfmu.draw.ground import supports
 from kinfmu.draw.instant import instant, pose_note
-from kinfmu.draw.links import links, shortest
-from kinfmu.draw.mark import Mark
 from kinfmu.draw.motion import motion
-from kinfmu.draw.names import place
+from kinfmu.draw.names import Mark, Name, place
+from kinfmu.draw.painting import Painter, extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
-from kinfmu.draw.slides import rails, slots_and_blocks
-from kinfmu.draw.wheels import MeshName, cams, racks, wheels
 from kinfmu.draw.writing import write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.slides import rods, slides
+from kinfmu.scene.shapes import Shape, shapes
 
 MOST_NAMES = 90  # more would cover the drawing
 _ALWAYS_DRAWN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)
@@ -52,45 +49,43 @@ def figure(mechanism: Mechanism, path: str | Path, at: float | None = None) -> N
 
 def sheet_of(shown: Instant) -> Sheet:
     """Return the sheet with everything drawn on it; needs matplotlib."""
-    marks = _marks(shown)
     mechanism = shown.mechanism
-    extent = np.vstack([mark.extent() for mark in marks])
-    size = float(np.ptp(extent, axis=0).max())
-    sheet = Sheet(extent, shortest(marks, size), mechanism.length_unit, mechanism.title or mechanism.name)
-    names = [name for mark in marks for name in mark.draw(sheet)]
+    found = placed(shown, shapes(shown))
+    arrows, places, tracks = motion(shown), pins(shown), paths(shown)
+    reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks))])
+    size = float(np.ptp(reach, axis=0).max())
+    sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name)
+    names = draw(sheet, found, tracks, [*arrows, *places])
     notes = [pose] if (pose := pose_note(shown)) else []
     if len(names) <= MOST_NAMES:
         place(names, sheet)
     else:
         notes.append(f"{len(names)} names left out")
-    missing = _not_drawn(mechanism, marks)
+    missing = _not_drawn(mechanism, found)
     if missing:
         notes.append(f"not drawn: {listed(missing)}")
     sheet.note("; ".join(notes))
     return sheet
 
 
-def _not_drawn(mechanism: Mechanism, marks: list[Mark]) -> list[str]:
+def draw(sheet: Sheet, found: Sequence[Shape], tracks: Sequence[Mark], above: Sequence[Mark]) -> list[Name]:
+    """Draw shapes of the world, paths between plates and bars, and marks above all, and return the names to place."""
+    painter = Painter(sheet, found)
+    painter.wheels()
+    painter.cams()
+    painter.ground()
+    painter.plates()
+    names = [name for track in tracks for name in track.draw(sheet)]
+    painter.bars()
+    painter.slides()
+    painter.racks()
+    painter.cylinders()
+    names += [name for mark in above for name in mark.draw(sheet)]
+    return [*painter.names, *names]
+
+
+def _not_drawn(mechanism: Mechanism, found: Sequence[Shape]) -> list[str]:
     """Return the names of joints that are not drawn, such as a held angle, or wheels without pins."""
-    drawn = {mark.name for mark in marks if isinstance(mark, MeshName)}
+    drawn = {shape.name for shape in found if shape.kind == "contact"}
     joints = [joint for joint in mechanism.joints if not isinstance(joint, _ALWAYS_DRAWN)]
     return [joint.name for joint in joints if joint.name not in drawn]
-
-
-def _marks(shown: Instant) -> list[Mark]:
-    """Return everything to draw; later marks cover earlier ones."""
-    sliding = slides(shown)
-    plates, bars = links(shown, rods(shown, sliding))
-    return [
-        *wheels(shown),
-        *cams(shown),
-        *supports(shown),
-        *rails(shown, sliding),
-        *plates,
-        *paths(shown),
-        *bars,
-        *slots_and_blocks(shown, sliding),
-        *racks(shown),
-        *motion(shown),
-        *pins(shown, sliding),
-    ]

@@ -1,4 +1,4 @@
-"""Drivers: cylinders and arrows, with name and drawn value."""
+"""Drivers: arrows, with name and drawn value."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.draw.mark import Mark
-from kinfmu.draw.names import Name
-from kinfmu.draw.sheet import PAPER, Sheet, arc, box
+from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.sheet import Sheet, arc
 from kinfmu.drivers import CoordinateDriver, DistanceDriver, Driver, SlideDriver
 from kinfmu.equations.system import size_of
 from kinfmu.joints import Revolute
@@ -17,7 +16,6 @@ from kinfmu.measures.placement import body_of, unit_vector
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
-from kinfmu.scene.cylinders import cylinder_shapes
 from kinfmu.scene.instant import Instant
 
 COLOUR: palette.Colour = (185, 28, 28)
@@ -25,7 +23,6 @@ _RADIUS, _TURN = 19.0, math.radians(95.0)  # [pt] and [rad], of a curved arrow
 _PUSH, _DISTANCE = 30.0, 13.0  # [pt]; length of a straight arrow, and its distance from its point
 _HEAD, _HALF_HEAD = 7.0, 2.8  # [pt]
 _STROKE = 1.4  # [pt]
-_BARREL, _ROD = 5.5, 1.9  # [pt]; half widths of a cylinder
 _TRIES = 12  # places for an arrow that are compared
 
 
@@ -79,34 +76,18 @@ class Push(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder(Mark):
-    """A driven distance: ends (2, 2), the barrel at the first; barrel, rod: their lengths [length]."""
+class Length(Mark):
+    """The name and value of a cylinder: ends (2, 2)."""
 
     text: str
     ends: FloatArray
-    barrel: float
-    rod: float
 
     def extent(self) -> FloatArray:
         return self.ends
 
-    def draw(self, sheet: Sheet) -> list[Name]:
-        size = sheet.ornament
-        a, b = self.ends
-        length = float(np.hypot(*(b - a)))
-        along = (b - a) / length
-        edge, fill = palette.darker(palette.GROUND), palette.lighter(palette.BAR)
-        rod = box((a + b) / 2.0, along, length / 2.0, _ROD * size)
-        sheet.line(rod, 0.9, edge, closed=True, fill=PAPER)
-        start = min(0.12 * length, 9.0 * size)
-        middle = a + along * (start + self.barrel) / 2.0
-        barrel = box(middle, along, (self.barrel - start) / 2.0, _BARREL * size)
-        sheet.line(barrel, 1.0, edge, closed=True, fill=fill, matters=1.0)
-        inside = min(max(length - self.rod, start + 1.6 * size), self.barrel - 1.6 * size)  # where the rod begins
-        piston = box(a + along * inside, along, 1.6 * size, _BARREL * size)
-        sheet.line(piston, 0.5, edge, closed=True, fill=edge, matters=0.0)
-        anchors = np.array([a + part * (b - a) for part in (0.4, 0.55, 0.25, 0.75)])
-        return [Name(self.text, anchors, _BARREL + 2.5, COLOUR, rank=1)]
+    def draw(self, sheet: Sheet) -> list[Name]:  # noqa: ARG002  it is only a name
+        anchors = np.array([self.ends[0] + part * (self.ends[1] - self.ends[0]) for part in (0.4, 0.55, 0.25, 0.75)])
+        return [Name(self.text, anchors, 8.0, COLOUR, rank=1)]
 
 
 def motion(shown: Instant) -> list[Mark]:
@@ -118,8 +99,7 @@ def _mark(shown: Instant, driver: Driver) -> Mark:
     value, direction = shown.value(driver.name), shown.directions[driver.name]
     text = f"{driver.name} = {value_text(shown, driver, value)}"
     if isinstance(driver, DistanceDriver):
-        (shape,) = (one for one in cylinder_shapes(shown) if one.driver == driver.name)
-        return Cylinder(text, np.array([shown.point(end) for end in driver.between]), shape.barrel, shape.rod)
+        return Length(text, np.array([shown.point(end) for end in driver.between]))
     if isinstance(driver, SlideDriver):
         a, b = driver.between
         e = np.array(unit_vector(driver.axis))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,18 @@ class Name:
     colour: Colour = INK
     italic: bool = False
     rank: int = 0
+
+
+class Mark(ABC):
+    """A thing that figures show and no other picture does: an arrow, a named place, a path; in world coordinates."""
+
+    @abstractmethod
+    def extent(self) -> FloatArray:
+        """Return world coordinates (k, 2) that must be on the sheet."""
+
+    @abstractmethod
+    def draw(self, sheet: Sheet) -> list[Name]:
+        """Draw it over what is on the sheet, and return its names, which are placed when everything is drawn."""
 
 
 @dataclass(frozen=True, eq=False)

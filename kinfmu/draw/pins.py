@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinfmu.draw.mark import Mark
-from kinfmu.draw.names import Name
-from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet, box
+from kinfmu.draw.names import Mark, Name
+from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
+from kinfmu.scene.details import box
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.slides import Slide
+from kinfmu.scene.slides import slides
 
 _SAME = 1e-6  # of the size; points that are nearer are one place
 _ORDER = ("loose", "slide", "weld", "pin")  # kinds of places; if one place has several, the last one is drawn
@@ -90,7 +89,7 @@ def paths(shown: Instant) -> list[Mark]:
     ]
 
 
-def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
+def pins(shown: Instant) -> list[Mark]:
     """Return all places that have a name."""
     mechanism = shown.mechanism
     names = list(shown.body_points)
@@ -101,7 +100,7 @@ def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
         same = np.flatnonzero(np.hypot(*(where[:k] - at).T) <= near)
         home[name] = home[names[int(same[0])]] if len(same) else _Place(at)
     places = list(dict.fromkeys(home.values()))
-    _note_joints(shown, sliding, home)
+    _note_joints(shown, home)
     used = {name for place in places for name in place.points}
     held = {joint.between[0] for joint in mechanism.joints if isinstance(joint, Translational | PointOnLine)}
     for name in names:
@@ -114,7 +113,7 @@ def pins(shown: Instant, sliding: Sequence[Slide]) -> list[Mark]:
     return [_pin(place) for place in places if place.kinds or place.interest]
 
 
-def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Place]) -> None:
+def _note_joints(shown: Instant, home: dict[str, _Place]) -> None:
     """Add the joints and cylinders to the places of their points."""
     for member in (*shown.joints, *shown.drivers):
         if not isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
@@ -129,7 +128,7 @@ def _note_joints(shown: Instant, sliding: Sequence[Slide], home: dict[str, _Plac
         if isinstance(joint, CamRoller):
             home[joint.between[1]].kinds.add("pin")
             home[joint.between[1]].points.append(joint.between[1])
-    for slide in sliding:
+    for slide in slides(shown):
         home[slide.point].kinds.add("pin" if slide.turns else "slide")
         home[slide.point].points.append(slide.point)
 

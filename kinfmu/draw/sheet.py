@@ -257,14 +257,6 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
     return made, axes
 
 
-def box(centre: FloatArray, along: FloatArray, half_length: float, half_width: float) -> FloatArray:
-    """Return the corners (4, 2) of a rectangle whose long side is along a unit vector."""
-    length, width = half_length * along, half_width * np.array([-along[1], along[0]])
-    return np.array(
-        [centre - length - width, centre + length - width, centre + length + width, centre - length + width]
-    )
-
-
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
 MOST_LINES = 2

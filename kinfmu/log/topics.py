@@ -112,7 +112,7 @@ class LinkTopic:
         if self._template is None:
             return
         metres, numbers = self._metres, []
-        for pose in urdf.frames(run, self._mechanism).values():
+        for pose in urdf.link_poses(run, self._mechanism).values():
             x, y, phi = pose.T
             nothing = np.zeros_like(x)
             place = [metres * x, metres * y, nothing]
@@ -127,7 +127,7 @@ class LinkTopic:
         """Write the robot description, drawn to the size of the mechanism in its first pose."""
         first = int(np.argmax(run.good))
         shown = scene(run.part(slice(first, first + 1)), self._mechanism)
-        frames = urdf.frames(run.part(slice(0, 0)), self._mechanism)
+        frames = urdf.link_poses(run.part(slice(0, 0)), self._mechanism)
         if not frames:
             return
         message = Template().string(urdf.robot_description(self._name, shown, self._metres))

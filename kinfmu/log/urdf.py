@@ -2,78 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from kinfmu.drivers import DistanceDriver
-from kinfmu.joints import Distance
-from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene import palette
-from kinfmu.scene.placing import poses_of, world
-from kinfmu.scene.scene import DrawnCylinder, Scene
-from kinfmu.scene.strokes import Stroke
+from kinfmu.scene.frames import die_frame, frames
+from kinfmu.scene.placing import poses_of
+from kinfmu.scene.scene import Scene
+from kinfmu.scene.shapes import Shape
 
 ROOT = "ground"  # the root frame
-KNOWN_AT_ONCE = ("cam", "roller", "wheel", "spoke", "belt", "block")  # strokes whose size follows from one pose
-_BAR, _BARREL, _ROD, _BLOCK = 0.02, 1.4, 0.6, 1.8  # width of links relative to the size; of others relative to links
+_WIDTH, _BLOCK = 0.02, 0.03  # width of links and half length of blocks, as parts of the size
 
 
-def frames(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
+class _Paint(NamedTuple):
+    """How one kind is drawn: width, relative to links; height above the body, in widths; has discs at its points."""
+
+    width: float
+    height: float = 0.0
+    has_discs: bool = False
+
+
+_PAINT = {  # kinds whose size follows from one pose
+    "support": _Paint(1.0, has_discs=True),
+    "link": _Paint(1.0, has_discs=True),
+    "rib": _Paint(1.0, has_discs=True),
+    "bar": _Paint(0.6, has_discs=True),
+    "barrel": _Paint(1.4),
+    "shaft": _Paint(0.6),
+    "block": _Paint(1.8),
+    **dict.fromkeys(("cam", "roller", "wheel", "spoke", "belt"), _Paint(0.4, -0.3)),
+}
+
+
+def link_poses(run: Run, mechanism: Mechanism) -> dict[str, FloatArray]:
     """Return poses (n, 3) of x, y [length], phi [rad] of every link of the description: bodies, bars, cylinders."""
-    poses, _ = poses_of(run, mechanism)
-    placed = {body.name: poses[body.name] for body in mechanism.moving_bodies if body.name in poses}
-    points = mechanism.body_points
-    for member in (*mechanism.joints, *mechanism.drivers):
-        if not isinstance(member, Distance | DistanceDriver):
-            continue
-        bodies = [body_of(point) for point in member.between]
-        if not all(body in poses or body == GROUND_NAME for body in bodies):
-            continue
-        a, b = (
-            np.broadcast_to(points[point], (len(run), 2)) if body == GROUND_NAME else world(poses[body], points[point])
-            for body, point in zip(bodies, member.between, strict=True)
-        )
-        angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
-        if isinstance(member, Distance):
-            placed[_bar_frame(member.name)] = np.column_stack([a, angle])
-        else:
-            barrel, rod = _cylinder_frames(member.name)
-            placed |= {barrel: np.column_stack([a, angle]), rod: np.column_stack([b, angle])}
-    return placed
+    known = poses_of(run, mechanism)[0] | {GROUND_NAME: np.zeros((len(run), 3))}
+    found = frames(known, mechanism)
+    unused = {GROUND_NAME, *(die_frame(joint.name) for joint in mechanism.joints)}
+    return {name: pose for name, pose in found.items() if name not in unused}
 
 
 def robot_description(name: str, scene: Scene, metres: float) -> str:
     """Return the URDF of the scene; a floating joint connects each link to ROOT, since closed loops are not a tree.
 
-    metres: length of the mechanism's unit [m]. Each link has its own layer, so that none hides another. Of what joints
-    add to links only KNOWN_AT_ONCE is drawn, whose size follows from one pose: a record that grows does not know the
-    later poses. For the same reason a cylinder's rod is as long as the cylinder is in that pose.
+    metres: length of the mechanism's unit [m]. Each link has its own layer, so that none hides another. Only shapes
+    whose size follows from one pose are drawn: a record that grows does not know the later poses. For the same reason a
+    cylinder's rod is as long as the cylinder is in that pose.
     """
     brush = _Brush(scene.size, metres)
-    width = brush.width
-    supports = brush.discs(np.array(list(scene.supports.values())).reshape(-1, 2), palette.GROUND, width, 0.0)
-    links = {ROOT: [*supports, *_added(brush, scene.ground, palette.GROUND, 0.0)]}
-    for body in scene.bodies:
-        colour, height = palette.body(body.index), width * (1 + body.index)
-        links[body.name] = [
-            *brush.bars(body.outline, colour, width, height),
-            *brush.discs(body.outline, colour, width, height),
-            *_added(brush, body.strokes, colour, height),
-        ]
-    for bar in scene.bars:
-        ends = np.array([[0.0, 0.0], [bar.length, 0.0]])
-        links[_bar_frame(bar.name)] = [
-            *brush.bars(ends, palette.BAR, 0.6 * width, -width),
-            *brush.discs(ends, palette.BAR, 0.6 * width, -width),
-        ]
-    for cylinder in scene.cylinders:
-        links |= _cylinder(brush, cylinder, width * (1 + len(scene.bodies)))
+    dies = {shape.frame for shape in scene.shapes if shape.kind == "die"}
+    links: dict[str, list[str]] = {frame: [] for frame in (ROOT, *scene.frames) if frame not in dies}
+    for shape in scene.shapes:
+        if shape.kind in _PAINT:
+            links[shape.frame] += brush.visuals(shape, _layer(scene, shape), _line(scene, shape))
     lines = [f"<link name={quoteattr(link)}>{''.join(visuals)}</link>" for link, visuals in links.items()]
     lines += [
         f'<joint name={quoteattr(link + "_floats")} type="floating">'
@@ -85,45 +74,41 @@ def robot_description(name: str, scene: Scene, metres: float) -> str:
     return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n{body_lines}\n</robot>\n'
 
 
-def _bar_frame(joint: str) -> str:
-    return f"bar.{joint}"  # names of bodies hold no dot
+def _layer(scene: Scene, shape: Shape) -> int:
+    """Return the height of a shape's frame, in widths of links: bars below the ground, cylinders above all bodies."""
+    if shape.kind == "bar":
+        return -1
+    if shape.kind in ("barrel", "shaft"):
+        return 1 + len(scene.bodies)
+    return 0 if shape.frame == GROUND_NAME else 1 + scene.bodies[shape.frame]
 
 
-def _cylinder_frames(driver: str) -> tuple[str, str]:
-    """Return the frames of the barrel and of the rod."""
-    return f"cylinder.{driver}.barrel", f"cylinder.{driver}.rod"
-
-
-def _cylinder(brush: _Brush, cylinder: DrawnCylinder, height: float) -> dict[str, list[str]]:
-    """Return the links of the barrel and of the rod; each begins at its own pin."""
-    barrel, rod = _cylinder_frames(cylinder.shape.driver)
-    length = float(np.hypot(*(cylinder.ends[0, 1] - cylinder.ends[0, 0])))
-    tube, shaft = np.array([[0.0, 0.0], [cylinder.shape.barrel, 0.0]]), np.array([[-length, 0.0], [0.0, 0.0]])
-    return {
-        barrel: [*brush.bars(tube, palette.GROUND, _BARREL * brush.width, height)],
-        rod: [*brush.bars(shaft, palette.lighter(palette.BAR), _ROD * brush.width, height)],
-    }
-
-
-def _added(brush: _Brush, strokes: Iterable[Stroke], own: palette.Colour, height: float) -> Iterator[str]:
-    """Yield what joints add to a body, of KNOWN_AT_ONCE; blocks above the links, the rest below them."""
-    for stroke in strokes:
-        kind = stroke.name.partition("/")[0]
-        if kind not in KNOWN_AT_ONCE:
-            continue
-        colour = palette.GROUND if stroke.tone == "grey" else own
-        if kind == "block":
-            yield from brush.bars(stroke.points, colour, _BLOCK * brush.width, height)
-        else:
-            yield from brush.bars(stroke.extent, colour, 0.4 * brush.width, height - 0.3 * brush.width)
+def _line(scene: Scene, shape: Shape) -> FloatArray:
+    """Return the line (k, 2) of a shape."""
+    if shape.kind == "block":
+        half = _BLOCK * scene.size * shape.towards
+        return np.array([shape.points[0] - half, shape.points[0] + half])
+    if shape.kind == "shaft":
+        pose, barrel = scene.frames[shape.frame][0], scene.frames[shape.frame.removesuffix("rod") + "barrel"][0]
+        return np.array([[-float(np.hypot(*(pose - barrel)[:2])), 0.0], [0.0, 0.0]])
+    return shape.line if shape.kind in ("link", "rib") else shape.extent
 
 
 class _Brush:
     """Writer of URDF visuals; size: of the mechanism [length]; metres: length of its unit [m]; width: of links [m]."""
 
     def __init__(self, size: float, metres: float) -> None:
-        self.width = _BAR * size * metres
+        self.width = _WIDTH * size * metres
         self._metres = metres
+
+    def visuals(self, shape: Shape, layer: int, line: FloatArray) -> Iterator[str]:
+        """Yield a shape as boxes along its line (k, 2) [length], and discs at the line's points."""
+        paint = _PAINT[shape.kind]
+        colour = palette.lighter(shape.colour) if shape.kind == "shaft" else shape.colour
+        width, height = paint.width * self.width, (layer + paint.height) * self.width
+        yield from self.bars(line, colour, width, height)
+        if paint.has_discs:
+            yield from self.discs(line, colour, width, height)
 
     def bars(self, points: FloatArray, colour: palette.Colour, width: float, height: float) -> Iterator[str]:
         """Yield boxes along a polyline (k, 2) [length]; width, height above the ground [m]."""

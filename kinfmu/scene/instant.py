@@ -15,6 +15,7 @@ from kinfmu.measures.placement import BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
+from kinfmu.scene.frames import frames
 from kinfmu.scene.placing import seen_from, world
 
 
@@ -46,6 +47,11 @@ class Instant:
         """Body-fixed coordinates of every point, by 'body.point'."""
         return self.mechanism.body_points
 
+    @cached_property
+    def frames(self) -> Mapping[str, FloatArray]:
+        """Poses (1 + n, 3) of all frames that move shapes, by name."""
+        return frames(self.poses, self.mechanism)
+
     def track(self, point: str) -> FloatArray:
         """Return world coordinates (1 + n, 2) of 'body.point', first as drawn."""
         return world(self.poses[body_of(point)], self.body_points[point])
@@ -54,13 +60,17 @@ class Instant:
         """Return world coordinates (2,) of 'body.point' as drawn."""
         return np.asarray(world(self.poses[body_of(point)][:1], self.body_points[point])[0])
 
+    def at(self, point: str) -> FloatArray:
+        """Return body-fixed coordinates (2,) of 'body.point'."""
+        return np.array(self.body_points[point])
+
     def placed(self, body: str, points: FloatArray) -> FloatArray:
         """Return world coordinates (k, 2) as drawn of points (k, 2) in a body's frame."""
         return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
 
     def seen(self, body: str, points: FloatArray) -> FloatArray:
         """Return coordinates (k, 2) in a body's frame of points (k, 2) of the world, the inverse of `placed`."""
-        return seen_from(np.tile(self.poses[body][:1], (len(points), 1)), points)
+        return seen_from(np.tile(self.frames[body][:1], (len(points), 1)), points)
 
     def angle(self, body: str) -> float:
         """Return the angle of a body as drawn [rad]."""

@@ -32,20 +32,13 @@ def rim(points: FloatArray) -> tuple[FloatArray, bool]:
     return points[_hull(points)], True
 
 
-def outline(points: FloatArray) -> FloatArray:
-    """Return the polyline (k, 2) of a link with points (p, 2): along them, or their hull with lines to inner points."""
+def ribs(points: FloatArray) -> FloatArray:
+    """Return lines (r, 2, 2) from the rim of a link with points (p, 2) to each point inside."""
     corners, is_closed = rim(points)
-    if not is_closed:
-        return corners
     inside = [point for point in np.unique(points, axis=0) if not (corners == point).all(axis=1).any()]
-    nearest = [int(np.argmin(np.hypot(*(corners - point).T))) for point in inside]
-    route = []
-    for k, corner in enumerate(corners):
-        route.append(corner)
-        for point, home in zip(inside, nearest, strict=True):
-            if home == k:
-                route += [point, corner]  # a line to the inner point and back
-    return np.array([*route, corners[0]])
+    if not is_closed:
+        return np.empty((0, 2, 2))
+    return np.array([[corners[np.argmin(np.hypot(*(corners - at).T))], at] for at in inside]).reshape(-1, 2, 2)
 
 
 def _hull(points: FloatArray) -> list[int]:
@@ -66,7 +59,7 @@ def _hull(points: FloatArray) -> list[int]:
 
 
 def pins_of(joint: Joint) -> tuple[str, ...]:
-    """Points 'body.point' where a joint has a pin; those of a revolute joint coincide, a block that slides has none."""
+    """Return points 'body.point' where a joint has a pin; those of a revolute joint coincide."""
     if isinstance(joint, Revolute | Fixed):
         return joint.between[:1]
     if isinstance(joint, Distance):
@@ -74,8 +67,3 @@ def pins_of(joint: Joint) -> tuple[str, ...]:
     if isinstance(joint, PointOnLine | CamRoller):
         return joint.between[1:]
     return (joint.of,) if isinstance(joint, Coordinate) else ()
-
-
-def supported(joint: Joint) -> tuple[str, ...]:
-    """Points 'body.point' that a joint loads, each on its own body: supports, where they are the ground's."""
-    return joint.between if isinstance(joint, Revolute | Fixed) else pins_of(joint)

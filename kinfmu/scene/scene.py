@@ -1,4 +1,4 @@
-"""The scene of a run: bodies as lines in their own frames, pins, supports, rails, bars, cylinders and paths."""
+"""The scene of a run: shapes in frames with their poses, pins, points of interest with their paths."""
 
 from __future__ import annotations
 
@@ -9,76 +9,47 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.errors import MechanismError
-from kinfmu.joints import Distance, Fixed, Revolute
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene.completing import remedy
-from kinfmu.scene.cylinders import CylinderShape, cylinder_shapes
+from kinfmu.scene.frames import frames
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.outline import outline, pins_of, points_of, supported
+from kinfmu.scene.outline import pins_of
 from kinfmu.scene.placing import poses_of, world
-from kinfmu.scene.strokes import Stroke, strokes
+from kinfmu.scene.shapes import Shape, shapes
 
 MOST_SAMPLES = 2000  # of a run, from which bounds and shapes are computed
 _LONG_ENOUGH, _FINEST = 0.15, 0.1  # of the size: shortest link that needs no thinner lines; factor of the thinnest
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnBody:
-    """A moving body: lines in its own frame, and poses of the frame.
-
-    outline: polyline (k, 2) through its points; strokes: lines that joints add, such as a cam's profile or a slot;
-    pins: by joint, (2,); points: of interest, by name; pose: (n, 3) of x, y [length], phi [rad], NaN where the run has
-    no numbers; index: of the body in the file, which chooses the colour.
-    """
-
-    name: str
-    index: int
-    outline: FloatArray
-    strokes: tuple[Stroke, ...]
-    pins: tuple[tuple[str, FloatArray], ...]
-    points: Mapping[str, FloatArray]
-    pose: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnBar:
-    """A massless bar between two points (joint Distance): ends (n, 2, 2) in the world [length]."""
-
-    name: str
-    length: float
-    ends: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnCylinder:
-    """A driven distance: its barrel and rod, ends (n, 2, 2) in the world [length]."""
-
-    shape: CylinderShape
-    ends: FloatArray
+_WITHOUT_POSE = ("link", "rib", "bar", "support")  # shapes that do not depend on a pose
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything to draw of one run, lengths in the mechanism's unit, y up.
 
-    supports: pins of the ground, name -> (x, y); ground: rails and other fixed lines; pins: of the ground, by joint,
-    (2,); paths: (n, 2) of the points of interest, by name; left_out: bodies whose pose is not in the run -> the missing
-    coordinates; low, high: corners (2,) of the bounding box.
+    bodies: moving bodies whose pose is known, with their index in the file; frames: poses (n, 3) of x, y [length], phi
+    [rad] by name, NaN where the run has no numbers; shapes: fixed in frames; pins: by frame, with the names of their
+    joints, (2,); points: of interest, by frame, with their names, (2,); paths: (n, 2) of the points of interest, by
+    name; left_out: bodies whose pose is not in the run -> the missing coordinates; low, high: corners (2,) of the
+    bounding box.
     """
 
-    bodies: tuple[DrawnBody, ...]
-    bars: tuple[DrawnBar, ...]
-    cylinders: tuple[DrawnCylinder, ...]
-    ground: tuple[Stroke, ...]
-    supports: Mapping[str, tuple[float, float]]
-    pins: tuple[tuple[str, FloatArray], ...]
+    bodies: Mapping[str, int]
+    frames: Mapping[str, FloatArray]
+    shapes: tuple[Shape, ...]
+    pins: Mapping[str, Sequence[tuple[str, FloatArray]]]
+    points: Mapping[str, Sequence[tuple[str, FloatArray]]]
     paths: Mapping[str, FloatArray]
     left_out: Mapping[str, tuple[str, ...]]
     low: FloatArray
     high: FloatArray
+
+    @property
+    def supports(self) -> dict[str, FloatArray]:
+        """Pins of the ground, name -> (2,)."""
+        return {shape.name: shape.points[0] for shape in self.shapes if shape.kind == "support"}
 
     @property
     def size(self) -> float:
@@ -88,9 +59,8 @@ class Scene:
     @property
     def stroke(self) -> float:
         """Reference length of line widths: the size, or less if links are short compared with it."""
-        lengths = [bar.length for bar in self.bars]
-        for body in self.bodies:
-            lengths += np.hypot(*np.diff(body.outline, axis=0).T).tolist()
+        links = [shape.line for shape in self.shapes if shape.kind in ("link", "rib", "bar")]
+        lengths = [length for line in links for length in np.hypot(*np.diff(line, axis=0).T).tolist()]
         shortest = min((length for length in lengths if length > 1e-3 * self.size), default=self.size)
         return self.size * math.sqrt(min(max(shortest / (_LONG_ENOUGH * self.size), _FINEST**2), 1.0))
 
@@ -111,90 +81,37 @@ def drawable(run: Run) -> tuple[Scene | None, str]:
 def scene(run: Run, mechanism: Mechanism) -> Scene:
     """Return the scene of `run`, without bodies whose poses are unknown."""
     poses, left_out = poses_of(run, mechanism)
-    points = mechanism.body_points
-    shown = _instant(run, mechanism, poses)
-    added = strokes(shown) if shown else {}
-    cylinders = cylinder_shapes(shown) if shown else []
-
-    def track(point: str) -> FloatArray | None:
-        body = body_of(point)
-        if body == GROUND_NAME:
-            return np.tile(np.array(points[point]), (len(run), 1))
-        return world(poses[body], points[point]) if body in poses else None
-
-    def ends_of(between: tuple[str, str]) -> FloatArray | None:
-        a, b = map(track, between)
-        return None if a is None or b is None else np.stack([a, b], axis=1)
-
-    pins = _pins(mechanism)
-    bodies = tuple(
-        DrawnBody(
-            body.name,
-            index,
-            outline(points_of(body)),
-            tuple(added.get(body.name, ())),
-            tuple(pins.get(body.name, ())),
-            {name: np.array(points[p]) for name, p in mechanism.points.items() if body_of(p) == body.name},
-            poses[body.name],
-        )
-        for index, body in enumerate(mechanism.moving_bodies)
-        if body.name in poses
-    )
-    bars = tuple(
-        DrawnBar(joint.name, joint.length, ends)
-        for joint in mechanism.joints
-        if isinstance(joint, Distance) and (ends := ends_of(joint.between)) is not None
-    )
-    driven = tuple(DrawnCylinder(shape, ends) for shape in cylinders if (ends := ends_of(shape.between)) is not None)
-    supports = _supports(mechanism, cylinders)
-    ground = tuple(added.get(GROUND_NAME, ()))
-    return Scene(
-        bodies,
-        bars,
-        driven,
-        ground,
-        supports,
-        tuple(pins.get(GROUND_NAME, ())),
-        {name: path for name, point in mechanism.points.items() if (path := track(point)) is not None},
-        left_out,
-        *_bounds(bodies, ground, supports),
-    )
-
-
-def _pins(mechanism: Mechanism) -> dict[str, list[tuple[str, FloatArray]]]:
-    """Return pins by body, in its frame, each with the name of its joint."""
-    points = mechanism.body_points
+    bodies = {body.name: index for index, body in enumerate(mechanism.moving_bodies) if body.name in poses}
+    known = poses | {GROUND_NAME: np.zeros((len(run), 3))}
+    good = np.flatnonzero(run.good)
+    rows = np.concatenate([good[:1], good[_some(len(good))]])
+    placed = {name: pose[rows] if len(rows) else np.zeros((1, 3)) for name, pose in known.items()}
+    shown = Instant(mechanism, placed, {driver.name: 1.0 for driver in mechanism.drivers})
+    found = tuple(shape for shape in shapes(shown) if len(rows) or shape.kind in _WITHOUT_POSE)
     pins: dict[str, list[tuple[str, FloatArray]]] = {}
     for joint in mechanism.joints:
-        for name in pins_of(joint):
-            pins.setdefault(body_of(name), []).append((joint.name, np.array(points[name])))
-    return pins
-
-
-def _supports(mechanism: Mechanism, cylinders: Sequence[CylinderShape]) -> dict[str, tuple[float, float]]:
-    """Return points of the ground that hold joints or cylinders, by name.
-
-    The names are those of the revolute joints and welds there, else of the points, as in figures.
-    """
-    joints: dict[str, list[str]] = {end: [] for cylinder in cylinders for end in cylinder.between}
-    for joint in mechanism.joints:
-        for name in supported(joint):
-            joints.setdefault(name, []).extend([joint.name] if isinstance(joint, Revolute | Fixed) else [])
-    at: dict[tuple[float, float], list[str]] = {}
-    for name, place in mechanism.body_points.items():
-        if name in joints and body_of(name) == GROUND_NAME:
-            at.setdefault(place, []).extend(joints[name] or [name.partition(".")[2]])
-    return {", ".join(dict.fromkeys(names)): place for place, names in at.items()}
-
-
-def _instant(run: Run, mechanism: Mechanism, poses: Mapping[str, FloatArray]) -> Instant | None:
-    """Return the first sample with numbers, and some of the others; None if there is none."""
-    good = np.flatnonzero(run.good)
-    if not len(good):
-        return None
-    rows = np.concatenate([good[:1], good[_some(len(good))]])
-    placed = {name: pose[rows] for name, pose in poses.items()} | {GROUND_NAME: np.zeros((len(rows), 3))}
-    return Instant(mechanism, placed, {driver.name: 1.0 for driver in mechanism.drivers})
+        for point in pins_of(joint):
+            pins.setdefault(body_of(point), []).append((joint.name, shown.at(point)))
+    for shape in found:
+        if shape.kind in ("barrel", "shaft"):
+            pins[shape.frame] = [(shape.name, np.zeros(2))]
+    points: dict[str, list[tuple[str, FloatArray]]] = {}
+    for name, point in mechanism.points.items():
+        points.setdefault(body_of(point), []).append((name, shown.at(point)))
+    return Scene(
+        bodies,
+        frames(known, mechanism),
+        found,
+        pins,
+        points,
+        {
+            name: world(known[body_of(point)], mechanism.body_points[point])
+            for name, point in mechanism.points.items()
+            if body_of(point) in known
+        },
+        left_out,
+        *_bounds(found, known),
+    )
 
 
 def _some(count: int) -> slice:
@@ -202,16 +119,18 @@ def _some(count: int) -> slice:
     return slice(None, None, max(-(-count // MOST_SAMPLES), 1))
 
 
-def _bounds(
-    bodies: tuple[DrawnBody, ...], ground: tuple[Stroke, ...], supports: Mapping[str, tuple[float, float]]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the box around the ground and all lines of all bodies over the run."""
-    corners = [np.array(list(supports.values()), dtype=float).reshape(-1, 2), *(stroke.points for stroke in ground)]
-    for body in bodies:
-        pose = body.pose[np.isfinite(body.pose).all(axis=1)]
-        pose = pose[_some(len(pose))]
-        for points in (body.outline, *(stroke.extent for stroke in body.strokes)):
-            corners += [world(pose, (x, y)) for x, y in points]
+def _bounds(found: Sequence[Shape], poses: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of the box around the shapes of all bodies and of the ground over the run."""
+    corners = [np.empty((0, 2))]
+    for shape in found:
+        if shape.kind == "pitch":  # only figures draw it
+            continue
+        if shape.frame == GROUND_NAME:
+            corners.append(shape.extent)
+        elif shape.frame in poses:
+            pose = poses[shape.frame]
+            pose = pose[np.isfinite(pose).all(axis=1)]
+            corners += [world(pose[_some(len(pose))], (x, y)) for x, y in shape.extent]
     everything = np.vstack(corners)
     if not len(everything):
         everything = np.zeros((1, 2))

@@ -11,12 +11,12 @@ import pytest
 
 import kinfmu
 from kinfmu.draw import animate, animation
-from kinfmu.draw.animation import _film, _marks, _placed
-from kinfmu.draw.motion import Cylinder
+from kinfmu.draw.animation import _film, _placed
 from kinfmu.errors import FigureError
 from kinfmu.run import Run
 from kinfmu.scene import palette
 from kinfmu.scene.instant import Instant
+from kinfmu.scene.shapes import shapes
 from kinfmu.sweep import run_times
 from tests.log.runs import fourbar, with_gap
 
@@ -98,15 +98,19 @@ def test_a_gap_holds_the_last_pose_that_closed(tmp_path: Path) -> None:
     assert [count > 40 for count in reddish] == [False, False, False, False, True, False, False]
 
 
-def test_a_cylinder_keeps_its_barrel_and_rod_while_it_works() -> None:
+def test_shapes_of_one_instant_serve_all_pictures(tmp_path: Path) -> None:
     run = solved("excavator")
-    mechanism, poses = _placed(run, Path("run.gif"))
+    mechanism, poses = _placed(run, tmp_path)
     directions = {driver.name: 1.0 for driver in mechanism.drivers}
-    lengths = set()
-    for row in (0, 30, 60, 100):
-        shown = Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, directions)
-        lengths |= {(mark.barrel, mark.rod) for mark in _marks(shown, []) if isinstance(mark, Cylinder)}
-    assert len(lengths) == 3
+    found = [
+        shapes(Instant(mechanism, {body: np.vstack([pose[row], pose]) for body, pose in poses.items()}, directions))
+        for row in (0, 60, 100)
+    ]
+    assert len([shape for shape in found[0] if shape.kind in ("barrel", "shaft")]) == 6
+    for other in found[1:]:
+        for one, same in zip(found[0], other, strict=True):
+            assert (one.kind, one.name, one.frame) == (same.kind, same.name, same.frame)
+            np.testing.assert_allclose(one.points, same.points, atol=1e-9)
 
 
 def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:

@@ -25,13 +25,13 @@ from kinfmu import (
     load,
 )
 from kinfmu.draw.drawing import sheet_of
-from kinfmu.draw.ground import Rail, Support, supports
 from kinfmu.draw.instant import instant
-from kinfmu.draw.motion import Cylinder, Push, Turn, motion
+from kinfmu.draw.motion import Length, Push, Turn, motion
+from kinfmu.draw.painting import placed
 from kinfmu.draw.pins import Pin, pins
-from kinfmu.draw.slides import Block, Slot, rails, slots_and_blocks
-from kinfmu.draw.wheels import Belt, Rack, Wheel, racks, wheels
-from kinfmu.scene.slides import rods, slides
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.shapes import Shape, shapes
+from kinfmu.scene.slides import slides
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar
 
@@ -57,6 +57,11 @@ def geared(ratio: float, *, sun: str = "ground", carrier: str = "arm") -> Mechan
     return Mechanism("geared", bodies, joints, [AngleDriver("arm", "arm"), AngleDriver("sun", "sun")])
 
 
+def drawn(shown: Instant, *kinds: str) -> list[Shape]:
+    """The shapes of some kinds, in the world as drawn."""
+    return [shape for shape in placed(shown, shapes(shown)) if shape.kind in kinds]
+
+
 def test_a_figure_shows_the_start_pose_of_the_file() -> None:
     shown = instant(load("fourbar"))  # its law begins at 0, its bodies are at 60 degrees
     np.testing.assert_allclose(shown.point("crank.P"), [0.5, math.sqrt(0.75)], atol=1e-12)
@@ -72,28 +77,24 @@ def test_a_mechanism_far_from_the_origin_is_drawn_at_its_place() -> None:
 
 
 def test_a_support_is_below_its_pin_or_on_a_free_side() -> None:
-    standing = supports(instant(load("fourbar")))
-    assert [(tuple(mark.at), tuple(mark.towards)) for mark in standing if isinstance(mark, Support)] == [
+    standing = drawn(instant(load("fourbar")), "support")
+    assert [(tuple(shape.points[0]), tuple(shape.towards)) for shape in standing] == [
         ((0.0, 0.0), (0.0, -1.0)),
         ((1.0, 0.0), (0.0, -1.0)),
         ((2.0, 0.0), (0.0, -1.0)),
     ]
-    (hanging,) = supports(instant(load("double_pendulum")))
-    assert isinstance(hanging, Support)
+    (hanging,) = drawn(instant(load("double_pendulum")), "support")
     assert tuple(hanging.towards) == (0.0, 1.0)
 
 
 def test_a_rail_is_as_long_as_the_path_of_its_block() -> None:
     mechanism = crank_and_slider()
     shown = instant(Mechanism("slider", mechanism.bodies, mechanism.joints, mechanism.drivers, run=TURN))
-    sliding = slides(shown)
-    (rail,), (block,) = rails(shown, sliding), slots_and_blocks(shown, sliding)
-    assert isinstance(rail, Rail)
-    assert isinstance(block, Block)
+    (rail,), (block,) = drawn(shown, "rail"), drawn(shown, "slot", "block", "die")
     dead_centres = [[math.sqrt(2.0**2 - 0.25**2), 0.25], [math.sqrt(4.0**2 - 0.25**2), 0.25]]
-    np.testing.assert_allclose(rail.ends, dead_centres, atol=2e-3)  # no sample of the run is exactly there
+    np.testing.assert_allclose(rail.points, dead_centres, atol=2e-3)  # no sample of the run is exactly there
     assert tuple(rail.towards) == (0.0, -1.0)
-    np.testing.assert_allclose(block.at, shown.point("block.S"), atol=0)
+    np.testing.assert_allclose(block.points[0], shown.point("block.S"), atol=1e-15)
 
 
 def test_a_pin_runs_in_a_slot_of_its_link() -> None:
@@ -113,14 +114,13 @@ def test_a_pin_runs_in_a_slot_of_its_link() -> None:
         run=TURN,
     )
     shown = instant(lever)
-    sliding = slides(shown)
-    (slot,) = slots_and_blocks(shown, sliding)
-    assert isinstance(slot, Slot)
-    lengths = [np.hypot(*(end - shown.point("lever.C"))) for end in slot.ends]
+    (slot,) = drawn(shown, "slot", "block", "die")
+    lengths = [np.hypot(*(end - shown.point("lever.C"))) for end in slot.points]
     np.testing.assert_allclose(sorted(lengths), [1.5, 2.5], atol=1e-9)
-    (bar,) = rods(shown, sliding)["lever"]  # from its pivot to the end of the slot
-    np.testing.assert_allclose(bar, [[0.0, 0.0], [2.5, 0.0]], atol=1e-9)
-    assert rails(shown, sliding) == []
+    (rod,) = (shape for shape in shapes(shown) if shape.kind == "rod")  # from its pivot to the end of the slot
+    assert rod.frame == "lever"
+    np.testing.assert_allclose(rod.points, [[0.0, 0.0], [2.5, 0.0]], atol=1e-9)
+    assert drawn(shown, "rail", "bed") == []
 
 
 def test_a_block_on_a_rod_is_the_body_without_extent() -> None:
@@ -155,22 +155,23 @@ def test_a_block_on_a_rod_is_the_body_without_extent() -> None:
     ids=["outer", "planet inside", "sun inside"],
 )
 def test_pitch_circles_touch_and_keep_the_ratio(ratio: float, radii: tuple[float, float]) -> None:
-    found = {mark.radius: mark for mark in wheels(instant(geared(ratio))) if isinstance(mark, Wheel)}
+    found = {wheel.radius: wheel.points[0] for wheel in drawn(instant(geared(ratio)), "wheel")}
     assert sorted(found) == pytest.approx(sorted(radii))
-    assert tuple(found[radii[0]].centre) == (0.0, 0.0)
-    assert found[radii[1]].centre == pytest.approx([3.0, 0.0])
+    assert tuple(found[radii[0]]) == (0.0, 0.0)
+    assert found[radii[1]] == pytest.approx([3.0, 0.0])
 
 
 def test_wheels_on_the_ground_that_turn_equally_have_a_belt() -> None:
-    marks = wheels(instant(geared(2.0, sun="sun", carrier="arm")))
-    (belt,) = (mark for mark in marks if isinstance(mark, Belt))
-    sun, planet = sorted((mark for mark in marks if isinstance(mark, Wheel)), key=lambda wheel: wheel.radius)
+    shown = instant(geared(2.0, sun="sun", carrier="arm"))
+    belt = drawn(shown, "belt")
+    assert len(belt) == 2
+    sun, planet = sorted(drawn(shown, "wheel"), key=lambda wheel: wheel.radius)
     assert planet.radius == pytest.approx(2.0 * sun.radius)
     assert planet.radius + sun.radius < 3.0
-    for a, b in belt.parts:  # each a tangent of both
+    for a, b in (part.points for part in belt):  # each a tangent of both
         along = (b - a) / np.hypot(*(b - a))
         for wheel in (sun, planet):
-            off = min((end - wheel.centre for end in (a, b)), key=lambda way: float(np.hypot(*way)))
+            off = min((end - wheel.points[0] for end in (a, b)), key=lambda way: float(np.hypot(*way)))
             assert np.hypot(*off) == pytest.approx(wheel.radius)
             assert along @ off == pytest.approx(0.0, abs=1e-12)
 
@@ -192,10 +193,10 @@ def test_a_rack_touches_its_pinion_on_the_side_that_rolls() -> None:
             [AngleDriver("pinion", "pinion")],
         )
         shown = instant(rack)
-        (drawn,) = (mark for mark in racks(shown) if isinstance(mark, Rack))
-        np.testing.assert_allclose(drawn.ends[:, 1], height, atol=1e-12)
-        assert tuple(drawn.towards) == pytest.approx((0.0, math.copysign(1.0, height)))
-        assert slots_and_blocks(shown, slides(shown)) == []  # the rack is its own block
+        (teeth,) = drawn(shown, "rack")
+        np.testing.assert_allclose(teeth.points[:, 1], height, atol=1e-12)
+        assert tuple(teeth.towards) == pytest.approx((0.0, math.copysign(1.0, height)))
+        assert drawn(shown, "slot", "block", "die") == []  # the rack is its own block
 
 
 def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
@@ -206,11 +207,14 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
         [DistanceDriver("cylinder", ("ground.C", "arm.Q"), ConstantSpeed(1.7, -0.1))],
         length_unit="mm",
     )
-    (cylinder,) = motion(instant(arm))
-    assert isinstance(cylinder, Cylinder)
+    shown = instant(arm)
+    (cylinder,) = motion(shown)
+    assert isinstance(cylinder, Length)
     length = 1.7  # where the law starts, not where the start pose is: 1.685
     assert cylinder.text == "cylinder = 1.7 mm"
-    assert 0.3 * length <= cylinder.barrel <= 0.62 * length + 1e-12
+    (barrel,), (shaft,) = drawn(shown, "barrel"), drawn(shown, "shaft")
+    np.testing.assert_allclose(cylinder.ends, [barrel.points[0], shaft.points[1]], atol=1e-12)
+    assert 0.3 * length <= np.hypot(*(barrel.points[1] - barrel.points[0])) <= 0.62 * length + 1e-12
 
     (turn,) = motion(instant(fourbar(4.0, 1.0, 3.5, 3.0)))
     assert isinstance(turn, Turn)
@@ -225,11 +229,11 @@ def test_drivers_are_cylinders_and_arrows_with_the_value_of_the_start() -> None:
 
 def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None:
     shown = instant(load("fourbar"))
-    found = {tuple(np.round(mark.at, 3)): mark for mark in pins(shown, slides(shown)) if isinstance(mark, Pin)}
+    found = {tuple(np.round(mark.at, 3)): mark for mark in pins(shown) if isinstance(mark, Pin)}
     assert [mark.text for mark in found.values()] == ["O", "C", "B", "P", "Q", "A"]
     assert {mark.kind for mark in found.values()} == {"pin"}
     shown = instant(load("double_pendulum"))  # the joint is called hinge, the points tip and hinge
-    assert [mark.text for mark in pins(shown, slides(shown)) if isinstance(mark, Pin)] == ["O", "hinge", "tip"]
+    assert [mark.text for mark in pins(shown) if isinstance(mark, Pin)] == ["O", "hinge", "tip"]
 
 
 @pytest.mark.parametrize("name", gallery.names())

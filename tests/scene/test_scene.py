@@ -28,26 +28,31 @@ def everything_drawn(run: Run) -> Scene:
 
 
 def test_bodies_have_the_poses_of_their_coordinates_and_constants(fourbar_scene: Scene, run: Run) -> None:
-    crank, coupler, rocker = fourbar_scene.bodies
+    assert fourbar_scene.bodies == {"crank": 0, "coupler": 1, "rocker": 2}
+    crank, coupler, rocker = (fourbar_scene.frames[body] for body in fourbar_scene.bodies)
     phi = DEGREE * run.t
     tip = np.column_stack([np.cos(phi), np.sin(phi)])
-    np.testing.assert_allclose(world(crank.pose, (1.0, 0.0)), tip, atol=1e-15)
-    np.testing.assert_allclose(world(coupler.pose, (-1.0, 0.0)), tip, atol=1e-15)
-    np.testing.assert_allclose(world(rocker.pose, (1.0, 0.0)), tip + np.array([1.0, 0.0]), atol=1e-15)
+    np.testing.assert_allclose(world(crank, (1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(coupler, (-1.0, 0.0)), tip, atol=1e-15)
+    np.testing.assert_allclose(world(rocker, (1.0, 0.0)), tip + np.array([1.0, 0.0]), atol=1e-15)
 
 
 def test_the_bar_keeps_its_length(fourbar_scene: Scene) -> None:
-    (bar,) = fourbar_scene.bars
+    (bar,) = (shape for shape in fourbar_scene.shapes if shape.kind == "bar")
     assert bar.name == "AB"
-    np.testing.assert_allclose(np.hypot(*(bar.ends[:, 1] - bar.ends[:, 0]).T), 1.0, rtol=1e-14)
+    np.testing.assert_array_equal(bar.points, [[0.0, 0.0], [1.0, 0.0]])
+    ends = [world(fourbar_scene.frames[bar.frame], (x, y)) for x, y in bar.points]
+    np.testing.assert_allclose(ends[1], world(fourbar_scene.frames["coupler"], (1.0, 0.0)), atol=1e-14)
+    np.testing.assert_allclose(ends[0], np.tile([2.0, 0.0], (len(ends[0]), 1)), atol=1e-14)
 
 
 def test_supports_are_the_points_of_the_ground_that_joints_use(fourbar_scene: Scene) -> None:
-    assert fourbar_scene.supports == {"O": (0.0, 0.0), "C": (1.0, 0.0), "B": (2.0, 0.0)}
+    found = {name: tuple(at) for name, at in fourbar_scene.supports.items()}
+    assert found == {"O": (0.0, 0.0), "C": (1.0, 0.0), "B": (2.0, 0.0)}
 
 
 def test_a_revolute_joint_is_one_pin_and_a_bar_has_two(fourbar_scene: Scene) -> None:
-    pins = [*fourbar_scene.pins, *(pin for body in fourbar_scene.bodies for pin in body.pins)]
+    pins = [pin for found in fourbar_scene.pins.values() for pin in found]
     assert sorted(name for name, _ in pins) == ["AB", "AB", "C", "O", "P", "Q"]
 
 
@@ -63,14 +68,15 @@ def test_the_bounds_hold_everything(fourbar_scene: Scene) -> None:
 def test_poses_in_a_gap_are_unknown_even_where_coordinates_are_constant(run_with_gap: Run) -> None:
     found, _ = drawable(run_with_gap)
     assert found
-    assert np.isnan(found.bodies[0].pose[100:121]).all()
+    assert np.isnan(found.frames["crank"][100:121]).all()
     assert np.isfinite(found.high).all()
 
 
 def test_a_body_whose_coordinates_are_not_in_the_run_is_left_out_by_name(run: Run) -> None:
     found, note = drawable(run.without(["coupler.x", "coupler.y"]))
     assert found
-    assert [body.name for body in found.bodies] == ["crank", "rocker"]
+    assert [*found.bodies] == ["crank", "rocker"]
+    assert {shape.frame for shape in found.shapes} == {"ground", "crank", "rocker"}
     assert note == (
         "Not drawn: coupler (the run does not hold coupler.x, coupler.y); "
         "keep them: --channels all, or q among its names."
@@ -93,8 +99,9 @@ def test_a_run_of_few_outputs_is_drawn_as_one_of_all(name: str) -> None:
 def check_equal_poses(run: Run, expected: Run) -> None:
     """Check that everything of a run is drawn, in the poses of another run."""
     found, wanted = everything_drawn(run), everything_drawn(expected)
-    for body, other in zip(found.bodies, wanted.bodies, strict=True):
-        np.testing.assert_allclose(body.pose, other.pose, atol=1e-9 * wanted.size)
+    assert found.frames.keys() == wanted.frames.keys()
+    for frame, pose in found.frames.items():
+        np.testing.assert_allclose(pose, wanted.frames[frame], atol=1e-9 * wanted.size)
 
 
 def test_a_run_of_few_outputs_is_drawn_with_its_own_parameters() -> None:
@@ -136,28 +143,25 @@ def drawn(name: str) -> tuple[Scene, Run]:
     return everything_drawn(run), run
 
 
-def placed(scene: Scene, body: str, stroke: str) -> np.ndarray:
-    """World coordinates (n, k, 2) of a stroke of a body."""
-    (found,) = (one for one in scene.bodies if one.name == body)
-    (line,) = (one.points for one in found.strokes if one.name == stroke)
-    return np.stack([world(found.pose, (x, y)) for x, y in line], axis=1)
+def placed(scene: Scene, frame: str, kind: str) -> np.ndarray:
+    """World coordinates (n, k, 2) of the line of the only shape of a kind in a frame."""
+    (line,) = (shape.line for shape in scene.shapes if (shape.frame, shape.kind) == (frame, kind))
+    return np.stack([world(scene.frames[frame], (x, y)) for x, y in line], axis=1)
 
 
 def test_the_roller_touches_the_cam_over_the_whole_run() -> None:
     found, _ = drawn("cam_roller")
-    (lever,) = (body for body in found.bodies if body.name == "lever")
-    profile, roller = placed(found, "cam", "cam/pitch"), placed(found, "lever", "roller/pitch")
+    profile, roller = placed(found, "cam", "cam"), placed(found, "lever", "roller")
     centre = roller[:, :-1].mean(axis=1)
     radius = np.hypot(*(roller[0, 0] - centre[0]))
-    assert np.isfinite(lever.pose).all()
+    assert np.isfinite(roller).all()
     gaps = np.hypot(*np.moveaxis(profile - centre[:, None], 2, 0)).min(axis=1) - radius
     assert np.abs(gaps).max() < 0.02 * radius  # the profile has a corner each degree
 
 
 def test_wheels_touch_while_they_turn() -> None:
     found, _ = drawn("geared_five_bar")
-    (name,) = (stroke.name for stroke in found.bodies[0].strokes if stroke.name.startswith("wheel/"))
-    rims = [placed(found, body.name, name) for body in found.bodies[:2]]
+    rims = [placed(found, body, "wheel") for body in [*found.bodies][:2]]
     centres = [rim[:, :-1].mean(axis=1) for rim in rims]
     radii = [np.hypot(*(rim[:, 0] - centre).T) for rim, centre in zip(rims, centres, strict=True)]
     np.testing.assert_allclose(np.hypot(*(centres[1] - centres[0]).T), sum(radii), rtol=1e-9)
@@ -165,28 +169,31 @@ def test_wheels_touch_while_they_turn() -> None:
 
 def test_cylinders_span_their_points_and_hold_their_rods() -> None:
     found, run = drawn("excavator")
-    assert [cylinder.shape.driver for cylinder in found.cylinders] == [
-        "boom_cylinder",
-        "stick_cylinder",
-        "bucket_cylinder",
-    ]
-    for cylinder in found.cylinders:
-        lengths = np.hypot(*(cylinder.ends[:, 1] - cylinder.ends[:, 0]).T)
-        np.testing.assert_allclose(lengths, run[f"{cylinder.shape.driver}_length"], rtol=1e-12)
-        within = lengths - cylinder.shape.rod  # where the rod begins, from the barrel's end
+    barrels, shafts = ([shape for shape in found.shapes if shape.kind == kind] for kind in ("barrel", "shaft"))
+    assert [barrel.name for barrel in barrels] == ["boom_cylinder", "stick_cylinder", "bucket_cylinder"]
+    for barrel, shaft in zip(barrels, shafts, strict=True):
+        start, end = found.frames[barrel.frame], found.frames[shaft.frame]
+        np.testing.assert_array_equal(start[:, 2], end[:, 2])
+        lengths = np.hypot(*(end - start)[:, :2].T)
+        np.testing.assert_allclose(lengths, run[f"{barrel.name}_length"], rtol=1e-12)
+        within = lengths + shaft.points[0, 0]  # where the rod begins, from the barrel's pin
         assert within.min() > 0.0
-        assert within.max() < cylinder.shape.barrel < lengths.min()
+        assert within.max() < barrel.points[1, 0] < lengths.min()
     assert {"O", "boom_foot"} == set(found.supports)
 
 
 def test_slides_have_rails_blocks_and_slots_but_no_pin_on_their_line() -> None:
     found, _ = drawn("inverted_slider_crank")
-    names = [stroke.name for body in found.bodies for stroke in body.strokes] + [stroke.name for stroke in found.ground]
-    kinds = {name.partition("/")[0] for name in names}
-    assert kinds == {"rod", "block", "rail"}
+    kinds = {shape.kind for shape in found.shapes}
+    assert kinds == {"link", "rod", "block", "rail", "support"}
     assert "way" not in found.supports
-    assert {stroke.name.partition("/")[0] for body in drawn("scotch_yoke")[0].bodies for stroke in body.strokes} == {
-        "rod",
-        "slot",
-        "block",
-    }
+    assert {shape.kind for shape in drawn("scotch_yoke")[0].shapes} >= {"rod", "slot", "block", "rail"}
+
+
+def test_the_block_of_a_pin_on_a_line_of_the_ground_moves_with_the_pin_and_does_not_turn() -> None:
+    found, run = drawn("offset_slider_crank")
+    (die,) = (shape for shape in found.shapes if shape.kind == "die")
+    pose = found.frames[die.frame]
+    np.testing.assert_allclose(pose[:, :2], found.paths["slider"], atol=1e-9)
+    assert not pose[:, 2].any()
+    assert len(pose) == len(run)

@@ -7,14 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.run import FloatArray
+from kinfmu.scene import details
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene
+from kinfmu.scene.shapes import Shape
 
-SUPPORT = 0.05  # height of a support, as a part of the size
+_SUPPORT = 0.05  # height of a support, as a part of the size
 _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame
 _LETTER, _EDGE, _LINE = 6.5, 8.0, 17.0  # [points]; of a name: width of a letter, margin, height
 _SAMPLES = 40  # poses that are compared
 _OFTEN = 0.35  # of them; of two names that cover each other in more poses only one is shown
+
+
+def detail(scene: Scene) -> float:
+    """Return the size of details of a recording [length]."""
+    return _SUPPORT * scene.stroke / details.SUPPORT
 
 
 def dots(scene: Scene) -> float:
@@ -25,10 +32,10 @@ def dots(scene: Scene) -> float:
 
 def places_below(scene: Scene) -> FloatArray:
     """Return the places of the names of supports, (k, 2): below each, or lower where another name would cover it."""
-    depth = 1.7 * SUPPORT * scene.stroke
+    depth = 1.7 * _SUPPORT * scene.stroke
     line, placed = _LINE / dots(scene), list[FloatArray]()
     for at in scene.supports.values():
-        here = np.array(at) - [0.0, depth]
+        here = at - np.array([0.0, depth])
         while any(_covers(scene, here[None], a[None], b, c).any() for a, b, c in _pairs(scene, placed)):
             here = here - [0.0, line]
         placed.append(here)
@@ -43,13 +50,16 @@ def _pairs(scene: Scene, placed: Sequence[FloatArray]) -> list[tuple[FloatArray,
 
 def shown_names(scene: Scene) -> frozenset[str]:
     """Return the bodies and bars whose names are always shown; supports and points of interest have precedence."""
-    count = max((len(body.pose) for body in scene.bodies), default=0)
+    count = max((len(pose) for pose in scene.frames.values()), default=0)
     rows = np.unique(np.linspace(0, max(count - 1, 0), _SAMPLES).astype(int)) if count else np.zeros(0, int)
     taken = [(name, path[rows]) for name, path in scene.paths.items()]
     taken += [(name, np.tile(at, (len(rows), 1))) for name, at in zip(scene.supports, places_below(scene), strict=True)]
     found = []
-    middles = [(body.name, world(body.pose[rows], _middle(body.outline))) for body in scene.bodies if len(body.outline)]
-    middles += [(bar.name, bar.ends[rows].mean(axis=1)) for bar in scene.bars]
+    middles = [
+        (shape.name, world(scene.frames[shape.frame][rows], _middle(shape)))
+        for shape in scene.shapes
+        if shape.kind in ("link", "bar")
+    ]
     for name, track in middles:
         covered = [_covers(scene, track, other, name, text) for text, other in taken]
         if all(overlap.sum() <= _OFTEN * len(rows) for overlap in covered):
@@ -58,9 +68,9 @@ def shown_names(scene: Scene) -> frozenset[str]:
     return frozenset(found)
 
 
-def _middle(outline: FloatArray) -> tuple[float, float]:
+def _middle(shape: Shape) -> tuple[float, float]:
     """Return where the viewer puts the name of a line."""
-    x, y = outline.mean(axis=0)
+    x, y = shape.line.mean(axis=0)
     return float(x), float(y)
 
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.log.viewer.ground import MOST_NAMES, log_ground
-from kinfmu.log.viewer.labels import shown_names
+from kinfmu.log.viewer.labels import detail, shown_names
 from kinfmu.log.viewer.timeline import Timeline
+from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
-from kinfmu.scene import palette
-from kinfmu.scene.scene import DrawnBody, Scene
-from kinfmu.scene.strokes import BROAD, LINK, Stroke
+from kinfmu.scene import details, palette
+from kinfmu.scene.scene import Scene
+from kinfmu.scene.shapes import Shape
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -23,12 +25,36 @@ MARGIN = 0.12  # around the linkage, as a part of its size
 TRAIL = 0.5  # length of the trail behind a point, as a part of the linkage's size
 LONGEST_TRAIL = 0.2  # of the run's time
 _TRAIL_PIECES = 1500  # of a path over the whole run
-_BAR, _PIN, _POINT = 0.006, 0.012, 0.015  # radii, as parts of the size
+_PIN, _POINT = 0.012, 0.015  # radii, as parts of the size
 _SUPPORT_NAMES = 0.04  # additional margin below, for the names of supports
-
-
 APPLICATION = "kinfmu"
 ROWS = 4096  # larger blocks are slower and take more memory
+
+
+class _Paint(NamedTuple):
+    """How lines of one kind are drawn: radius, as a part of the size; order: higher ones cover lower ones."""
+
+    radius: float
+    order: float
+
+
+_PAINT = {
+    "cam": _Paint(0.006, 19.5),  # under the link through its pins
+    "wheel": _Paint(0.006, 19.5),
+    "spoke": _Paint(0.004, 19.5),
+    "rack": _Paint(0.004, 19.5),
+    "rod": _Paint(0.012, 19.5),
+    "bar": _Paint(0.006, 10.0),
+    "link": _Paint(0.012, 20.0),
+    "rib": _Paint(0.012, 20.0),
+    "belt": _Paint(0.004, 20.0),
+    "slot": _Paint(0.006, 20.5),
+    "block": _Paint(0.022, 20.6),
+    "die": _Paint(0.022, 20.6),
+    "roller": _Paint(0.004, 23.0),
+    "shaft": _Paint(0.006, 26.0),
+    "barrel": _Paint(0.0176, 27.0),
+}
 
 
 def send(
@@ -98,9 +124,11 @@ class _Linkage:
     ) -> None:
         self.rec, self.root, self.timeline, self.run, self.scene = rec, root, timeline, run, scene
         self.colour, self.layer = colour, layer
-        self.size = width * scene.stroke
+        self.size, self.detail = width * scene.stroke, detail(scene)
         self.width = width
         self.frames = Frames(rec, timeline, run, self.size, layer)
+        bare = {shape.frame for shape in scene.shapes if shape.kind == "link" and len(shape.points) < 2}
+        self._unlinked = {body: body for body in bare}  # bodies whose name is that of their first other shape
         is_named = colour is None and len(scene.bodies) <= MOST_NAMES
         self.names = shown_names(scene) if is_named else frozenset[str]()
 
@@ -111,74 +139,61 @@ class _Linkage:
         # Rerun's plane has y down; flipping the plane once keeps the logged numbers as they are.
         self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
         log_ground(self.rec, self.root, self.scene, _PIN * self.size)
-        for body in self.scene.bodies:
-            self._body(body)
-        for bar in self.scene.bars:
-            path = f"{self.root}/bars/{bar.name}"
-            along = bar.ends[:, 1] - bar.ends[:, 0]
-            self.frames.move(path, np.column_stack([bar.ends[:, 0], np.arctan2(along[:, 1], along[:, 0])]))
-            line = np.array([[0.0, 0.0], [bar.length, 0.0]])
-            self.frames.line(path, line, _BAR, self.colour or palette.BAR, 10.0, bar.name, bar.name in self.names)
-        self._cylinders()
+        entities = {frame: self._entity(frame) for frame in self.scene.frames if frame != GROUND_NAME}
+        seen: Counter[str] = Counter()
+        for frame, path in entities.items():
+            self.frames.move(path, self.scene.frames[frame])
+        for shape in self.scene.shapes:
+            if shape.frame in entities and shape.kind in _PAINT:
+                name = f"{shape.kind}/{shape.name}"
+                self._shape(entities[shape.frame], shape, f"{name}/{seen[name]}" if seen[name] else name)
+                seen[name] += 1
+        for frame, path in entities.items():
+            self._points(path, frame)
         for index, (name, points) in enumerate(self.scene.paths.items()):
             own = self.colour or palette.body(len(self.scene.bodies) + index)
             self._path(f"{self.root}/paths/{name}", points, own)
             self._trail(trail_path(self.root, name), points, own)
         self._notice()
 
-    def _body(self, body: DrawnBody) -> None:
-        """Log the link of a body, what joints add to it, its pins, and its points of interest."""
-        path = f"{self.root}/bodies/{body.name}"
-        own = self.colour or palette.body(body.index)
-        order = 20.0 + body.index / 100.0
-        self.frames.move(path, body.pose)
-        has_link = len(body.outline) > 1
-        if has_link:
-            self.frames.line(path, body.outline, LINK, own, order, body.name, body.name in self.names)
-        for k, stroke in enumerate(body.strokes):
-            label = body.name if k == 0 and not has_link else None
-            self._stroke(path, stroke, own, order, label)
-        self._pins(f"{path}/pins", body.pins)
-        first = len(self.scene.bodies)
-        names = list(self.scene.paths)
-        for name, at in body.points.items():
-            tint = self.colour or palette.body(first + names.index(name))
-            self.frames.points(f"{path}/points/{name}", at[None], _POINT, tint, 40.0, [name], self.colour is None)
+    def _entity(self, frame: str) -> str:
+        """Return the entity of a frame, such as 'bodies/crank' or 'cylinders/boom/rod'."""
+        kind, dot, name = frame.partition(".")
+        if not dot:
+            return f"{self.root}/bodies/{frame}"
+        return f"{self.root}/{kind}s/{name.replace('.', '/')}"
 
-    def _stroke(self, path: str, stroke: Stroke, own: palette.Colour, order: float, label: str | None = None) -> None:
-        tones = {"own": own, "grey": palette.GROUND, "dark": palette.BACKDROP}
-        tint = self.colour if self.colour and stroke.tone != "dark" else tones[stroke.tone]
-        below = -0.5 if stroke.tone == "own" and not stroke.layer else 0.0  # a cam lies under the link through its pins
-        self.frames.line(
-            f"{path}/{stroke.name}",
-            stroke.points,
-            stroke.radius,
-            tint,
-            order + stroke.layer + below,
-            label,
-            label in self.names,
-        )
+    def _shape(self, path: str, shape: Shape, name: str) -> None:
+        """Log one shape; that of a body's link, a bar or a cylinder is the frame's own entity."""
+        paint = _PAINT[shape.kind]
+        line = shape.line
+        if shape.kind == "link" and len(line) < 2:
+            return
+        if shape.kind in ("block", "die"):
+            line = details.core(shape, self.detail)
+        elif shape.kind == "rack":
+            pinion = next(wheel for wheel in self.scene.shapes if (wheel.kind, wheel.name) == ("wheel", shape.name))
+            line = details.teeth(shape, details.teeth_size(pinion.radius))
+            line = np.vstack([line, line[:1]])
+        own = palette.BACKDROP if shape.kind == "slot" else self.colour or shape.colour
+        if shape.kind == "shaft":
+            own = self.colour or palette.lighter(shape.colour)
+        index = self.scene.bodies.get(shape.frame, 0)
+        is_own = shape.kind in ("link", "bar", "barrel", "shaft")
+        label = shape.name if shape.kind in ("link", "bar") else self._unlinked.pop(shape.frame, None)
+        entity = path if is_own else f"{path}/{name}"
+        self.frames.line(entity, line, paint.radius, own, paint.order + index / 100.0, label, label in self.names)
 
-    def _cylinders(self) -> None:
-        for cylinder in self.scene.cylinders:
-            path, shape = f"{self.root}/cylinders/{cylinder.shape.driver}", cylinder.shape
-            a, b = cylinder.ends[:, 0], cylinder.ends[:, 1]
-            angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
-            rod = np.array([[-shape.rod, 0.0], [0.0, 0.0]])
-            self.frames.move(f"{path}/rod", np.column_stack([b, angle]))
-            self.frames.line(f"{path}/rod", rod, _BAR, self.colour or palette.lighter(palette.BAR), 26.0)
-            barrel = np.array([[0.0, 0.0], [shape.barrel, 0.0]])
-            self.frames.move(f"{path}/barrel", np.column_stack([a, angle]))
-            self.frames.line(f"{path}/barrel", barrel, 0.8 * BROAD, self.colour or palette.GROUND, 27.0)
-            pin = np.zeros((1, 2))
-            for part in ("rod", "barrel"):
-                self.frames.points(f"{path}/{part}/pin", pin, _PIN, palette.PIN, 30.0, [shape.driver], shown=False)
-
-    def _pins(self, path: str, pins: tuple[tuple[str, FloatArray], ...]) -> None:
-        """Log pins with the names of their joints, which show when pointed at."""
+    def _points(self, path: str, frame: str) -> None:
+        """Log pins with the names of their joints, which show when pointed at, and points of interest."""
+        pins = self.scene.pins.get(frame, ())
         if pins:
             names, at = zip(*pins, strict=True)
-            self.frames.points(path, np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
+            self.frames.points(f"{path}/pins", np.array(at), _PIN, palette.PIN, 30.0, list(names), shown=False)
+        order = list(self.scene.paths)
+        for name, place in self.scene.points.get(frame, ()):
+            tint = self.colour or palette.body(len(self.scene.bodies) + order.index(name))
+            self.frames.points(f"{path}/points/{name}", place[None], _POINT, tint, 40.0, [name], self.colour is None)
 
     def _path(self, path: str, points: FloatArray, colour: palette.Colour) -> None:
         """Log the path of a point over the run, one line for each part between gaps."""

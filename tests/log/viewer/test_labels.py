@@ -62,7 +62,8 @@ def test_a_name_that_would_cover_another_is_shown_only_when_pointed_at() -> None
     mechanism = kinfmu.load("fourbar")
     assert {"crank", "coupler", "rocker"} <= shown_names(scene_of(mechanism))
     scene = scene_of(mechanism)
-    twins = replace(scene, bodies=(*scene.bodies, replace(scene.bodies[0], name="other")))
+    (crank,) = (shape for shape in scene.shapes if (shape.kind, shape.name) == ("link", "crank"))
+    twins = replace(scene, shapes=(*scene.shapes, replace(crank, name="other")))
     assert "other" not in shown_names(twins)
     assert "crank" in shown_names(twins)
 

@@ -1,0 +1,273 @@
+"""What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
+
+A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those of
+`kinfmu.scene.frames`.
+
+    link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
+    rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
+    block, die       what slides: a body, or the block of a pin, which can turn; direction: along the line
+    rail, bed        a line of the ground under blocks, and under a rack; direction: into the ground
+    support          a pin of the ground; direction: into the ground
+    cam, pitch       the profile, and the curve of the roller's centre; roller: its circle
+    wheel, spoke     a pitch circle, and a radius that shows its rotation; belt: a straight part of one
+    rack             the pitch line; direction: from the teeth to the back
+    contact          the point where the bodies of a cam, gear or rack touch
+    bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinfmu.drivers import DistanceDriver, Driver
+from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute
+from kinfmu.joints.joint import Joint
+from kinfmu.measures.placement import body_of
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.run import FloatArray
+from kinfmu.scene import palette
+from kinfmu.scene.cams import cam_shapes
+from kinfmu.scene.frames import bar_frame, cylinder_frames, die_frame
+from kinfmu.scene.instant import Instant
+from kinfmu.scene.outline import points_of, ribs, rim
+from kinfmu.scene.placing import world
+from kinfmu.scene.slides import Slide, place, racks_of, rods, slides
+from kinfmu.scene.wheels import WheelShape, gear_pairs, rack_pairs
+
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
+_CROWDED = 0.8  # cosine of the angle to a link; above it a support would hide the link
+_SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # of a support; below is preferred
+_BARREL, _OF_SHORTEST = 0.62, 0.9  # length of the barrel: of the usual length, and at most of the shortest one
+_SMALLEST = 0.3  # of the usual length, smallest barrel if the shortest length is very small
+_GUIDED = 0.1  # of the barrel, in which the rod stays at the longest pose
+_STEEP = 0.9  # sine of a rail's angle, above which the ground is on the side away from the mechanism
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A line, area or circle that is fixed in a frame.
+
+    kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
+    colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
+    the only point; direction: unit vector (2,), as stated with the kinds.
+    """
+
+    kind: str
+    name: str
+    frame: str
+    points: FloatArray
+    colour: palette.Colour = palette.GROUND
+    is_closed: bool = False
+    radius: float = 0.0
+    direction: FloatArray | None = None
+
+    @property
+    def line(self) -> FloatArray:
+        """The polyline (k, 2) in the frame; that of a circle or closed line returns to its first point."""
+        if self.radius:
+            return self.points + self.radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+        return np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
+
+    @property
+    def extent(self) -> FloatArray:
+        """Some of the points of the line, (at most 25, 2)."""
+        return self.line[:: max(len(self.line) // 24, 1)]
+
+    @property
+    def towards(self) -> FloatArray:
+        """The direction of a kind that has one, (2,)."""
+        if self.direction is None:
+            raise TypeError(f"a shape of kind '{self.kind}' has no direction")
+        return self.direction
+
+    def placed(self, pose: FloatArray) -> Shape:
+        """Return the shape in the world, its frame in a pose (3,)."""
+        points = np.array([world(pose[None], (x, y))[0] for x, y in self.points]).reshape(-1, 2)
+        if self.direction is None:
+            return replace(self, points=points)
+        x, y = self.direction
+        return replace(self, points=points, direction=world(np.array([[0.0, 0.0, pose[2]]]), (x, y))[0])
+
+
+def shapes(shown: Instant) -> list[Shape]:
+    """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
+    sliding = slides(shown)
+    in_world = [*_cams(shown), *_wheels(shown), *_racks(shown), *_blocks(shown, sliding), *_ground(shown, sliding)]
+    return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world)]
+
+
+def _in_frame(shown: Instant, shape: Shape) -> Shape:
+    """Return a shape of the world as drawn, fixed in its frame."""
+    points = shown.seen(shape.frame, shape.points)
+    if shape.direction is None:
+        return replace(shape, points=points)
+    ends = shown.seen(shape.frame, np.array([[0.0, 0.0], shape.direction]))
+    return replace(shape, points=points, direction=ends[1] - ends[0])
+
+
+def _links(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
+    along = rods(shown, sliding)
+    for body in shown.mechanism.moving_bodies:
+        if body.name not in shown.poses:
+            continue
+        colour = shown.colour(body.name)
+        corners, is_closed = rim(points_of(body))
+        yield Shape("link", body.name, body.name, corners, colour, is_closed=is_closed)
+        for ends in ribs(points_of(body)):
+            yield Shape("rib", body.name, body.name, ends, colour)
+        for ends in along.get(body.name, ()):
+            yield Shape("rod", body.name, body.name, ends, colour)
+
+
+def _between(shown: Instant) -> Iterator[Shape]:
+    """Yield bars and cylinders, which lie along the first axis of their own frames."""
+    for joint in shown.joints:
+        if isinstance(joint, Distance):
+            ends = np.array([[0.0, 0.0], [joint.length, 0.0]])
+            yield Shape("bar", joint.name, bar_frame(joint.name), ends, palette.BAR)
+    for driver in shown.drivers:
+        if isinstance(driver, DistanceDriver):
+            tube, rod = _cylinder(shown, driver)
+            barrel, end = cylinder_frames(driver.name)
+            yield Shape("shaft", driver.name, end, np.array([[-rod, 0.0], [0.0, 0.0]]), palette.BAR)
+            yield Shape("barrel", driver.name, barrel, np.array([[0.0, 0.0], [tube, 0.0]]))
+
+
+def _cylinder(shown: Instant, driver: DistanceDriver) -> tuple[float, float]:
+    """Return the lengths of the barrel and of the rod of a driven distance over the run.
+
+    The rod's length follows from the longest pose, so it may project behind the barrel in shorter ones.
+    """
+    tracks = [shown.track(end) for end in driver.between]
+    lengths: FloatArray = np.hypot(*(tracks[1] - tracks[0]).T)
+    lengths = lengths[1:] if np.isfinite(lengths[1:]).any() else lengths  # of the run, without the drawn pose
+    usual, shortest, longest = (float(of(lengths)) for of in (np.nanmedian, np.nanmin, np.nanmax))
+    barrel = max(min(_OF_SHORTEST * shortest, _BARREL * usual), _SMALLEST * usual)
+    return barrel, max(longest - (1.0 - _GUIDED) * barrel, 0.0)
+
+
+def _cams(shown: Instant) -> Iterator[Shape]:
+    for cam in cam_shapes(shown):
+        colour = shown.colour(cam.cam)
+        yield Shape("cam", cam.joint, cam.cam, cam.profile, colour, is_closed=True)
+        yield Shape("pitch", cam.joint, cam.cam, cam.pitch, colour, is_closed=True)
+        yield Shape("roller", cam.joint, cam.follower, cam.roller[None], radius=cam.radius)
+        yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
+
+
+def _wheels(shown: Instant) -> Iterator[Shape]:
+    for gears in gear_pairs(shown):
+        for wheel in gears.wheels:
+            yield from _wheel(shown, wheel, gears.joint)
+        if gears.is_belt:
+            for ends in gears.belt():
+                yield Shape("belt", gears.joint, gears.carrier, ends)
+        yield Shape("contact", gears.joint, gears.carrier, gears.meets[None])
+
+
+def _racks(shown: Instant) -> Iterator[Shape]:
+    for pair in rack_pairs(shown):
+        yield Shape("rack", pair.joint, pair.rack, pair.ends, shown.colour(pair.rack), direction=pair.towards)
+        yield from _wheel(shown, pair.pinion, pair.joint)
+        yield Shape("contact", pair.joint, pair.rack, pair.contact[None])
+
+
+def _wheel(shown: Instant, wheel: WheelShape, joint: str) -> Iterator[Shape]:
+    angle, colour = shown.angle(wheel.body), shown.colour(wheel.body)
+    rim_point = wheel.centre + wheel.radius * np.array([np.cos(angle), np.sin(angle)])
+    yield Shape("wheel", joint, wheel.body, wheel.centre[None], colour, radius=wheel.radius)
+    yield Shape("spoke", joint, wheel.body, np.array([wheel.centre, rim_point]), colour)
+
+
+def _blocks(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
+    """Yield the moving parts of slides."""
+    racks = racks_of(shown)
+    for slide in sliding:
+        if slide.slider in racks:
+            continue  # the rack itself slides
+        at, along = place(shown, slide)
+        if not slide.turns:
+            yield Shape("block", slide.name, slide.slider, at[None], shown.colour(slide.slider), direction=along)
+        elif slide.holder == GROUND_NAME:
+            yield Shape("die", slide.name, die_frame(slide.name), at[None], palette.BAR, direction=along)
+        else:
+            ends = shown.placed(slide.holder, slide.ends)
+            yield Shape("slot", slide.name, slide.holder, ends, shown.colour(slide.holder))
+
+
+def _ground(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
+    """Yield supports, and rails under blocks or under a fixed block through which a rod slides."""
+    yield from _supports(shown)
+    racks, middle = racks_of(shown), _middle(shown)
+    for slide in sliding:
+        at, along = place(shown, slide)
+        if slide.holder == GROUND_NAME:
+            kind = "bed" if slide.slider in racks else "rail"
+            yield Shape(kind, slide.name, GROUND_NAME, slide.ends, direction=_outwards(along, at, middle))
+        elif slide.slider == GROUND_NAME and not slide.turns:
+            yield Shape("rail", slide.name, GROUND_NAME, np.array([at, at]), direction=_outwards(along, at, middle))
+
+
+def _supports(shown: Instant) -> Iterator[Shape]:
+    """Yield one support for each place of the ground that holds pins.
+
+    Its names are those of the revolute joints and welds there, else of the points.
+    """
+    joints: dict[str, list[str]] = {}  # by point of the ground
+    leaving: dict[tuple[float, float], list[FloatArray]] = {}  # vectors from a place to the points of its bodies
+    members: list[Joint | Driver] = [*shown.mechanism.joints, *shown.mechanism.drivers]
+    for member in members:
+        for point, body in _held(member):
+            at = shown.body_points[point]
+            joints.setdefault(point, []).extend([member.name] if isinstance(member, Revolute | Fixed) else [])
+            ends = _points(shown, body)
+            if len(ends):
+                leaving.setdefault(at, []).extend([*(ends - at), ends.mean(axis=0) - at])  # a plate covers its middle
+    names: dict[tuple[float, float], list[str]] = {}
+    for point, found in joints.items():
+        names.setdefault(shown.body_points[point], []).extend(found or [point.partition(".")[2]])
+    for at, found in names.items():
+        side = _free_side(leaving.get(at, []))
+        yield Shape("support", ", ".join(dict.fromkeys(found)), GROUND_NAME, np.array([at]), direction=side)
+
+
+def _held(member: Joint | Driver) -> list[tuple[str, str]]:
+    """Return the points 'ground.point' that a joint or cylinder loads, each with the other body."""
+    pairs: list[tuple[str, str]] = []
+    if isinstance(member, Revolute | Fixed | Distance | DistanceDriver):
+        pairs = [member.between, member.between[::-1]]
+    elif isinstance(member, PointOnLine | CamRoller):
+        pairs = [member.between[::-1]]
+    return [(point, body_of(other)) for point, other in pairs if body_of(point) == GROUND_NAME]
+
+
+def _free_side(vectors: Sequence[FloatArray]) -> FloatArray:
+    """Return the side of a support: below if no vector points there, else the side furthest from all vectors."""
+    longest = max((float(np.hypot(*vector)) for vector in vectors), default=0.0)
+    directions = [vector / np.hypot(*vector) for vector in vectors if np.hypot(*vector) > 1e-6 * longest]
+    crowded = [max((float(np.dot(side, way)) for way in directions), default=-1.0) for side in _SIDES]
+    best = 0 if crowded[0] < _CROWDED else int(np.argmin(np.round(crowded, 6)))
+    return np.array(_SIDES[best])
+
+
+def _points(shown: Instant, body: str) -> FloatArray:
+    """Return the points (k, 2) of a body in the world as drawn; none if its pose is unknown."""
+    names = [name for name in shown.body_points if body_of(name) == body and body in shown.poses]
+    return np.array([shown.point(name) for name in names]).reshape(-1, 2)
+
+
+def _middle(shown: Instant) -> FloatArray:
+    """Return the middle of all points as drawn, (2,)."""
+    points = np.vstack([_points(shown, body) for body in shown.poses])
+    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0 if len(points) else np.zeros(2))
+
+
+def _outwards(along: FloatArray, at: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return the unit vector across a line into the ground: down, or away from the mechanism if the line is steep."""
+    across = np.array([along[1], -along[0]])
+    is_steep = abs(along[1]) > _STEEP
+    wanted = at - middle if is_steep and abs((at - middle) @ across) > 0.0 else np.array([-0.1, -1.0])
+    return across if across @ wanted > 0.0 else -across
