@@ -1,12 +1,14 @@
-"""Newton's loop in every language: when it ends, and the solves of one and two unknowns, unrolled.
+"""Newton's loop in every language: its statements, when it ends, and the solves of one and two unknowns, unrolled.
 
-The expressions are plain arithmetic on names and mean the same in Python and in C.
+Expressions are plain arithmetic on names and mean the same in Python and in C. Statements are without their end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
+from kinfmu.codegen.writer import Writer, identifier
+from kinfmu.equations.graph import Node, symbols
 from kinfmu.plan import Block
 
 ROUND_OFF = 4e-16  # residual relative to the size below which more steps gain nothing at regular poses
@@ -61,3 +63,31 @@ def square(r: Sequence[str], scales: Sequence[float]) -> str:
 
 def _product(a: str, b: str) -> str:
     return " * ".join(f"({text})" if any(c in text for c in " -") else text for text in (a, b))
+
+
+def outright(writer: Writer, block: Block) -> Iterator[tuple[list[str], str]]:
+    """Yield for each coordinate that a block gives outright its statements and the row that gives it."""
+    for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
+        lines = writer.statements([motion[0]])
+        given = writer.expression(motion[0])
+        yield lines if given == identifier(name) else [*lines, f"{identifier(name)} = {given}"], row
+
+
+def before_newton(writer: Writer, block: Block, turned: Iterable[Node] = ()) -> list[str]:
+    """Return the statements that Newton's loop need not repeat; turned: further nodes that its steps change."""
+    rows = [*block.residuals, *block.entries]
+    unknowns = [node for node in symbols(rows) if node.name in block.unknowns]
+    looped = [*(motion[0] for _, motion in block.assigned), *rows]
+    return writer.statements(writer.independent(looped, [*unknowns, *turned]))
+
+
+def residual_lines(writer: Writer, block: Block, entries: Sequence[Node]) -> tuple[list[str], list[str]]:
+    """Return names of the residuals, and the statements that compute them and entries of the Jacobian."""
+    r = [f"r{k}" for k in range(len(block.residuals))]
+    lines = writer.statements([*block.residuals, *entries])
+    return r, lines + [f"{one} = {writer.expression(node)}" for one, node in zip(r, block.residuals, strict=True)]
+
+
+def jacobian_text(writer: Writer, block: Block) -> Rows:
+    """Return the Jacobian as expressions, after its statements."""
+    return [[writer.expression(entry) for entry in row] for row in block.jacobian]

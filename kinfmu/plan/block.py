@@ -48,6 +48,11 @@ class Block:
     def coordinates(self) -> tuple[str, ...]:
         return (*(name for name, _ in self.assigned), *self.unknowns)
 
+    @property
+    def entries(self) -> tuple[Node, ...]:
+        """The entries of the Jacobian, row after row."""
+        return tuple(entry for row in self.jacobian for entry in row)
+
 
 class Rates:
     """Derivatives with respect to time on the graph: each symbol's rate is the symbol of its next derivative."""

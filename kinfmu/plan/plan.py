@@ -216,7 +216,7 @@ def _behind_all(nodes: Sequence[Node], behind: Mapping[str, frozenset[str]]) -> 
 def nodes_of(block: Block) -> list[Node]:
     """Return all nodes of a block, those of the position stage first."""
     nodes = [motion[0] for _, motion in block.assigned]
-    nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+    nodes += [*block.residuals, *block.entries]
     nodes += [node for _, motion in block.assigned for node in motion[1:]]
     return [*nodes, *block.velocity, *block.acceleration]
 

@@ -13,7 +13,16 @@ from kinfmu.codegen.c.text import assigned, declared
 from kinfmu.codegen.c.units import places, row_type
 from kinfmu.codegen.kinds import Kind, positions
 from kinfmu.codegen.lists import LISTS
-from kinfmu.codegen.newton import determinant, opposite_solution, solution, square
+from kinfmu.codegen.newton import (
+    before_newton,
+    determinant,
+    jacobian_text,
+    opposite_solution,
+    outright,
+    residual_lines,
+    solution,
+    square,
+)
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import FUNCTIONS, Node, reachable
 from kinfmu.plan import Block
@@ -85,7 +94,7 @@ class LaneUnit:
         for block in self.kind.blocks:
             if block.unknowns:
                 lines += self._closing(writer, block) if held else self._newton(writer, block)
-            lines += self._given_outright(writer, block)
+            lines += [f"{line};" for new, _ in outright(writer, block) for line in new]
         corrected = self.kind.solved.unknowns if self.kind.solved is not None and not held else ()
         turning = self.turning if corrected else []
         for unknown, sine, cosine in turning:
@@ -161,32 +170,16 @@ class LaneUnit:
             "",
         ]
 
-    def _given_outright(self, writer: Writer, block: Block) -> list[str]:
-        lines = []
-        for name, motion in block.assigned:
-            lines += [f"{line};" for line in writer.statements([motion[0]])]
-            given = writer.expression(motion[0])
-            if given != identifier(name):
-                lines.append(f"{identifier(name)} = {given};")
-        return lines
-
     def _newton(self, writer: Writer, block: Block) -> list[str]:
         """Return statements of one correction of the prediction and of the residual after it."""
-        entries = [entry for row in block.jacobian for entry in row]
-        unknowns = [
-            node
-            for node in reachable([*block.residuals, *entries])
-            if node.op == "symbol" and node.name in block.unknowns
-        ]
-        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
-        moving = [*unknowns, *(node for turn in self.turning for node in turn[1:])]
-        lines = [f"{line};" for line in writer.statements(writer.independent(looped, moving))]
+        turned = [node for turn in self.turning for node in turn[1:]]
+        lines = [f"{line};" for line in before_newton(writer, block, turned)]
         known = set(writer.known)
         steps = [f"d{k}" for k in range(len(block.unknowns))]
-        r, evaluated = self._residuals(writer, block, entries)
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        r, evaluated = residual_lines(writer, block, block.entries)
+        jacobian = jacobian_text(writer, block)
         values = [text.replace(" / det", " * per_det") for text in solution(jacobian, r, "det")]
-        lines += [*evaluated, f"per_det = 1.0 / ({determinant(jacobian)});"]
+        lines += [f"{line};" for line in (*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})")]
         lines += [f"{one} = {text};" for one, text in zip(steps, values, strict=True)]
         for name, one in zip(block.unknowns, steps, strict=True):
             scale = "" if name.endswith(".phi") else f" * {1.0 / self.size!r}"
@@ -196,11 +189,11 @@ class LaneUnit:
                 if unknown == name:
                     lines.append(f"kf_rotate(-{one}, &{self.names.of(sine)}, &{self.names.of(cosine)});")
         writer.known = set(known)
-        r, evaluated = self._residuals(writer, block, entries)
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        r, evaluated = residual_lines(writer, block, block.entries)
+        jacobian = jacobian_text(writer, block)
         return [
             *lines,
-            *evaluated,
+            *(f"{line};" for line in evaluated),
             f"det = {determinant(jacobian)};",
             f"hold[{self.cached(None)}][i] = det;",
             "size = fabs(det * factor);",
@@ -210,15 +203,8 @@ class LaneUnit:
 
     def _closing(self, writer: Writer, block: Block) -> list[str]:
         """Return statements of the residual of unknowns that are given."""
-        r, evaluated = self._residuals(writer, block, ())
-        return [*evaluated, *self._left(r, block)]
-
-    def _residuals(self, writer: Writer, block: Block, entries: Sequence[Node]) -> tuple[list[str], list[str]]:
-        """Return names of the residuals, and the statements that compute them and the entries of the Jacobian."""
-        r = [f"r{k}" for k in range(len(block.residuals))]
-        lines = [f"{line};" for line in writer.statements([*block.residuals, *entries])]
-        lines += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
-        return r, lines
+        r, evaluated = residual_lines(writer, block, ())
+        return [*(f"{line};" for line in evaluated), *self._left(r, block)]
 
     def _left(self, r: Sequence[str], block: Block) -> list[str]:
         """Return statements that add the residuals of a block to those of all blocks."""
@@ -231,7 +217,7 @@ class LaneUnit:
         """Return the linear solve of a block for its rates (order 1) or, after them, its accelerations (2)."""
         right = (block.velocity, block.acceleration)[order - 1]
         many = len(block.unknowns) > 1  # the determinant of one unknown is its Jacobian
-        entries = [entry for row in block.jacobian for entry in row if many]
+        entries = block.entries if many else ()
         lines = [f"{line};" for line in writer.statements([*right, *entries])]
         b = [f"b{k}" for k in range(len(right))]
         lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]

@@ -19,14 +19,18 @@ from kinfmu.codegen.lists import LISTS
 from kinfmu.codegen.newton import (
     ITERATIONS,
     SETTLED,
+    before_newton,
     determinant,
     is_small,
+    jacobian_text,
     opposite_solution,
+    outright,
+    residual_lines,
     solution,
     square,
 )
 from kinfmu.codegen.writer import Names, Writer, identifier
-from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
@@ -127,7 +131,7 @@ class Units:
             self.keeps_determinant = is_small(block)
         lines = self._rates("velocity", 1) + self._rates("acceleration", 2)
         if block is not None:
-            lines += self._entries("jacobian", [entry for row in block.jacobian for entry in row], None)
+            lines += self._entries("jacobian", block.entries, None)
             lines += self._entries("residuals", block.residuals, block.row_scales)
         return lines
 
@@ -164,28 +168,20 @@ class Units:
 
     def _given_outright(self, writer: Writer, block: Block) -> list[str]:
         lines = []
-        for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
-            new = writer.statements([motion[0]])
-            given = writer.expression(motion[0])
-            if given != identifier(name):
-                new.append(f"{identifier(name)} = {given}")
+        for new, row in outright(writer, block):
             lines += [f"{line};" for line in new[:-1]]
             lines += [f"{line}; /* {row} */" for line in new[-1:]]
         return lines
 
     def _newton(self, writer: Writer, block: Block) -> list[str]:
-        entries = [entry for row in block.jacobian for entry in row]
-        unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
-        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
-        before = [f"{line};" for line in writer.statements(writer.independent(looped, unknowns))]
+        looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *block.entries]
+        before = [f"{line};" for line in before_newton(writer, block)]
         turned = [node for node in reachable(looped) if node.op in ("sin", "cos") and node.args[0].op == "symbol"]
         inside = [f"{line};" for line in writer.statements(turned)]
         inside += self._given_outright(writer, block)
-        inside += [f"{line};" for line in writer.statements([*block.residuals, *entries])]
-        r = [f"r{k}" for k in range(len(block.residuals))]
-        inside += [f"{one} = {writer.expression(node)};" for one, node in zip(r, block.residuals, strict=True)]
-        inside.append(f"error = {square(r, block.row_scales)};")
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        r, lines = residual_lines(writer, block, block.entries)
+        inside += [f"{line};" for line in (*lines, f"error = {square(r, block.row_scales)}")]
+        jacobian = jacobian_text(writer, block)
         inside += self._determinant(jacobian, block.usual)
         starts = [f"z[row->{self.own[name]}]" for name in block.unknowns]
         angles = " + ".join(["1.0", *(f"{start} * {start}" for start in starts)])
@@ -276,14 +272,14 @@ class Units:
         """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
         m, k = len(block.residuals), len(block.unknowns)
-        entries = [entry for row in block.jacobian for entry in row] if k == 2 and is_small(block) else []
+        entries = block.entries if k == 2 and is_small(block) else ()
         before = [f"{line};" for line in writer.statements([*right, *entries])]
         b = [f"b{i}" for i in range(m)]
         z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
         taken = [f"    {one} = given[row->{self.own[name]}];" for one, name in zip(z, block.unknowns, strict=True)]
         solved = [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
         if is_small(block):
-            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian] if entries else []
+            jacobian = jacobian_text(writer, block) if entries else []
             kept, by_det = ("det = <kept>;", "/ det") if order == 1 else ("per_det = 1.0 / <kept>;", "* per_det")
             values = opposite_solution(jacobian, b, by_det)
             solved += [kept, *(f"{one} = {value};" for one, value in zip(z, values, strict=True))]

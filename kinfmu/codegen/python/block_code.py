@@ -7,25 +7,24 @@ from collections.abc import Iterable, Sequence
 from kinfmu.codegen.newton import (
     ITERATIONS,
     SETTLED,
+    before_newton,
     determinant,
     is_small,
+    jacobian_text,
     opposite_solution,
+    outright,
+    residual_lines,
     solution,
     square,
 )
 from kinfmu.codegen.writer import Writer, identifier
-from kinfmu.equations.graph import symbols
 from kinfmu.plan import Block
 
 
 def assigned_lines(writer: Writer, block: Block) -> list[str]:
     """Return statements for the coordinates that a block gives outright, each with its row as a comment."""
     lines = []
-    for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
-        new = writer.statements([motion[0]])
-        given = writer.expression(motion[0])
-        if given != identifier(name):
-            new.append(f"{identifier(name)} = {given}")
+    for new, row in outright(writer, block):
         lines += new[:-1]
         lines += [f"{line}  # {row}" for line in new[-1:]]
     return lines
@@ -38,16 +37,11 @@ def newton_lines(writer: Writer, block: Block, label: str, starts: Sequence[str]
     held: an expression that is true where the unknowns are not to be solved for; number: of the block, for the error.
     The code reads `enough`, the squared residual that it may end at.
     """
-    entries = [entry for row in block.jacobian for entry in row]
-    unknowns = [node for node in symbols([*block.residuals, *entries]) if node.name in block.unknowns]
-    looped = [*(motion[0] for _, motion in block.assigned), *block.residuals, *entries]
-    before = writer.statements(writer.independent(looped, unknowns))
+    before = before_newton(writer, block)
     inside = assigned_lines(writer, block)
-    inside += writer.statements([*block.residuals, *entries])
-    r = [f"r{i}" for i in range(len(block.residuals))]
-    inside += [f"{name} = {writer.expression(node)}" for name, node in zip(r, block.residuals, strict=True)]
-    inside.append(f"error = {square(r, block.row_scales)}")
-    jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+    r, lines = residual_lines(writer, block, block.entries)
+    inside += [*lines, f"error = {square(r, block.row_scales)}"]
+    jacobian = jacobian_text(writer, block)
     z = [identifier(name) for name in block.unknowns]
     inside += _determinant(label, jacobian, block.usual)
     # large angles are rounded more; the start's angles count, so that a diverging iteration gets no larger tolerance

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from kinfmu.codegen.kinds import Kind, positions
 from kinfmu.codegen.lists import LISTS
+from kinfmu.codegen.newton import jacobian_text
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
     indented,
@@ -139,11 +140,11 @@ class Loops:
     def _solution(self, writer: Writer, block: Block, order: int) -> list[str]:
         """Return the linear solve of a block, or the values given in its place."""
         right = (block.velocity, block.acceleration)[order - 1]
-        lines = writer.statements([*right, *(entry for row in block.jacobian for entry in row)])
+        lines = writer.statements([*right, *block.entries])
         b = [f"b{i}" for i in range(len(right))]
         lines += [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
         z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
-        jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        jacobian = jacobian_text(writer, block)
         self.hold.setdefault(kept_name(block, self.label), None)
         taken = [f"given[{self.own[name]}]" for name in block.unknowns]
         places = [self.places[derivative_name(name, order)] for name in block.unknowns]
@@ -173,8 +174,8 @@ class Loops:
 
     def _matrices(self, block: Block) -> list[str]:
         writer = Writer(self.names, self.positions)
-        lines = writer.statements([entry for row in block.jacobian for entry in row])
-        rows = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+        lines = writer.statements(block.entries)
+        rows = jacobian_text(writer, block)
         self._import(writer)
         return self._later("jacobian", ["found"], [*lines, f"found.append({matrix(rows)})"])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from kinfmu.codegen.lists import parametric
-from kinfmu.codegen.newton import ROUND_OFF
+from kinfmu.codegen.newton import ROUND_OFF, jacobian_text
 from kinfmu.codegen.python.alone import Alone, Definitions
 from kinfmu.codegen.python.binding import bound
 from kinfmu.codegen.python.block_code import (
@@ -47,7 +47,7 @@ class _Straight:
                 self.names.assign(motion[0], name)
                 self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
             self.position_nodes += [motion[0] for _, motion in block.assigned]
-            self.position_nodes += [*block.residuals, *(entry for row in block.jacobian for entry in row)]
+            self.position_nodes += [*block.residuals, *block.entries]
         self.parametric, self.prolog = parametric(plan)
         known = [node for node in reachable(self.position_nodes) if node not in self.parametric]
         self.known = {*known, *self.prolog}  # computed before the later stages
@@ -229,12 +229,12 @@ class _Straight:
         lines = []
         for k, block in enumerate(self.solved):
             z = [identifier(derivative_name(name, order)) for name in block.unknowns]
-            vector, entries = right(block), [entry for row in block.jacobian for entry in row]
+            vector, entries = right(block), block.entries
             lines += definitions.lines(writer, _names(vector), done)
             lines += writer.statements([*vector, *entries])
             b = [f"b{i}" for i in range(len(vector))]
             lines += [f"{name} = {writer.expression(node)}" for name, node in zip(b, vector, strict=True)]
-            jacobian = [[writer.expression(entry) for entry in row] for row in block.jacobian]
+            jacobian = jacobian_text(writer, block)
             self.exports.setdefault(kept_name(block, str(k + 1)), None)
             solution = solution_lines(str(k + 1), order, jacobian, b, z)
             if held:
@@ -301,8 +301,8 @@ class _Straight:
         matrices = []
         body: list[str] = []
         for block in self.solved:
-            body += writer.statements([entry for row in block.jacobian for entry in row])
-            matrices.append(matrix([[writer.expression(entry) for entry in row] for row in block.jacobian]))
+            body += writer.statements(block.entries)
+            matrices.append(matrix(jacobian_text(writer, block)))
         self._import(writer)
         return [
             "",
