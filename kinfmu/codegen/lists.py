@@ -6,9 +6,13 @@ their positions, x1 their rates, x2 their accelerations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 from kinfmu.codegen.kinds import UnitRun, runs_of
 from kinfmu.equations.graph import Node
-from kinfmu.plan import SolvePlan
+from kinfmu.measures import DistanceBetween
+from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
 from kinfmu.units import derivative_name
 
@@ -68,3 +72,27 @@ class Lists:
         places = self.places(order)
         nodes: list[Node] = [motion[1:][order] for motion in self.plan.outputs_motion]
         return [(node, places.get(node.name) if node.op == "symbol" else None) for node in nodes]
+
+
+class DistanceRow(NamedTuple):
+    """A driver of a distance, by its number, and its row in a solved block; scale: of the row, per mechanism size."""
+
+    driver: int
+    block: int
+    row: int
+    scale: float
+
+
+def distance_rows(plan: SolvePlan, solved: Sequence[Block]) -> tuple[DistanceRow, ...]:
+    """Return the rows of the plan's drivers of distances; solved: the blocks that need Newton."""
+    found = []
+    for number, driver in enumerate(plan.mechanism.drivers):
+        measure = driver.measured()
+        if isinstance(measure, DistanceBetween):
+            name = f"{driver.name}.{driver.noun}"
+            found += [
+                DistanceRow(number, k, block.row_names.index(name), measure.scale(plan.size) * plan.size)
+                for k, block in enumerate(solved)
+                if name in block.row_names
+            ]
+    return tuple(found)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from kinfmu.codegen.c.functions import block_of, index
 from kinfmu.codegen.c.stage_cache import StageCache
-from kinfmu.codegen.c.stages import block_of, index
 from kinfmu.codegen.c.text import array, indented, repeated
 from kinfmu.codegen.c.units import rows_of
 from kinfmu.codegen.kinds import Kind

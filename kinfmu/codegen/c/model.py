@@ -5,14 +5,15 @@ The same plan gives the same bytes. The functions are described in solver/c/kinf
 
 from __future__ import annotations
 
-from kinfmu.codegen.c.bind import bind, drive
-from kinfmu.codegen.c.parts import Parts
-from kinfmu.codegen.c.readers import readers
-from kinfmu.codegen.c.stages import stages
-from kinfmu.codegen.c.tables import curve_tables, tables
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+
+from kinfmu.codegen.c.functions import Parts, bind, drive, readers, stages
+from kinfmu.codegen.c.text import array, booleans, string
 from kinfmu.codegen.c.units import rows_of
-from kinfmu.codegen.distances import distance_rows
-from kinfmu.plan import SolvePlan
+from kinfmu.codegen.lists import distance_rows
+from kinfmu.plan import Block, SolvePlan
+from kinfmu.solver.python.curve import CurveData
 
 
 def emit(plan: SolvePlan) -> dict[str, str]:
@@ -80,3 +81,69 @@ def _sizes(parts: Parts) -> str:
         "#endif",
     ]
     return "\n".join(lines) + "\n"
+
+
+def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
+    """Return the tables that the solver reads from a model; solved: the blocks that need Newton."""
+    anchor_u, anchor_z = plan.anchor_values
+    kinds = [driver.quantity.kind for driver in plan.drivers]
+    scales = [1.0 if name.endswith(".phi") else plan.size for name in plan.unknowns]
+    distances = distance_rows(plan, solved)
+    ends = list(accumulate(len(block.unknowns) for block in solved))
+    return [
+        *array("double kf_anchor_u", anchor_u),
+        *array("double kf_anchor_z", anchor_z),
+        *array("double kf_unknown_scales", scales),
+        *array("double kf_reach", [1.0 if kind == "angle" else plan.size for kind in kinds]),
+        *array("int kf_block_ends", ends),
+        *array("int kf_block_rows", [len(block.residuals) for block in solved]),
+        *(array("int kf_block_drivers", plan.block_drivers) if plan.has_tracks else []),
+        *array("double kf_row_scales", [scale for block in solved for scale in block.row_scales]),
+        *array("double kf_determinant_factors", [1.0 / block.determinant_scale for block in solved]),
+        *array("int kf_distance_drivers", [row.driver for row in distances]),
+        *array("int kf_distance_blocks", [row.block for row in distances]),
+        *array("int kf_distance_rows", [row.row for row in distances]),
+        *array("double kf_distance_scales", [row.scale for row in distances]),
+        *array("double kf_parameters_written", [parameter.value for parameter in plan.parameters]),
+        *array("double kf_constants_written", [constant.value for constant in plan.law_constants]),
+        "",
+        f"const char kf_name[] = {string(plan.mechanism.name)};",
+        f"const char kf_length_unit[] = {string(plan.mechanism.length_unit)};",
+        *_strings("kf_driver_names", [driver.name for driver in plan.drivers]),
+        *array("bool kf_driver_is_angle", booleans(kind == "angle" for kind in kinds)),
+        *_strings("kf_unknown_names", plan.unknowns),
+        *array("bool kf_unknown_is_angle", booleans(name.endswith(".phi") for name in plan.unknowns)),
+        *array("bool kf_output_is_angle", booleans(name.endswith(".phi") for name in plan.outputs)),
+        *_strings("kf_watch_names", plan.watch_names),
+        *_strings("kf_parameter_names", [parameter.name for parameter in plan.parameters]),
+        *_strings("kf_block_row_names", [", ".join(block.row_names) for block in solved]),
+        "",
+    ]
+
+
+def curve_tables(curves: Mapping[CurveData, str]) -> list[str]:
+    """Return the data of curves, and the function that evaluates them."""
+    lines: list[str] = []
+    for (breaks, pieces), reference in curves.items():
+        name = reference.removeprefix("&")
+        lines += array(f"static double {name}_breaks", breaks)
+        rows = []
+        for k, (origin, coefficients, amplitude, frequency, phase) in enumerate(pieces):
+            lines += array(f"static double {name}_{k}", coefficients)
+            numbers = f"{float(amplitude)!r}, {float(frequency)!r}, {float(phase)!r}"
+            rows.append(f"    {{{float(origin)!r}, {len(coefficients)}, {name}_{k}, {numbers}}},")
+        lines += [f"static const kf_piece {name}_pieces[{len(rows)}] = {{", *rows, "};"]
+        lines += [f"static const kf_curve {name} = {{{len(pieces)}, {name}_breaks, {name}_pieces}};", ""]
+    if curves:
+        lines += [
+            "static double curve(const kf_curve *data, int order, double x)",
+            "{",
+            "    return kf_curve_at(data, order, x);",
+            "}",
+            "",
+        ]
+    return lines
+
+
+def _strings(name: str, texts: Sequence[str]) -> list[str]:
+    return array(f"char *const {name}", [string(text) for text in texts])

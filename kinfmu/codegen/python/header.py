@@ -1,15 +1,16 @@
-"""The head of every emitted module: imports, constants that the solver and the FMU read, the laws of motion."""
+"""What every emitted module has: imports and constants, laws of motion, the binding of parameters, `differences`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
-from kinfmu.codegen.distances import distance_rows
+from kinfmu.codegen.lists import distance_rows
 from kinfmu.codegen.python.block_code import indented, tupled, unpacking
-from kinfmu.codegen.python.differences import angle_places
 from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node
 from kinfmu.plan import Block, SolvePlan
+from kinfmu.plan.trace import parameter_symbol
 from kinfmu.solver.python.curve import CurveData
 
 _RAISING = {"sin", "cos", "sqrt", "floor", "curve", "/"}  # operations that have no value for some numbers
@@ -119,3 +120,85 @@ def _may_raise(plan: SolvePlan) -> bool:
             if node.op in _RAISING:
                 return True
     return False
+
+
+_HOLDS = {"positive": "({}) > 0.0", "other than 0": "({}) != 0.0", "0": "abs({}) <= 1e-9"}
+
+
+def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequence[str]) -> list[str]:
+    """Return the functions inside one that binds the parameters and computes once what depends on these alone."""
+    values = [identifier(parameter_symbol(parameter.name)) for parameter in plan.parameters]
+    writer = Writer(names, (), prolog)
+    known = writer.statements([*prolog, *(condition.node for condition in plan.conditions)])
+    for name, node, required in plan.conditions:
+        number = writer.expression(node)
+        known += [
+            f"if not {_HOLDS[required].format(number)}:",
+            f"    raise ValueError({name + ' = %.15g must be ' + required!r} % ({number},))",
+        ]
+    fixed = ", ".join(f"{name!r}: {writer.expression(node)}" for name, node in plan.fixed_nodes.items())
+    defined = [line.split("(")[0].removeprefix("def ") for line in functions if line.startswith("def ")]
+    return [
+        "",
+        "def bound(parameters):",
+        '    """The model for these values of PARAMETERS."""',
+        *unpacking(values, "parameters"),
+        *indented(known),
+        f"    FIXED = {{{fixed}}}",
+        *(f"    {line}" if line else "" for text in functions for line in text.split("\n")),
+        "    constants = {name: value for name, value in globals().items() if name.isupper()}",
+        f"    functions = {{{', '.join(f'{name!r}: {name}' for name in defined)}}}",
+        "    return SimpleNamespace(**constants | functions | {'FIXED': FIXED})",
+        "",
+    ]
+
+
+MANY = 100  # outputs; beyond that, loops are shorter
+_HEAD = (
+    "",
+    "def differences(there, here):",
+    '    """Largest differences of positions, of rates and of accelerations, in radians and sizes; all finite."""',
+)
+
+
+def angle_places(plan: SolvePlan) -> tuple[int, ...]:
+    """Return the places of the angles among the outputs."""
+    return tuple(k for k, name in enumerate(plan.outputs) if name.endswith(".phi"))
+
+
+def differences(plan: SolvePlan) -> list[str]:
+    """Return the lines of the function `differences`."""
+    n = len(plan.outputs)
+    angles = angle_places(plan)
+    lengths = [k for k in range(n) if k not in set(angles)]
+    if n > MANY:
+        return [
+            *_HEAD,
+            "    gaps = [abs(a - b) for a, b in zip(there, here)]",
+            f"    rows = [gaps[k : k + {n}] for k in range(0, {3 * n}, {n})]",
+            "    of_angles = [max([row[k] for k in ANGLES], default=0.0) for row in rows]",
+            f"    lengths = {tupled(map(str, lengths))}",
+            "    of_lengths = [max([row[k] for k in lengths], default=0.0) / SIZE for row in rows]",
+            "    return tuple(map(max, of_angles, of_lengths))",
+            "",
+        ]
+    largest = [_largest([k + order * n for k in angles], [k + order * n for k in lengths]) for order in range(3)]
+    return [
+        *_HEAD,
+        *unpacking([f"a{k}" for k in range(3 * n)], "there"),
+        *unpacking([f"b{k}" for k in range(3 * n)], "here"),
+        f"    return {tupled(largest)}",
+        "",
+    ]
+
+
+def _largest(angles: Sequence[int], lengths: Sequence[int]) -> str:
+    """Return the expression of the largest difference; a length counts relative to the size."""
+    terms = [f"abs(a{k} - b{k})" for k in angles]
+    if lengths:
+        terms.append(f"{_max([f'abs(a{k} - b{k})' for k in lengths])} / SIZE")
+    return _max(terms)
+
+
+def _max(terms: Sequence[str]) -> str:
+    return f"max({', '.join(terms)})" if len(terms) > 1 else "".join(terms) or "0.0"

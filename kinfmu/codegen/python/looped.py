@@ -11,10 +11,8 @@ from collections.abc import Sequence
 from kinfmu.codegen.kinds import UnitRun
 from kinfmu.codegen.lists import LISTS, Lists
 from kinfmu.codegen.newton import ROUND_OFF
-from kinfmu.codegen.python.binding import bound
 from kinfmu.codegen.python.block_code import indented, tupled
-from kinfmu.codegen.python.differences import differences
-from kinfmu.codegen.python.header import curve_names, drive, header
+from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header
 from kinfmu.codegen.python.loops import Loops
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node

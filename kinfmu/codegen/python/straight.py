@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from kinfmu.codegen.lists import parametric
 from kinfmu.codegen.newton import ROUND_OFF, jacobian_text
 from kinfmu.codegen.python.alone import Alone, Definitions
-from kinfmu.codegen.python.binding import bound
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
     indented,
@@ -18,8 +17,7 @@ from kinfmu.codegen.python.block_code import (
     tupled,
     unpacking,
 )
-from kinfmu.codegen.python.differences import differences
-from kinfmu.codegen.python.header import curve_names, drive, header, places
+from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, places
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block, SolvePlan
