@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.measures.arithmetic import Value, atan2, cos, sin, sqrt
@@ -24,6 +26,7 @@ from kinfmu.mechanism.dimension import Dimension, DimensionError
 from kinfmu.mechanism.valid import quoted
 from kinfmu.units import every_unit
 
+T = TypeVar("T")
 LONGEST = 1000  # characters
 DEEPEST = 40  # parentheses within parentheses
 LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits to rounding
@@ -32,7 +35,7 @@ LARGEST_POWER = 20  # exponent; a polynomial of a higher degree loses its digits
 class Step(NamedTuple):
     """One step of an expression in postfix order, and its position in the text."""
 
-    operation: str  # "number", "name", "power", or a key of OPERATIONS
+    operation: str  # "number", "name", or a key of OPERATIONS
     at: int
     value: Any = None  # of "number" the float in the units used inside, of "name" the name, of "power" the exponent
     unit: str = ""  # of a number, as written
@@ -59,12 +62,21 @@ def _acos(x: Value) -> Value:
     return atan2(sqrt((1.0 - x) * (1.0 + x)), x)
 
 
+def _power(base: Value, exponent: int) -> Value:
+    """Return base ** exponent, by products only, so that every arithmetic gives the same bits."""
+    product = base
+    for _ in range(abs(exponent) - 1):
+        product = product * base
+    return 1.0 if exponent == 0 else product if exponent > 0 else 1.0 / product
+
+
 OPERATORS = {
     "+": Operation(2, lambda a, b: a + b, dimension.sum_of),
     "-": Operation(2, lambda a, b: a - b, dimension.sum_of),
     "*": Operation(2, lambda a, b: a * b, dimension.product_of),
     "/": Operation(2, lambda a, b: a / b, dimension.quotient_of),
     "sign": Operation(1, lambda a: -a, lambda a: a),
+    "power": Operation(1, _power, lambda a, exponent: dimension.power_of(a, Fraction(exponent))),
 }
 CONSTANTS = {"pi": Operation(0, lambda: math.pi, lambda: dimension.BARE)}
 FUNCTIONS = {
@@ -80,6 +92,7 @@ OPERATIONS = {**OPERATORS, **CONSTANTS, **FUNCTIONS}
 WORDS = (*FUNCTIONS, *CONSTANTS)  # reserved: no parameter can have these names
 
 
+@dataclass(frozen=True, repr=False)
 class Expression:
     """An expression of parameters, parsed once.
 
@@ -88,48 +101,35 @@ class Expression:
     Args:
         text: Such as "2*a + 5 mm".
         length_unit: Unit of length of the mechanism; lengths with other units are converted to it. Default: 'm'.
-
-    Attributes:
-        names: The parameters in it, each once, in their order.
-        steps: The operations in postfix order.
+        steps: The operations in postfix order. Default: those that the text gives.
 
     Raises:
         MechanismError: The text is not an expression; the message states the position.
 
     """
 
-    __slots__ = ("length_unit", "names", "steps", "text")
-
     text: str
-    length_unit: str
-    steps: tuple[Step, ...]
-    names: tuple[str, ...]
+    length_unit: str = "m"
+    steps: tuple[Step, ...] = field(default=(), compare=False)
 
-    def __init__(self, text: str, length_unit: str = "m") -> None:
-        self.text = text.strip(" \t")
-        self.length_unit = length_unit
-        self.steps = _Parser(self.text, length_unit).parsed()
-        self.names = tuple(dict.fromkeys(step.value for step in self.steps if step.operation == "name"))
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", self.text.strip(" \t"))
+        if not self.steps:
+            object.__setattr__(self, "steps", _Parser(self.text, self.length_unit).parsed())
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Expression):
-            return NotImplemented
-        return (self.text, self.length_unit) == (other.text, other.length_unit)
-
-    def __hash__(self) -> int:
-        return hash((self.text, self.length_unit))
-
     def __add__(self, shift: float) -> Expression:
         """Return the expression plus a length, such as a shift of the origin."""
-        moved = Expression.__new__(Expression)
-        moved.text, moved.length_unit = f"({self.text}) + {shift!r}", self.length_unit
         end = len(self.text)
-        moved.steps = (*self.steps, Step("number", end, shift), Step("+", end))
-        moved.names = self.names
-        return moved
+        steps = (*self.steps, Step("number", end, shift), Step("+", end))
+        return Expression(f"({self.text}) + {shift!r}", self.length_unit, steps)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parameters in it, each once, in their order."""
+        return tuple(dict.fromkeys(step.value for step in self.steps if step.operation == "name"))
 
     @property
     def alone(self) -> str | None:
@@ -155,53 +155,54 @@ class Expression:
                 is too large; the message states the position.
 
         """
-        stack: list[Value] = []
-        for step in self.steps:
-            if step.operation == "number":
-                stack.append(step.value)
-            elif step.operation == "name":
-                if step.value not in values:
-                    raise self._unknown(step, values)
-                stack.append(values[step.value])
-            else:
-                try:
-                    self._apply(step, stack)
-                except ZeroDivisionError:
-                    raise self._wrong(step.at, "division by zero") from None
-                except OverflowError:
-                    raise self._wrong(step.at, "the number is too large") from None
-                except ValueError:
-                    what = f"{step.operation} of {quoted(stack[-1])} is undefined"
-                    raise self._wrong(step.at, what) from None
-        return stack[0]
 
-    def _apply(self, step: Step, stack: list[Value]) -> None:
-        if step.operation == "power":
-            result = _power(stack[-1], step.value)
-            arity = 1
-        else:
-            arity = OPERATIONS[step.operation].arity
-            result = OPERATIONS[step.operation].value(*stack[len(stack) - arity :])
-        if isinstance(result, float) and not math.isfinite(result):
-            raise OverflowError
-        stack[len(stack) - arity :] = [result]
+        def leaf(step: Step) -> Value:
+            if step.operation == "number":
+                return step.value
+            if step.value not in values:
+                raise self._unknown(step, values)
+            return values[step.value]
+
+        def apply(step: Step, operands: Sequence[Value]) -> Value:
+            try:
+                result = OPERATIONS[step.operation].value(*operands)
+                if isinstance(result, float) and not math.isfinite(result):
+                    raise OverflowError
+            except ZeroDivisionError:
+                raise _error(self.text, step.at, "division by zero") from None
+            except OverflowError:
+                raise _error(self.text, step.at, "the number is too large") from None
+            except ValueError:
+                what = f"{step.operation} of {quoted(operands[-1])} is undefined"
+                raise _error(self.text, step.at, what) from None
+            return result
+
+        return self._evaluated(leaf, apply)
 
     def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
         """Return the dimension of the expression, or raise a MechanismError where dimensions are incompatible."""
-        stack: list[Dimension] = []
+
+        def leaf(step: Step) -> Dimension:
+            return step.dimension if step.operation == "number" else dimensions.get(step.value, dimension.UNKNOWN)
+
+        def apply(step: Step, operands: Sequence[Any]) -> Dimension:
+            try:
+                return OPERATIONS[step.operation].dimension(*operands)
+            except DimensionError as error:
+                raise _error(self.text, step.at, f"'{step.operation}': {error}") from None
+
+        return self._evaluated(leaf, apply)
+
+    def _evaluated(self, leaf: Callable[[Step], T], apply: Callable[[Step, Sequence[Any]], T]) -> T:
+        """Return the result of the steps; `apply` gets the operands, and of a power also the exponent."""
+        stack: list[T] = []
         for step in self.steps:
-            if step.operation == "number":
-                stack.append(step.dimension)
-            elif step.operation == "name":
-                stack.append(dimensions.get(step.value, dimension.UNKNOWN))
-            elif step.operation == "power":
-                stack[-1] = dimension.power_of(stack[-1], Fraction(step.value))
+            if step.operation in ("number", "name"):
+                stack.append(leaf(step))
             else:
                 first = len(stack) - OPERATIONS[step.operation].arity
-                try:
-                    stack[first:] = [OPERATIONS[step.operation].dimension(*stack[first:])]
-                except DimensionError as error:
-                    raise self._wrong(step.at, f"'{step.operation}': {error}") from None
+                exponent = (step.value,) if step.operation == "power" else ()
+                stack[first:] = [apply(step, (*stack[first:], *exponent))]
         return stack[0]
 
     def refuse_unknown(self, names: Collection[str]) -> None:
@@ -213,18 +214,11 @@ class Expression:
     def _unknown(self, step: Step, known: Iterable[str]) -> MechanismError:
         known = list(known)
         what = f"no parameter '{step.value}'{suggestion(step.value, [*known, *WORDS])}; parameters: {listed(known)}"
-        return self._wrong(step.at, what)
-
-    def _wrong(self, at: int, what: str) -> MechanismError:
-        return MechanismError(f"{quoted(self.text)}, character {at + 1}: {what}")
+        return _error(self.text, step.at, what)
 
 
-def _power(base: Value, exponent: int) -> Value:
-    """Return base ** exponent, by products only, so that every arithmetic gives the same bits."""
-    product = base
-    for _ in range(abs(exponent) - 1):
-        product = product * base
-    return 1.0 if exponent == 0 else product if exponent > 0 else 1.0 / product
+def _error(text: str, at: int, what: str) -> MechanismError:
+    return MechanismError(f"{quoted(text)}, character {at + 1}: {what}")
 
 
 class _Token(NamedTuple):
@@ -273,25 +267,24 @@ class _Parser:
         else:
             self._token = _Token("character", self._text[self._at], self._at)
             if self._token.text == "^":
-                raise MechanismError(f"{quoted(self._text)}, character {self._at + 1}: powers are written with **")
+                raise _error(self._text, self._at, "powers are written with **")
 
     def _is(self, *signs: str) -> bool:
         return self._token.kind == "sign" and self._token.text in signs
 
     def _sum(self) -> None:
-        self._product()
-        while self._is("+", "-"):
-            operator = self._token
-            self._next()
-            self._product()
-            self._steps.append(Step(operator.text, operator.at))
+        self._operands(("+", "-"), self._product)
 
     def _product(self) -> None:
-        self._factor()
-        while self._is("*", "/"):
+        self._operands(("*", "/"), self._factor)
+
+    def _operands(self, signs: tuple[str, ...], operand: Callable[[], None]) -> None:
+        """Parse operands with these signs between them."""
+        operand()
+        while self._is(*signs):
             operator = self._token
             self._next()
-            self._factor()
+            operand()
             self._steps.append(Step(operator.text, operator.at))
 
     def _factor(self) -> None:
@@ -337,10 +330,8 @@ class _Parser:
             self._next()
             if self._is("("):
                 near = suggestion(token.text, FUNCTIONS)
-                raise MechanismError(
-                    f"{quoted(self._text)}, character {token.at + 1}: no function '{token.text}'{near}; "
-                    f"functions: {listed(FUNCTIONS)}"
-                )
+                what = f"no function '{token.text}'{near}; functions: {listed(FUNCTIONS)}"
+                raise _error(self._text, token.at, what)
             is_constant = token.text in CONSTANTS
             self._steps.append(Step(token.text if is_constant else "name", token.at, token.text))
         else:
@@ -354,16 +345,13 @@ class _Parser:
             word, per = match[1], match[2] or ""
             unit, end = (word + per, match.end()) if word + per in self._units else (word, match.end(1))
             if unit not in self._units:
-                near = suggestion(unit, self._units)
-                raise MechanismError(
-                    f"{quoted(self._text)}, character {match.start(1) + 1}: no unit '{unit}'{near}; "
-                    f"units: {listed(u for u in self._units if '/' not in u)}, and such as mm/s, rad/s2; "
-                    f"a product needs *"
-                )
+                known = listed(u for u in self._units if "/" not in u)
+                what = f"no unit '{unit}'{suggestion(unit, self._units)}; units: {known}, and such as mm/s, rad/s2"
+                raise _error(self._text, match.start(1), f"{what}; a product needs *")
             quantity, factor = self._units[unit]
             value, measures, self._at = value * factor, Dimension.of(quantity), end
         if not math.isfinite(value):
-            raise MechanismError(f"{quoted(self._text)}, character {token.at + 1}: the number is too large")
+            raise _error(self._text, token.at, "the number is too large")
         self._steps.append(Step("number", token.at, value, unit, measures))
         self._next()
 
@@ -371,9 +359,7 @@ class _Parser:
         """Parse parentheses with `count` sums, separated by commas."""
         self._depth += 1
         if self._depth > DEEPEST:
-            raise MechanismError(
-                f"{quoted(self._text)}, character {opening.at + 1}: parentheses more than {DEEPEST} deep"
-            )
+            raise _error(self._text, opening.at, f"parentheses more than {DEEPEST} deep")
         self._next()
         for k in range(count):
             self._sum()
@@ -384,10 +370,9 @@ class _Parser:
         self._depth -= 1
 
     def _wrong(self, valid: str) -> MechanismError:
-        found = f"'{self._token.text}'" if self._token.kind != "end" else "the end"
-        if self._token.kind == "character":
-            found = quoted(self._token.text)
-        return MechanismError(f"{quoted(self._text)}, character {self._token.at + 1}: expected {valid}, found {found}")
+        token = self._token
+        found = {"end": "the end", "character": quoted(token.text)}.get(token.kind, f"'{token.text}'")
+        return _error(self._text, token.at, f"expected {valid}, found {found}")
 
 
 class Computed(float):

@@ -177,14 +177,16 @@ def _values(where: str, cls: Any, table: Mapping[str, Any], folder: Path | None)
 
     Numbers stay as written; the mechanism converts and checks them.
     """
-    keys = [key for key in keys_of(cls) if key.takes != "law"]
-    values = {key.name: _value(f"{where} {key.name}", table[key.name], key.takes) for key in keys if key.name in table}
-    if cls is Spline and "file" in table:
-        if "points" in values:
-            raise MechanismError(f"{where} has both 'points' and 'file'; the table is one or the other")
-        values["points"] = read_table(f"{where} file", table["file"], folder)
-    for key in keys:
-        if key.name not in values and key.default is REQUIRED:
+    values: dict[str, Any] = {}
+    has_file = cls is Spline and "file" in table
+    if has_file and "points" in table:
+        raise MechanismError(f"{where} has both 'points' and 'file'; the table is one or the other")
+    for key in keys_of(cls):
+        if key.name in table and key.takes != "law":
+            values[key.name] = _value(f"{where} {key.name}", table[key.name], key.takes)
+        elif key.name == "points" and has_file:
+            values[key.name] = read_table(f"{where} file", table["file"], folder)
+        elif key.default is REQUIRED and key.takes != "law":
             or_file = " or 'file'" if key.name == "points" else ""
             raise MechanismError(f"{where} needs the key '{key.name}'{or_file}; keys: {listed(table_keys(cls))}")
     return values
