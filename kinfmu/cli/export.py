@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,33 +19,24 @@ if TYPE_CHECKING:
     from kinfmu.run import Run
 
 
-def _table(run: Run, path: Path, columns: Sequence[str]) -> None:
-    from kinfmu.log import write_table
-
-    write_table(run, path, columns or None)
+TABLES, PLOTS, ANIMATIONS = (".csv", ".parquet", ".npz"), (".svg", ".png"), (".gif",)
+FORMATS = (*TABLES, *PLOTS, *ANIMATIONS)
 
 
-def _plot(run: Run, path: Path, columns: Sequence[str]) -> None:
-    from kinfmu.draw import plot
+def _write(run: Run, path: Path, columns: Sequence[str]) -> None:
+    """Write a run in the format of the path's suffix."""
+    if suffix_of(path) in TABLES:
+        from kinfmu.log import write_table
 
-    plot(run, path, columns)
+        write_table(run, path, columns or None)
+    elif suffix_of(path) in PLOTS:
+        from kinfmu.draw import plot
 
+        plot(run, path, columns)
+    else:
+        from kinfmu.draw import animate
 
-def _animation(run: Run, path: Path, columns: Sequence[str]) -> None:  # noqa: ARG001  --columns is refused before
-    from kinfmu.draw import animate
-
-    animate(run, path)
-
-
-FORMATS: dict[str, Callable[[Run, Path, Sequence[str]], None]] = {
-    ".csv": _table,
-    ".parquet": _table,
-    ".npz": _table,
-    ".svg": _plot,
-    ".png": _plot,
-    ".gif": _animation,
-}
-WITH_COLUMNS = [suffix for suffix, write in FORMATS.items() if write is not _animation]
+        animate(run, path)
 
 
 def _between(run: Run, start: str | None, stop: str | None) -> Run:
@@ -109,7 +100,8 @@ def export(run: Path, output: Path, columns: str | None, start: str | None, stop
     from kinfmu.log import read
 
     suffix = suffix_of(output)
-    if columns is not None and suffix not in WITH_COLUMNS:
-        raise click.UsageError(f"--columns {columns}: only for tables and plots, {listed(WITH_COLUMNS)}, not {suffix}")
-    FORMATS[suffix](_between(read(run), start, stop), output, names_in(columns) or ())
+    if columns is not None and suffix in ANIMATIONS:
+        valid = listed((*TABLES, *PLOTS))
+        raise click.UsageError(f"--columns {columns}: only for tables and plots, {valid}, not {suffix}")
+    _write(_between(read(run), start, stop), output, names_in(columns) or ())
     click.echo(f"written: {output}")

@@ -71,7 +71,7 @@ def lock_for_writing(descriptor: int) -> None:
 
 
 def check_is_free(target: Path) -> None:
-    """Raise BeingWrittenError if `hold` marks the file."""
+    """Raise BeingWrittenError if another process or sink writes to the file."""
     if not fcntl:
         return
     try:
@@ -112,5 +112,5 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 
 def suffix_of(path: str | PurePath) -> str:
-    """'.mcap' of 'run.mcap' and of 'RUN.MCAP'; '' if a name has no suffix."""
+    """Return '.mcap' for 'run.mcap' and for 'RUN.MCAP', '' for a name without a suffix."""
     return PurePath(path).suffix.lower()

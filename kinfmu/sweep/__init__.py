@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from kinfmu.sweep.solve import run_times, solve
+from kinfmu.sweep.driving import run_times
+from kinfmu.sweep.solve import solve
 
 __all__ = ["run_times", "solve"]

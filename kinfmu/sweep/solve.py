@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
@@ -12,24 +11,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python import load_model, load_module
-from kinfmu.errors import CompilerError, KinfmuError, RequestError, listed, suggestion
-from kinfmu.mechanism import Mechanism, RunSettings
+from kinfmu.errors import CompilerError, RequestError, listed, suggestion
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.run import MOST_SAMPLES, Event, FloatArray, Run
+from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for
-from kinfmu.run.unwrap import unwrap
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.continued import anew, at_law_start, bound_values, continued, law_starts
+from kinfmu.sweep.driving import column_of, driven_by_inputs, refuse_huge_rates, run_times, without_huge_rates
 from kinfmu.sweep.engine import Driven, Engine, Tables
 from kinfmu.sweep.python_engine import PythonEngine
 
 ENGINES = ("auto", "python", "native")
-LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 
 
@@ -92,38 +90,23 @@ def solve(
     if t is None and not inputs:
         t = run_times(plan.mechanism.run)
     if t is None:
-        times, u, ud, udd = driven_by_inputs(plan, inputs, wrap=wrap)
+        times, u, ud, udd = driven_by_inputs(plan.drivers, inputs, wrap=wrap)
         driven, axis = (u, ud, udd), axis_for(u, tuple(driver.inputs[0] for driver in plan.drivers))
     elif wrap:
         raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
     elif inputs:
         raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     else:
-        times, driven, axis = _column("t", t), None, TIME
+        times, driven, axis = column_of("t", t), None, TIME
     chosen = _engine(engine, plan, bound, solver, tolerance, len(times))
     if driven is None:
-        driven = _with_values(chosen.drive(times, tuple(constants.values())))
+        driven = without_huge_rates(chosen.drive(times, tuple(constants.values())))
     else:
-        _refuse_huge(plan, driven)
+        refuse_huge_rates(plan.drivers, driven)
     run = _run_of(plan, chosen, times, driven, out, constants).replaced(axis=axis)
     if anew_note and len(times):
         run = run.replaced(events=(Event(float(times[0]), "info", anew_note), *run.events))
     return run
-
-
-def run_times(run: RunSettings) -> FloatArray:
-    """Return (n,) times start + k step up to stop, which is included if a step hits it.
-
-    Raises:
-        KinfmuError: There are more than MOST_SAMPLES of them.
-
-    """
-    if (run.stop - run.start) / run.step > MOST_SAMPLES:
-        raise KinfmuError(
-            f"[run] {run.start:g} to {run.stop:g} s in steps of {run.step:g} s: more than {MOST_SAMPLES} samples"
-        )
-    count = int((run.stop - run.start) / run.step + 1e-6)
-    return run.start + run.step * np.arange(count + 1, dtype=np.float64)
 
 
 def _settings(plan: SolvePlan, given: Mapping[str, float | str]) -> tuple[dict[str, float], dict[str, float | str]]:
@@ -195,84 +178,6 @@ def _engine(name: str, plan: SolvePlan, bound: Vector, solver: Solver | None, to
             if name == "native":
                 raise
     return PythonEngine(solver or Solver(load_model(plan), tolerance))
-
-
-def driven_by_inputs(plan: SolvePlan, inputs: Mapping[str, ArrayLike], *, wrap: bool = False) -> tuple[FloatArray, ...]:
-    """Return sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
-
-    Args:
-        plan: Its drivers have the inputs.
-        inputs: Arrays (n,) or numbers by name, such as crank_angle [rad].
-        wrap: Unwrap angles.
-
-    Returns:
-        Times (n,), values, speeds and accelerations (n, d).
-
-    Raises:
-        RequestError: An input is unknown, missing or invalid, or the lengths differ.
-
-    """
-    known = [name for driver in plan.drivers for name in driver.inputs]
-    for name in inputs:
-        if name not in known:
-            raise RequestError(
-                f"input '{name}' is not known{suggestion(name, known)}; inputs: {listed(known)}; times go by t"
-            )
-    for driver in plan.drivers:
-        if driver.inputs[0] not in inputs:
-            raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
-    columns = {name: _column(name, value) for name, value in inputs.items()}
-    angles = [driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"]
-    if wrap and not angles:
-        raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
-    columns |= {name: unwrap(columns[name]) for name in angles if wrap}
-    lengths = {len(column) for column in columns.values() if len(column) > 1}
-    if len(lengths) > 1:
-        sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())
-        raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
-    n = lengths.pop() if lengths else min((len(column) for column in columns.values()), default=1)
-    tables = []
-    for order, default in enumerate((0.0, 1.0, 0.0)):
-        given = [columns.get(driver.inputs[order], np.array([default])) for driver in plan.drivers]
-        tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
-    return np.arange(n, dtype=float), *tables
-
-
-def _with_values(driven: Driven) -> Driven:
-    """Return the driver values; NaN where a law has no value, or has rates whose squares overflow."""
-    u, ud, udd = driven
-    if _is_within(ud, LARGEST_RATE) and _is_within(udd, LARGEST_RATE):
-        return driven
-    has_value = (np.abs(ud) <= LARGEST_RATE) & (np.abs(udd) <= LARGEST_RATE)
-    return np.where(has_value, u, np.nan), ud, udd
-
-
-def _refuse_huge(plan: SolvePlan, driven: Driven) -> None:
-    """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
-    for order in (1, 2):
-        if not _is_within(driven[order], LARGEST_RATE):
-            sample, number = np.argwhere(np.abs(driven[order]) > LARGEST_RATE)[0]
-            raise RequestError(
-                f"{plan.drivers[number].inputs[order]} = {driven[order][sample, number]:.6g} at sample {sample}: "
-                f"the largest value is {LARGEST_RATE:g}"
-            )
-
-
-def _is_within(values: FloatArray, largest: float) -> bool:
-    """Return True if all values are numbers of at most this size; no temporary arrays are made."""
-    return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
-
-
-def _column(name: str, values: ArrayLike) -> FloatArray:
-    try:
-        column = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be numbers") from None
-    if column.ndim != 1:
-        raise RequestError(f"{name} must be one-dimensional, not of shape {column.shape}")
-    if not _is_within(column, sys.float_info.max):
-        raise RequestError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
-    return column
 
 
 def _run_of(
