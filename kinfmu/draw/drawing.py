@@ -18,7 +18,8 @@ from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.shapes import Shape, shapes
+from kinfmu.scene.shape import Shape
+from kinfmu.scene.shapes import shapes
 
 MOST_NAMES = 90  # more would cover the drawing
 _ALWAYS_DRAWN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)

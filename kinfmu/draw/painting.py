@@ -13,7 +13,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene import details, palette
 from kinfmu.scene.details import box
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.shapes import Shape
+from kinfmu.scene.shape import Shape
 
 DASHES = (0, (7.0, 2.0, 1.5, 2.0))  # of a pitch circle or curve
 _GREY, _LIGHT_GREY = palette.darker(palette.GROUND), palette.lighter(palette.BAR)  # edge and area without a body

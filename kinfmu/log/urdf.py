@@ -16,7 +16,7 @@ from kinfmu.scene import palette
 from kinfmu.scene.frames import die_frame, frames
 from kinfmu.scene.placing import poses_of
 from kinfmu.scene.scene import Scene
-from kinfmu.scene.shapes import Shape
+from kinfmu.scene.shape import Shape
 
 ROOT = "ground"  # the root frame
 _WIDTH, _BLOCK = 0.02, 0.03  # width of links and half length of blocks, as parts of the size

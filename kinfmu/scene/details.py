@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinfmu.run import FloatArray
-from kinfmu.scene.shapes import Shape
+from kinfmu.scene.shape import Shape
 
 BLOCK, BLOCK_WIDTH = 11.0, 7.0  # half length and half width of a block
 SUPPORT = 13.0  # height of a support

@@ -18,7 +18,8 @@ from kinfmu.scene.frames import frames
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import pins_of
 from kinfmu.scene.placing import poses_of, world
-from kinfmu.scene.shapes import Shape, shapes
+from kinfmu.scene.shape import Shape
+from kinfmu.scene.shapes import shapes
 
 MOST_SAMPLES = 2000  # of a run, from which bounds and shapes are computed
 _LONG_ENOUGH, _FINEST = 0.15, 0.1  # of the size: shortest link that needs no thinner lines; factor of the thinnest

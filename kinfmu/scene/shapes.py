@@ -1,24 +1,9 @@
-"""What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
-
-A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those of
-`kinfmu.scene.frames`.
-
-    link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
-    rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
-    block, die       what slides: a body, or the block of a pin, which can turn; direction: along the line
-    rail, bed        a line of the ground under blocks, and under a rack; direction: into the ground
-    support          a pin of the ground; direction: into the ground
-    cam, pitch       the profile, and the curve of the roller's centre; roller: its circle
-    wheel, spoke     a pitch circle, and a radius that shows its rotation; belt: a straight part of one
-    rack             the pitch line; direction: from the teeth to the back
-    contact          the point where the bodies of a cam, gear or rack touch
-    bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
-"""
+"""All shapes of a mechanism: links, bars and cylinders, slides, cams, wheels, and the ground."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,11 +18,10 @@ from kinfmu.scene.cams import cam_shapes
 from kinfmu.scene.frames import bar_frame, cylinder_frames, die_frame
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import points_of, ribs, rim
-from kinfmu.scene.placing import world
+from kinfmu.scene.shape import Shape
 from kinfmu.scene.slides import Slide, place, racks_of, rods, slides
-from kinfmu.scene.wheels import WheelShape, gear_pairs, rack_pairs
+from kinfmu.scene.wheels import wheels
 
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
 _CROWDED = 0.8  # cosine of the angle to a link; above it a support would hide the link
 _SIDES = ((0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # of a support; below is preferred
 _BARREL, _OF_SHORTEST = 0.62, 0.9  # length of the barrel: of the usual length, and at most of the shortest one
@@ -46,56 +30,10 @@ _GUIDED = 0.1  # of the barrel, in which the rod stays at the longest pose
 _STEEP = 0.9  # sine of a rail's angle, above which the ground is on the side away from the mechanism
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """A line, area or circle that is fixed in a frame.
-
-    kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
-    colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
-    the only point; direction: unit vector (2,), as stated with the kinds.
-    """
-
-    kind: str
-    name: str
-    frame: str
-    points: FloatArray
-    colour: palette.Colour = palette.GROUND
-    is_closed: bool = False
-    radius: float = 0.0
-    direction: FloatArray | None = None
-
-    @property
-    def line(self) -> FloatArray:
-        """The polyline (k, 2) in the frame; that of a circle or closed line returns to its first point."""
-        if self.radius:
-            return self.points + self.radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-        return np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
-
-    @property
-    def extent(self) -> FloatArray:
-        """Some of the points of the line, (at most 25, 2)."""
-        return self.line[:: max(len(self.line) // 24, 1)]
-
-    @property
-    def towards(self) -> FloatArray:
-        """The direction of a kind that has one, (2,)."""
-        if self.direction is None:
-            raise TypeError(f"a shape of kind '{self.kind}' has no direction")
-        return self.direction
-
-    def placed(self, pose: FloatArray) -> Shape:
-        """Return the shape in the world, its frame in a pose (3,)."""
-        points = np.array([world(pose[None], (x, y))[0] for x, y in self.points]).reshape(-1, 2)
-        if self.direction is None:
-            return replace(self, points=points)
-        x, y = self.direction
-        return replace(self, points=points, direction=world(np.array([[0.0, 0.0, pose[2]]]), (x, y))[0])
-
-
 def shapes(shown: Instant) -> list[Shape]:
     """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
     sliding = slides(shown)
-    in_world = [*_cams(shown), *_wheels(shown), *_racks(shown), *_blocks(shown, sliding), *_ground(shown, sliding)]
+    in_world = [*_cams(shown), *wheels(shown), *_blocks(shown, sliding), *_ground(shown, sliding)]
     return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world)]
 
 
@@ -156,30 +94,6 @@ def _cams(shown: Instant) -> Iterator[Shape]:
         yield Shape("pitch", cam.joint, cam.cam, cam.pitch, colour, is_closed=True)
         yield Shape("roller", cam.joint, cam.follower, cam.roller[None], radius=cam.radius)
         yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
-
-
-def _wheels(shown: Instant) -> Iterator[Shape]:
-    for gears in gear_pairs(shown):
-        for wheel in gears.wheels:
-            yield from _wheel(shown, wheel, gears.joint)
-        if gears.is_belt:
-            for ends in gears.belt():
-                yield Shape("belt", gears.joint, gears.carrier, ends)
-        yield Shape("contact", gears.joint, gears.carrier, gears.meets[None])
-
-
-def _racks(shown: Instant) -> Iterator[Shape]:
-    for pair in rack_pairs(shown):
-        yield Shape("rack", pair.joint, pair.rack, pair.ends, shown.colour(pair.rack), direction=pair.towards)
-        yield from _wheel(shown, pair.pinion, pair.joint)
-        yield Shape("contact", pair.joint, pair.rack, pair.contact[None])
-
-
-def _wheel(shown: Instant, wheel: WheelShape, joint: str) -> Iterator[Shape]:
-    angle, colour = shown.angle(wheel.body), shown.colour(wheel.body)
-    rim_point = wheel.centre + wheel.radius * np.array([np.cos(angle), np.sin(angle)])
-    yield Shape("wheel", joint, wheel.body, wheel.centre[None], colour, radius=wheel.radius)
-    yield Shape("spoke", joint, wheel.body, np.array([wheel.centre, rim_point]), colour)
 
 
 def _blocks(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:

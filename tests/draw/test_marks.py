@@ -30,7 +30,8 @@ from kinfmu.draw.motion import Length, Push, Turn, motion
 from kinfmu.draw.painting import placed
 from kinfmu.draw.pins import Pin, pins
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.shapes import Shape, shapes
+from kinfmu.scene.shape import Shape
+from kinfmu.scene.shapes import shapes
 from kinfmu.scene.slides import slides
 from tests.joints.test_mechanisms import crank_and_slider
 from tests.mechanisms import fourbar

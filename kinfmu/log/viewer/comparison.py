@@ -14,7 +14,7 @@ from kinfmu.log.verdict import sentence
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
-from kinfmu.log.viewer.linkage import log_linkage
+from kinfmu.log.viewer.linkage import Linkage
 from kinfmu.log.viewer.rerun_file import application, left_out, log_card, log_group, log_status, recording
 from kinfmu.log.viewer.series import Group, groups
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
@@ -74,7 +74,7 @@ def write_comparison(a: Run, b: Run, path: str | Path, names: tuple[str, str] = 
     with recording(path, f"{names[0]} and {names[1]}", layout, own_name) as rec:
         for run, drawn, scene, own, look in zip((a, b), shown, scenes, curves, _LOOKS, strict=True):
             if scene:
-                log_linkage(rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer)
+                Linkage(rec, f"{look.root}/linkage", timeline, drawn, scene, look.colour, look.bars, look.layer).log()
             for group in own.values():
                 log_group(rec, look.root, timeline, drawn, _named(group, look), look.curves)
             log_status(rec, look.root, timeline, timeline.placed(run))

@@ -10,7 +10,7 @@ from kinfmu.run import FloatArray
 from kinfmu.scene import details
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene
-from kinfmu.scene.shapes import Shape
+from kinfmu.scene.shape import Shape
 
 _SUPPORT = 0.05  # height of a support, as a part of the size
 _WIDTH, _HEIGHT = 600.0, 380.0  # [points] of the view on a usual screen, within its frame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene import details, palette
 from kinfmu.scene.scene import Scene
-from kinfmu.scene.shapes import Shape
+from kinfmu.scene.shape import Shape
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -90,47 +91,31 @@ def trail_time(run: Run, scene: Scene, point: str) -> float:
     return span * min(TRAIL * scene.size / length, LONGEST_TRAIL) if length > 0.0 else 0.0
 
 
-def log_linkage(
-    rec: rr.RecordingStream,
-    root: str,
-    timeline: Timeline,
-    run: Run,
-    scene: Scene,
-    colour: palette.Colour | None = None,
-    width: float = 1.0,
-    layer: float = 0.0,
-) -> None:
-    """Log the linkage of a placed run under the entity `root`: all in `colour`, or each body in its own.
+@dataclass
+class Linkage:
+    """The linkage of a placed run, logged under the entity `root`: all in `colour`, or each body in its own.
 
     width: factor of the lines' widths; layer: higher layers cover lower ones. Where the run has no numbers, the last
     pose that closed stays, in grey, with a notice; before the first pose nothing is drawn.
     """
-    _Linkage(rec, root, timeline, run, scene, colour, width, layer).log()
 
+    rec: rr.RecordingStream
+    root: str
+    timeline: Timeline
+    run: Run
+    scene: Scene
+    colour: palette.Colour | None = None
+    width: float = 1.0
+    layer: float = 0.0
 
-class _Linkage:
-    """A linkage that is being logged, and its style."""
-
-    def __init__(
-        self,
-        rec: rr.RecordingStream,
-        root: str,
-        timeline: Timeline,
-        run: Run,
-        scene: Scene,
-        colour: palette.Colour | None,
-        width: float,
-        layer: float,
-    ) -> None:
-        self.rec, self.root, self.timeline, self.run, self.scene = rec, root, timeline, run, scene
-        self.colour, self.layer = colour, layer
-        self.size, self.detail = width * scene.stroke, detail(scene)
-        self.width = width
-        self.frames = Frames(rec, timeline, run, self.size, layer)
-        bare = {shape.frame for shape in scene.shapes if shape.kind == "link" and len(shape.points) < 2}
+    def __post_init__(self) -> None:
+        """Set what follows from the scene: sizes, and the names that are always shown."""
+        self.size, self.detail = self.width * self.scene.stroke, detail(self.scene)
+        self.frames = Frames(self.rec, self.timeline, self.run, self.size, self.layer)
+        bare = [shape.frame for shape in self.scene.shapes if shape.kind == "link" and len(shape.points) < 2]
         self._unlinked = {body: body for body in bare}  # bodies whose name is that of their first other shape
-        is_named = colour is None and len(scene.bodies) <= MOST_NAMES
-        self.names = shown_names(scene) if is_named else frozenset[str]()
+        is_named = self.colour is None and len(self.scene.bodies) <= MOST_NAMES
+        self.names = shown_names(self.scene) if is_named else frozenset[str]()
 
     def log(self) -> None:
         """Log everything, the ground first."""
@@ -140,14 +125,14 @@ class _Linkage:
         self.rec.log(self.root, rr.Transform3D(mat3x3=[[1, 0, 0], [0, -1, 0], [0, 0, 1]]), static=True)
         log_ground(self.rec, self.root, self.scene, _PIN * self.size)
         entities = {frame: self._entity(frame) for frame in self.scene.frames if frame != GROUND_NAME}
-        seen: Counter[str] = Counter()
+        seen: Counter[str] = Counter()  # entities of bodies with several shapes of one kind and joint
         for frame, path in entities.items():
             self.frames.move(path, self.scene.frames[frame])
         for shape in self.scene.shapes:
             if shape.frame in entities and shape.kind in _PAINT:
-                name = f"{shape.kind}/{shape.name}"
-                self._shape(entities[shape.frame], shape, f"{name}/{seen[name]}" if seen[name] else name)
-                seen[name] += 1
+                entity = f"{entities[shape.frame]}/{shape.kind}/{shape.name}"
+                self._shape(shape, f"{entity}/{seen[entity]}" if seen[entity] else entity)
+                seen[entity] += 1
         for frame, path in entities.items():
             self._points(path, frame)
         for index, (name, points) in enumerate(self.scene.paths.items()):
@@ -163,26 +148,28 @@ class _Linkage:
             return f"{self.root}/bodies/{frame}"
         return f"{self.root}/{kind}s/{name.replace('.', '/')}"
 
-    def _shape(self, path: str, shape: Shape, name: str) -> None:
+    def _shape(self, shape: Shape, entity: str) -> None:
         """Log one shape; that of a body's link, a bar or a cylinder is the frame's own entity."""
-        paint = _PAINT[shape.kind]
-        line = shape.line
+        paint, line, own = _PAINT[shape.kind], shape.line, self.colour or shape.colour
         if shape.kind == "link" and len(line) < 2:
             return
+        if shape.kind in ("link", "bar", "barrel", "shaft"):
+            entity = self._entity(shape.frame)
+            label = shape.name if shape.kind in ("link", "bar") else None
+        else:
+            label = self._unlinked.pop(shape.frame, None)
         if shape.kind in ("block", "die"):
             line = details.core(shape, self.detail)
         elif shape.kind == "rack":
             pinion = next(wheel for wheel in self.scene.shapes if (wheel.kind, wheel.name) == ("wheel", shape.name))
             line = details.teeth(shape, details.teeth_size(pinion.radius))
             line = np.vstack([line, line[:1]])
-        own = palette.BACKDROP if shape.kind == "slot" else self.colour or shape.colour
-        if shape.kind == "shaft":
+        elif shape.kind == "slot":
+            own = palette.BACKDROP
+        elif shape.kind == "shaft":
             own = self.colour or palette.lighter(shape.colour)
-        index = self.scene.bodies.get(shape.frame, 0)
-        is_own = shape.kind in ("link", "bar", "barrel", "shaft")
-        label = shape.name if shape.kind in ("link", "bar") else self._unlinked.pop(shape.frame, None)
-        entity = path if is_own else f"{path}/{name}"
-        self.frames.line(entity, line, paint.radius, own, paint.order + index / 100.0, label, label in self.names)
+        order = paint.order + self.scene.bodies.get(shape.frame, 0) / 100.0
+        self.frames.line(entity, line, paint.radius, own, order, label, label in self.names)
 
     def _points(self, path: str, frame: str) -> None:
         """Log pins with the names of their joints, which show when pointed at, and points of interest."""

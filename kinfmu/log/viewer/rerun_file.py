@@ -33,7 +33,7 @@ from kinfmu.log.verdict import changes, label, notable_events, sentence
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
-from kinfmu.log.viewer.linkage import APPLICATION, log_linkage, send
+from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
 from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
@@ -75,7 +75,7 @@ def write_rrd(run: Run, path: str | Path) -> None:
     with recording(path, name, layout, application([shown], curves.values())) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
-            log_linkage(rec, "/linkage", timeline, shown, scene)
+            Linkage(rec, "/linkage", timeline, shown, scene).log()
         for group in (*curves.values(), *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))

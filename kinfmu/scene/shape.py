@@ -1,0 +1,74 @@
+"""What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
+
+A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those of
+`kinfmu.scene.frames`.
+
+    link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
+    rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
+    block, die       what slides: a body, or the block of a pin, which can turn; direction: along the line
+    rail, bed        a line of the ground under blocks, and under a rack; direction: into the ground
+    support          a pin of the ground; direction: into the ground
+    cam, pitch       the profile, and the curve of the roller's centre; roller: its circle
+    wheel, spoke     a pitch circle, and a radius that shows its rotation; belt: a straight part of one
+    rack             the pitch line; direction: from the teeth to the back
+    contact          the point where the bodies of a cam, gear or rack touch
+    bar              a joint Distance; barrel, shaft: of a driven distance, at its first and at its second point
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinfmu.run import FloatArray
+from kinfmu.scene import palette
+from kinfmu.scene.placing import world
+
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 73)  # [rad], corners of a circle
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A line, area or circle that is fixed in a frame.
+
+    kind: see above; name: of the joint, body or driver it shows; frame: that moves it; points: (k, 2) in the frame;
+    colour: of the body, or grey; is_closed: True for a line that returns to its first point; radius: of a circle about
+    the only point; direction: unit vector (2,), as stated with the kinds.
+    """
+
+    kind: str
+    name: str
+    frame: str
+    points: FloatArray
+    colour: palette.Colour = palette.GROUND
+    is_closed: bool = False
+    radius: float = 0.0
+    direction: FloatArray | None = None
+
+    @property
+    def line(self) -> FloatArray:
+        """The polyline (k, 2) in the frame; that of a circle or closed line returns to its first point."""
+        if self.radius:
+            return self.points + self.radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+        return np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
+
+    @property
+    def extent(self) -> FloatArray:
+        """Some of the points of the line, (at most 25, 2)."""
+        return self.line[:: max(len(self.line) // 24, 1)]
+
+    @property
+    def towards(self) -> FloatArray:
+        """The direction of a kind that has one, (2,)."""
+        if self.direction is None:
+            raise TypeError(f"a shape of kind '{self.kind}' has no direction")
+        return self.direction
+
+    def placed(self, pose: FloatArray) -> Shape:
+        """Return the shape in the world, its frame in a pose (3,)."""
+        points = np.array([world(pose[None], (x, y))[0] for x, y in self.points]).reshape(-1, 2)
+        if self.direction is None:
+            return replace(self, points=points)
+        x, y = self.direction
+        return replace(self, points=points, direction=world(np.array([[0.0, 0.0, pose[2]]]), (x, y))[0])
