@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.analysis.matrices import Matrix, moving_jacobian
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.analysis.values import value_text
-from kinfmu.equations.assembly import assemble
+from kinfmu.equations.assembly import find_assembly
 from kinfmu.equations.closing import close
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
@@ -25,7 +25,7 @@ SMALL_TURN = math.radians(1.0)  # [rad]; enough to restore the rank near a singu
 def pose_matrices(plan: SolvePlan, redundancy: Redundancy, reach: DriverRange | None) -> tuple[Matrix, ...]:
     """Return Phi_K,q and Phi_q at the start pose, Phi_q at each singular point of the range and after a small turn."""
     system = System(localized(plan.mechanism)[0])
-    assembled = assemble(system)
+    assembled = find_assembly(system).pose
     moving = [name for name in system.coordinates if name not in plan.fixed]
     if assembled is None or not moving:
         return ()

@@ -87,21 +87,10 @@ def find_assembly(system: System) -> Assembly:
     return Assembly(moved, there) if there is not None and there.margin > SINGULAR else Assembly(given, found)
 
 
-def assemble(system: System) -> Assembled | None:
-    """Return the pose of `find_assembly`."""
-    return find_assembly(system).pose
-
-
 def start_values(system: System) -> StartValues:
     """Return the start values of `find_assembly`; nothing is assembled if start poses and laws agree."""
     given = start_from_poses(system)
     return find_assembly(system).start if given.is_followed else given
-
-
-def _is_reached(system: System, found: Assembled, target: FloatArray) -> bool:
-    """Return True if a straight line of driver values leads from a pose to the target without a limit between."""
-    _, u = followed(system, found.q, found.u, target)
-    return np.array_equal(u, target)
 
 
 def _assembled(system: System, start: StartValues) -> Assembled | None:
@@ -169,7 +158,7 @@ def _assembled_beside(system: System, start: StartValues) -> Assembled | None:
             u = start.u + side * BESIDE * reaches(system)
             q, gap = close(system, start.q + spread, u)
             near = Assembled(q, u, margin(system, q) if gap <= CLOSED else 0.0)
-            if near.margin > SINGULAR and _is_reached(system, near, start.u):
+            if near.margin > SINGULAR and np.array_equal(followed(system, q, u, start.u)[1], start.u):
                 beside.append((distance_from_start(system, start, near.q), near))
     return min(beside, key=lambda pose: pose[0])[1] if beside else None
 

@@ -192,7 +192,8 @@ def followed(
 
 def reaches(system: System) -> FloatArray:
     """Return one unit of each driver, (d,): a radian, or the mechanism's size."""
-    return np.array([_reach(system, driver.quantity.kind) for driver in system.mechanism.drivers])
+    is_angle = [driver.quantity.kind == "angle" for driver in system.mechanism.drivers]
+    return np.where(is_angle, 1.0, system.size)
 
 
 def dependent_rows(gradients: FloatArray) -> dict[int, list[int]]:
@@ -234,10 +235,6 @@ def branches(system: System, singular: FloatArray, u: FloatArray) -> list[FloatA
         if gap <= CLOSED and away < 1.0 and new:
             found.append((away, pose))
     return [pose for _, pose in sorted(found, key=lambda item: item[0])]
-
-
-def _reach(system: System, kind: str) -> float:
-    return 1.0 if kind == "angle" else system.size
 
 
 def margin(system: System, q: FloatArray) -> float:

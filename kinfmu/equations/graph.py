@@ -263,24 +263,12 @@ def symbols(targets: Iterable[Node]) -> list[Node]:
     return [node for node in reachable(targets) if node.op == "symbol"]
 
 
-@sin.register
-def _(x: Node) -> Node:
-    return x.graph.function("sin", x)
+def _traced(name: str) -> Callable[[Node], Node]:
+    return lambda x: x.graph.function(name, x)
 
 
-@cos.register
-def _(x: Node) -> Node:
-    return x.graph.function("cos", x)
-
-
-@sqrt.register
-def _(x: Node) -> Node:
-    return x.graph.function("sqrt", x)
-
-
-@floor.register
-def _(x: Node) -> Node:
-    return x.graph.function("floor", x)
+for _name, _function in (("sin", sin), ("cos", cos), ("sqrt", sqrt), ("floor", floor)):
+    _function.register(Node, _traced(_name))
 
 
 @curve.register

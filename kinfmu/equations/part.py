@@ -45,7 +45,7 @@ class Part:
             )
 
     def whole(self, q: FloatArray) -> FloatArray:
-        """All coordinates of the system, (n,)."""
+        """Return all coordinates of the system, (n,)."""
         at = self._at.copy()
         at[self.columns] = q
         return at

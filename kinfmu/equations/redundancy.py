@@ -86,9 +86,7 @@ def find_redundancy(system: System) -> Redundancy:
     for index, implying in reversed(suspects.items()):
         others = [k for k in kept if k != index]
         joints = {system.member_of[row] for row in (*implying, index)}
-        of_joints = [
-            k for k in others if system.member_of[k] in joints
-        ]  # at a single pose some of these have no weight
+        of_joints = [k for k in others if system.member_of[k] in joints]  # some have no weight at a single pose
         companies = [implying, of_joints, others] if implying else [others]
         found = next(filter(None, (_poses_of_dependence(system, start, index, rows) for rows in companies)), None)
         if found is None:
@@ -104,7 +102,7 @@ def find_redundancy(system: System) -> Redundancy:
 
 
 def _tolerance(system: System, index: int) -> float:
-    """The gap up to which a dependent row counts as consistent, as a length or in radians."""
+    """Return the gap up to which a dependent row counts as consistent, as a length or in radians."""
     if system.rows[index].kind == "angle":
         return CONSISTENT
     member, length = system.members[system.member_of[index]], system.size
@@ -133,7 +131,7 @@ def _poses_of_dependence(
 
 
 def _suspects(system: System, closed: FloatArray | None) -> dict[int, list[int]]:
-    """Joint rows that may be dependent, each with the rows before it whose gradients give its own at a closed pose.
+    """Return joint rows that may be dependent, each with the earlier rows that give its gradient at a closed pose.
 
     Where all rows hold together, what is dependent all along the motion is dependent there too. Where they do not
     close, all rows are suspects, and nothing is known of what implies them.
@@ -159,7 +157,7 @@ def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others:
 def _combination(
     system: System, pose: FloatArray, index: int, others: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weights of the other rows whose sum comes nearest to a row's gradient, that gradient, and what they leave."""
+    """Return weights of the other rows whose sum is nearest to a row's gradient, that gradient, and the difference."""
     jacobian = Part(system, [*others, index]).jacobian(pose)
     weights = np.asarray(np.linalg.lstsq(jacobian[:-1].T, jacobian[-1], rcond=1e-9)[0])
     return weights, jacobian[-1], jacobian[-1] - jacobian[:-1].T @ weights

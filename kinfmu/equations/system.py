@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -120,15 +120,12 @@ class System:
         """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
         unit = np.eye(len(member.columns))
         along = [Taylor(value, unit[k]) for k, value in enumerate(q[list(member.columns)].tolist())]
-        lines = [_lines(phi, len(along)) for phi in self._alone(member, along, 0.0)]
+        lines = [np.broadcast_to(_derivative(phi, 1), len(along)) for phi in self._alone(member, along, 0.0)]
         return np.array(lines).reshape(len(member.rows), len(along))
 
     def _alone(self, member: Member, coordinates: Sequence[Any], target: Any) -> Sequence[Any]:
         """Return the rows of one joint or driver, in the arithmetic of its bodies' coordinates."""
-        poses = {GROUND_NAME: GROUND}
-        for k, name in enumerate(member.bodies):
-            poses[name] = BodyFrame.of(*coordinates[3 * k : 3 * k + 3])
-        at, owner = Placement(poses, self._points), member.owner
+        at, owner = Placement(_frames(member.bodies, coordinates), self._points), member.owner
         return owner.residual(at) if isinstance(owner, Joint) else (owner.residual(at, target),)
 
     @cached_property
@@ -177,10 +174,13 @@ class System:
 
 def placement(mechanism: Mechanism, q: Sequence[Any]) -> Placement:
     """Return the poses of the bodies from all coordinates q, in any arithmetic."""
-    poses = {GROUND_NAME: GROUND}
-    for k, body in enumerate(mechanism.moving_bodies):
-        poses[body.name] = BodyFrame.of(*q[3 * k : 3 * k + 3])
-    return Placement(poses, mechanism.body_points)
+    return Placement(_frames([body.name for body in mechanism.moving_bodies], q), mechanism.body_points)
+
+
+def _frames(bodies: Iterable[str], q: Sequence[Any]) -> dict[str, BodyFrame]:
+    """Return the frames of the ground and of bodies from their coordinates x, y, phi."""
+    frames = {name: BodyFrame.of(*q[3 * k : 3 * k + 3]) for k, name in enumerate(bodies)}
+    return {GROUND_NAME: GROUND, **frames}
 
 
 def size_of(mechanism: Mechanism) -> float:
@@ -202,12 +202,8 @@ def _floats(values: ArrayLike) -> list[float]:
     return [float(value) for value in np.asarray(values, dtype=float)]
 
 
-def _lines(phi: Any, n: int) -> FloatArray:
-    """Return first derivatives along n lines; zero for a residual that is a plain number."""
-    return np.broadcast_to(_derivative(phi, 1), (n,))
-
-
 def _derivative(phi: Any, order: int) -> Any:
+    """Return a derivative of a residual; 0 if it is a plain number."""
     if not isinstance(phi, Taylor):
         return 0.0
     return phi.d1 if order == 1 else phi.d2

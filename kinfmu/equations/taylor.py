@@ -11,9 +11,7 @@ from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
 
-_NOTHING = (
-    1e-100  # in place of a length of 0 whose derivative is wanted: a point at rest stays at rest, and no division fails
-)
+_NOTHING = 1e-100  # in place of a length of 0 that a derivative divides by: a point at rest then stays at rest
 Derivative = Any  # float, or (n,) for n lines at once
 
 
