@@ -141,6 +141,8 @@ def test_variables_without_directional_derivative_are_refused_by_name(start: Sta
     assert "crank_angle (value reference 1) has no directional derivative" in host.messages[-1][1]
     assert answer(host.slopes, ["coupler.x"], ["coupler.y"], [1.0]) == ERROR
     assert "no directional derivative along coupler.y" in host.messages[-1][1]
+    assert answer(host.fmu.getDirectionalDerivative, [9999], host.of("crank_angle"), [1.0]) == ERROR
+    assert "an unknown variable (value reference 9999) has no directional derivative" in host.messages[-1][1]
 
 
 def test_output_derivatives_are_the_velocity_and_acceleration_outputs(start: Start) -> None:

@@ -318,17 +318,15 @@ kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t
     memset(instance->seed, 0, sizeof instance->seed);
     for (k = 0; k < unknown_count; ++k) {
         if (!is_unknown(unknowns[k])) {
-            const char *const name = kf_name_of(unknowns[k]);
             return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no directional derivative",
-                          name ? name : "what is not there", unknowns[k]);
+                          kf_name_of(unknowns[k]), unknowns[k]);
         }
         parts |= KF_BIT(kf_part_of[KF_PLACE(unknowns[k])]);
     }
     for (k = 0; k < known_count; ++k) {
         if (!is_known(s, knowns[k]) || !isfinite(seed[k])) {
-            const char *const name = kf_name_of(knowns[k]);
             return kf_answered(instance, KF_ERROR, "no directional derivative along %s (value reference %u) now, by %g",
-                          name ? name : "what is not there", knowns[k], seed[k]);
+                          kf_name_of(knowns[k]), knowns[k], seed[k]);
         }
         if (knowns[k] == KF_TIME) {
             time_seed += seed[k];
@@ -355,9 +353,8 @@ kf_answer kf_output_derivative(kf_instance *instance, unsigned reference, int or
     int wanted;
     kf_answer answer;
     if ((part != KF_PART_VALUES && part != KF_PART_RATES) || order < 1 || order > KF_PART_ACCELERATIONS - part) {
-        const char *const name = kf_name_of(reference);
         return kf_answered(instance, KF_ERROR, "%s (value reference %u) has no derivative of order %d: positions have 1 and 2, "
-                      "rates 1", name ? name : "what is not there", reference, order);
+                      "rates 1", kf_name_of(reference), reference, order);
     }
     wanted = part + order;
     answer = kf_read(instance, KF_BIT(wanted));

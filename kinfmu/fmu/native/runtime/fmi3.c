@@ -139,55 +139,50 @@ GET_COUNTS(fmi3GetInt32, fmi3Int32, "Int32")
 GET_COUNTS(fmi3GetInt64, fmi3Int64, "Int64")
 SET_COUNTS(fmi3SetInt64, fmi3Int64, "Int64")
 
-/* Types that no variable has, or none that can be set. */
-static fmi3Status none_to_get(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
+/* Answer a call for variables of a type that no variable has, or none that can be set. */
+static fmi3Status none(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type,
+                       kf_answer (*refuse)(const kf_instance *, unsigned, const char *))
 {
     const kf_answer answer = kf_check(common(instance), references, references, count);
-    return (fmi3Status)(answer == KF_DONE && count ? kf_not_a(common(instance), references[0], type) : answer);
-}
-
-static fmi3Status none_to_set(fmi3Instance instance, const fmi3ValueReference *references, size_t count, const char *type)
-{
-    const kf_answer answer = kf_check(common(instance), references, references, count);
-    return (fmi3Status)(answer == KF_DONE && count ? kf_not_settable(common(instance), references[0], type) : answer);
+    return (fmi3Status)(answer == KF_DONE && count ? refuse(common(instance), references[0], type) : answer);
 }
 
 /* Define a function for such a type, which has the parameters given after the list of variables. */
 #define NONE(function, refuse, type, ...)                                                                              \
     fmi3Status function(fmi3Instance instance, const fmi3ValueReference references[], size_t count, __VA_ARGS__)       \
     {                                                                                                                  \
-        return refuse(instance, references, count, type);                                                              \
+        return none(instance, references, count, type, refuse);                                                        \
     }
 
-NONE(fmi3GetFloat32, none_to_get, "Float32", fmi3Float32 values[], size_t value_count)
-NONE(fmi3GetInt8, none_to_get, "Int8", fmi3Int8 values[], size_t value_count)
-NONE(fmi3GetUInt8, none_to_get, "UInt8", fmi3UInt8 values[], size_t value_count)
-NONE(fmi3GetInt16, none_to_get, "Int16", fmi3Int16 values[], size_t value_count)
-NONE(fmi3GetUInt16, none_to_get, "UInt16", fmi3UInt16 values[], size_t value_count)
-NONE(fmi3GetUInt32, none_to_get, "UInt32", fmi3UInt32 values[], size_t value_count)
-NONE(fmi3GetUInt64, none_to_get, "UInt64", fmi3UInt64 values[], size_t value_count)
-NONE(fmi3GetBinary, none_to_get, "Binary", size_t sizes[], fmi3Binary values[], size_t value_count)
-NONE(fmi3GetClock, none_to_get, "Clock", fmi3Clock values[])
-NONE(fmi3SetFloat32, none_to_set, "Float32", const fmi3Float32 values[], size_t value_count)
-NONE(fmi3SetInt8, none_to_set, "Int8", const fmi3Int8 values[], size_t value_count)
-NONE(fmi3SetUInt8, none_to_set, "UInt8", const fmi3UInt8 values[], size_t value_count)
-NONE(fmi3SetInt16, none_to_set, "Int16", const fmi3Int16 values[], size_t value_count)
-NONE(fmi3SetUInt16, none_to_set, "UInt16", const fmi3UInt16 values[], size_t value_count)
-NONE(fmi3SetInt32, none_to_set, "Int32", const fmi3Int32 values[], size_t value_count)
-NONE(fmi3SetUInt32, none_to_set, "UInt32", const fmi3UInt32 values[], size_t value_count)
-NONE(fmi3SetUInt64, none_to_set, "UInt64", const fmi3UInt64 values[], size_t value_count)
-NONE(fmi3SetString, none_to_set, "String", const fmi3String values[], size_t value_count)
-NONE(fmi3SetBinary, none_to_set, "Binary", const size_t sizes[], const fmi3Binary values[], size_t value_count)
-NONE(fmi3SetClock, none_to_set, "Clock", const fmi3Clock values[])
-NONE(fmi3GetIntervalDecimal, none_to_get, "Clock", fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-NONE(fmi3GetIntervalFraction, none_to_get, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+NONE(fmi3GetFloat32, kf_not_a, "Float32", fmi3Float32 values[], size_t value_count)
+NONE(fmi3GetInt8, kf_not_a, "Int8", fmi3Int8 values[], size_t value_count)
+NONE(fmi3GetUInt8, kf_not_a, "UInt8", fmi3UInt8 values[], size_t value_count)
+NONE(fmi3GetInt16, kf_not_a, "Int16", fmi3Int16 values[], size_t value_count)
+NONE(fmi3GetUInt16, kf_not_a, "UInt16", fmi3UInt16 values[], size_t value_count)
+NONE(fmi3GetUInt32, kf_not_a, "UInt32", fmi3UInt32 values[], size_t value_count)
+NONE(fmi3GetUInt64, kf_not_a, "UInt64", fmi3UInt64 values[], size_t value_count)
+NONE(fmi3GetBinary, kf_not_a, "Binary", size_t sizes[], fmi3Binary values[], size_t value_count)
+NONE(fmi3GetClock, kf_not_a, "Clock", fmi3Clock values[])
+NONE(fmi3SetFloat32, kf_not_settable, "Float32", const fmi3Float32 values[], size_t value_count)
+NONE(fmi3SetInt8, kf_not_settable, "Int8", const fmi3Int8 values[], size_t value_count)
+NONE(fmi3SetUInt8, kf_not_settable, "UInt8", const fmi3UInt8 values[], size_t value_count)
+NONE(fmi3SetInt16, kf_not_settable, "Int16", const fmi3Int16 values[], size_t value_count)
+NONE(fmi3SetUInt16, kf_not_settable, "UInt16", const fmi3UInt16 values[], size_t value_count)
+NONE(fmi3SetInt32, kf_not_settable, "Int32", const fmi3Int32 values[], size_t value_count)
+NONE(fmi3SetUInt32, kf_not_settable, "UInt32", const fmi3UInt32 values[], size_t value_count)
+NONE(fmi3SetUInt64, kf_not_settable, "UInt64", const fmi3UInt64 values[], size_t value_count)
+NONE(fmi3SetString, kf_not_settable, "String", const fmi3String values[], size_t value_count)
+NONE(fmi3SetBinary, kf_not_settable, "Binary", const size_t sizes[], const fmi3Binary values[], size_t value_count)
+NONE(fmi3SetClock, kf_not_settable, "Clock", const fmi3Clock values[])
+NONE(fmi3GetIntervalDecimal, kf_not_a, "Clock", fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+NONE(fmi3GetIntervalFraction, kf_not_a, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[],
      fmi3IntervalQualifier qualifiers[])
-NONE(fmi3GetShiftDecimal, none_to_get, "Clock", fmi3Float64 shifts[])
-NONE(fmi3GetShiftFraction, none_to_get, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-NONE(fmi3SetIntervalDecimal, none_to_get, "Clock", const fmi3Float64 intervals[])
-NONE(fmi3SetIntervalFraction, none_to_get, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-NONE(fmi3SetShiftDecimal, none_to_get, "Clock", const fmi3Float64 shifts[])
-NONE(fmi3SetShiftFraction, none_to_get, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NONE(fmi3GetShiftDecimal, kf_not_a, "Clock", fmi3Float64 shifts[])
+NONE(fmi3GetShiftFraction, kf_not_a, "Clock", fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+NONE(fmi3SetIntervalDecimal, kf_not_a, "Clock", const fmi3Float64 intervals[])
+NONE(fmi3SetIntervalFraction, kf_not_a, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NONE(fmi3SetShiftDecimal, kf_not_a, "Clock", const fmi3Float64 shifts[])
+NONE(fmi3SetShiftFraction, kf_not_a, "Clock", const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
                                                size_t *nDependencies)

@@ -137,7 +137,7 @@ kf_answer kf_set_boolean(kf_instance *instance, unsigned reference, bool value);
 kf_answer kf_get_string(kf_instance *instance, unsigned reference, const char **value);
 KF_RARE kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type);
 KF_RARE kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type);
-const char *kf_name_of(unsigned reference); /* NULL if there is no such variable */
+const char *kf_name_of(unsigned reference);
 
 /* Derivatives. */
 kf_answer kf_directional(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,

@@ -12,26 +12,25 @@
 
 const char *kf_name_of(unsigned reference)
 {
-    return KF_PLACE(reference) < KF_VARIABLES ? kf_variable_names[KF_PLACE(reference)] : NULL;
+    return KF_PLACE(reference) < KF_VARIABLES ? kf_variable_names[KF_PLACE(reference)] : "an unknown variable";
+}
+
+static KF_RARE kf_answer refused(const kf_instance *instance, unsigned reference, const char *type, const char *suffix)
+{
+    return KF_PLACE(reference) < KF_VARIABLES
+               ? kf_answered(instance, KF_ERROR, "%s (value reference %u) is not a %s variable%s", kf_name_of(reference),
+                             reference, type, suffix)
+               : kf_answered(instance, KF_ERROR, "value reference %u is not a variable of this FMU", reference);
 }
 
 kf_answer kf_not_a(const kf_instance *instance, unsigned reference, const char *type)
 {
-    const char *const name = kf_name_of(reference);
-    if (name) {
-        return kf_answered(instance, KF_ERROR, "%s (value reference %u) is not a %s variable", name, reference, type);
-    }
-    return kf_answered(instance, KF_ERROR, "value reference %u is not a variable of this FMU", reference);
+    return refused(instance, reference, type, "");
 }
 
 kf_answer kf_not_settable(const kf_instance *instance, unsigned reference, const char *type)
 {
-    const char *const name = kf_name_of(reference);
-    if (name) {
-        return kf_answered(instance, KF_ERROR, "%s (value reference %u) is not a %s variable that can be set", name, reference,
-                      type);
-    }
-    return kf_answered(instance, KF_ERROR, "value reference %u is not a variable of this FMU", reference);
+    return refused(instance, reference, type, " that can be set");
 }
 
 /* Get */
