@@ -84,6 +84,9 @@ def checked_settings(
         settings: Name and text of each --set.
         of_run: Names of settings of a run that this command takes.
 
+    Returns:
+        The settings.
+
     Raises:
         click.UsageError: For an unknown name, an invalid value, or a value that follows from an expression.
 

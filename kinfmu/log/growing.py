@@ -11,7 +11,7 @@ from shlex import quote
 
 from kinfmu.files.whole_file import lock_for_writing
 from kinfmu.log.cdr import zero_of
-from kinfmu.log.target import check_writable, checked, replacing, write_error
+from kinfmu.log.target import check_writable, replacing, target_of, write_error
 from kinfmu.log.verdict import status_events, unexplained
 from kinfmu.log.writing import Content
 from kinfmu.run import Event, Run
@@ -108,7 +108,7 @@ class McapLog:
                 file.close()
             raise
         if file.closed:
-            file = FileIO(checked(self.path), "a")
+            file = FileIO(target_of(self.path), "a")
             content.continue_in(file)
         self._file, self._content = file, content
 

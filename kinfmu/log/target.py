@@ -17,7 +17,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
     After a failure `path` is unchanged. LogError for a folder that is missing or cannot be written.
     """
-    target = checked(path)
+    target = target_of(path)
     try:
         with replacement(target) as temporary:
             yield temporary
@@ -25,7 +25,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         raise write_error(path, error) from error
 
 
-def checked(path: str | Path) -> Path:
+def target_of(path: str | Path) -> Path:
     """Return where a file of that name is or will be, the target of a link; LogError if no file can be there."""
     target = Path(os.path.realpath(path))  # the link is kept
     if target.is_dir():
@@ -39,7 +39,7 @@ def checked(path: str | Path) -> Path:
 
 def check_writable(path: str | Path) -> None:
     """Raise a LogError if no file can be made at `path`, or if another run is being written to it."""
-    target = checked(path)
+    target = target_of(path)
     temporary = hidden_sibling(target)
     try:
         check_is_free(target)

@@ -1,4 +1,4 @@
-"""Runs: named columns over samples, their axis, which of them are kept, and what takes a run while it goes on."""
+"""Runs: named columns over samples, their axis, the columns to keep, and sinks, which receive a run in parts."""
 
 from __future__ import annotations
 

@@ -58,6 +58,18 @@ class _Job(ctypes.Structure):
     )
 
 
+_sweep, _job = ctypes.c_void_p, ctypes.POINTER(_Job)
+_FUNCTIONS: dict[str, tuple[Any, ...]] = {  # of sweep.h: types of the result and of the arguments
+    "kf_sweep_new": (_sweep, _double),
+    "kf_sweep_free": (None, _sweep),
+    "kf_sweep_bind": (ctypes.c_bool, _sweep, _numbers),
+    "kf_sweep_run": (ctypes.c_bool, _sweep, _job),
+    "kf_sweep_diagnose": (ctypes.c_bool, _sweep, _job, _numbers, _numbers),
+    "kf_sweep_message": (ctypes.c_char_p, _sweep),
+    "kf_drive_all": (ctypes.c_bool, ctypes.c_int64, *[_numbers] * 6),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class LibraryResult:
     """Per-sample diagnostics of a sweep, as in Run.
@@ -92,18 +104,9 @@ class Library:
         self._tolerance = tolerance
         files = emit(plan) | compiler.runtime() | sources(plan)
         library = self._library = compiler.load(files, FLAGS)
-        library.kf_sweep_new.restype = ctypes.c_void_p
-        library.kf_sweep_new.argtypes = [_double]
-        library.kf_sweep_free.argtypes = [ctypes.c_void_p]
-        library.kf_sweep_bind.restype = ctypes.c_bool
-        library.kf_sweep_bind.argtypes = [ctypes.c_void_p, _numbers]
-        library.kf_sweep_run.restype = ctypes.c_bool
-        library.kf_sweep_run.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job)]
-        library.kf_sweep_diagnose.restype = ctypes.c_bool
-        library.kf_sweep_diagnose.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), _numbers, _numbers]
-        library.kf_sweep_message.restype = ctypes.c_char_p
-        library.kf_sweep_message.argtypes = [ctypes.c_void_p]
-        library.kf_drive_all.restype = ctypes.c_bool
+        for name, (result, *arguments) in _FUNCTIONS.items():
+            function = getattr(library, name)
+            function.restype, function.argtypes = result, arguments
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return (n, d) driver values, speeds and accelerations at times."""
@@ -111,7 +114,7 @@ class Library:
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
         values = self._parameters or [parameter.value for parameter in self.plan.parameters]
         given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
-        if not self._library.kf_drive_all(ctypes.c_int64(len(times)), _start(times), *given, *map(_start, driven)):
+        if not self._library.kf_drive_all(len(times), _start(times), *given, *map(_start, driven)):
             raise KinfmuError("these parameters have no solution")
         return driven  # type: ignore[return-value]  # three of them
 
