@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_MOVE, _LINE, _CLOSE = 1, 2, 79  # codes of a path of matplotlib
 INK: Colour = (40, 40, 40)
 GREY: Colour = (110, 110, 110)
 PAPER: Colour = (255, 255, 255)
@@ -88,38 +89,19 @@ class Sheet:
         style: Any = "solid",
     ) -> None:
         """Draw a line of `width` [pt] through points (k, 2) with round ends; matters: its weight for names."""
-        from matplotlib.patches import PathPatch
-        from matplotlib.path import Path as Outline
-
         points = np.asarray(points, dtype=float)
         route = np.vstack([points, points[:1]]) if closed else points
-        codes = [Outline.MOVETO, *[Outline.LINETO] * (len(route) - 1)]
+        codes = [_MOVE, *[_LINE] * (len(route) - 1)]
         if closed:
-            codes[-1] = Outline.CLOSEPOLY
-        self.axes.add_artist(
-            PathPatch(
-                Outline(route, codes),
-                linewidth=width,
-                edgecolor=ink(colour),
-                facecolor=ink(fill) if fill else "none",
-                capstyle="round",
-                joinstyle="round",
-                linestyle=style,
-                zorder=self._next(),
-            )
-        )
+            codes[-1] = _CLOSE
+        self._add(route, codes, width, colour, fill, linestyle=style, capstyle="round", joinstyle="round")
         if matters:
             self.cover(route, matters, width)
 
     def strokes(self, ends: ArrayLike, width: float, colour: Colour) -> None:
         """Draw hatching: straight lines of one style with ends (k, 2, 2), which names may cover."""
-        from matplotlib.patches import PathPatch
-        from matplotlib.path import Path as Outline
-
         points = np.asarray(ends, dtype=float).reshape(-1, 2)
-        codes = [Outline.MOVETO, Outline.LINETO] * (len(points) // 2)
-        look = {"linewidth": width, "edgecolor": ink(colour), "facecolor": "none", "capstyle": "butt"}
-        self.axes.add_artist(PathPatch(Outline(points, codes), zorder=self._next(), **look))
+        self._add(points, [_MOVE, _LINE] * (len(points) // 2), width, colour)
 
     def circle(
         self,
@@ -133,22 +115,26 @@ class Sheet:
         style: Any = "solid",
     ) -> None:
         """Draw a circle of `radius` [length] with a line of `width` [pt]."""
-        from matplotlib.patches import Circle
+        from matplotlib.path import Path as Outline
 
-        x, y = np.asarray(centre, dtype=float)
-        self.axes.add_artist(
-            Circle(
-                (x, y),
-                radius,
-                linewidth=width,
-                edgecolor=ink(colour),
-                facecolor=ink(fill) if fill else "none",
-                linestyle=style,
-                zorder=self._next(),
-            )
-        )
+        unit = Outline.unit_circle()
+        centre = np.asarray(centre, dtype=float)
+        self._add(centre + radius * np.asarray(unit.vertices), unit.codes, width, colour, fill, linestyle=style)
         if matters:
-            self.cover(arc((x, y), radius, 0.0, 2.0 * np.pi), matters, width)
+            self.cover(arc(centre, radius, 0.0, 2.0 * np.pi), matters, width)
+
+    def _add(
+        self, points: FloatArray, codes: Any, width: float, colour: Colour, fill: Colour | None = None, **look: Any
+    ) -> None:
+        """Add a path of matplotlib, which covers all earlier ones."""
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path as Outline
+
+        face = ink(fill) if fill else "none"
+        path = Outline(points, codes)
+        self.axes.add_artist(
+            PathPatch(path, linewidth=width, edgecolor=ink(colour), facecolor=face, zorder=self._next(), **look)
+        )
 
     def track(self, points: FloatArray, width: float, colour: Colour) -> None:
         """Draw a thin line through points (n, 2) with gaps where they are NaN."""

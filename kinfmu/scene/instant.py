@@ -64,13 +64,13 @@ class Instant:
         """Return body-fixed coordinates (2,) of 'body.point'."""
         return np.array(self.body_points[point])
 
-    def placed(self, body: str, points: FloatArray) -> FloatArray:
-        """Return world coordinates (k, 2) as drawn of points (k, 2) in a body's frame."""
-        return np.array([world(self.poses[body][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
+    def placed(self, frame: str, points: FloatArray) -> FloatArray:
+        """Return world coordinates (k, 2) as drawn of points (k, 2) in a frame."""
+        return np.array([world(self.frames[frame][:1], (x, y))[0] for x, y in points]).reshape(-1, 2)
 
-    def seen(self, body: str, points: FloatArray) -> FloatArray:
-        """Return coordinates (k, 2) in a body's frame of points (k, 2) of the world, the inverse of `placed`."""
-        return seen_from(np.tile(self.frames[body][:1], (len(points), 1)), points)
+    def seen(self, frame: str, points: FloatArray) -> FloatArray:
+        """Return coordinates (k, 2) in a frame of points (k, 2) of the world, the inverse of `placed`."""
+        return seen_from(np.tile(self.frames[frame][:1], (len(points), 1)), points)
 
     def angle(self, body: str) -> float:
         """Return the angle of a body as drawn [rad]."""

@@ -33,7 +33,7 @@ _STEEP = 0.9  # sine of a rail's angle, above which the ground is on the side aw
 def shapes(shown: Instant) -> list[Shape]:
     """Return everything to draw of the bodies whose poses are known, but for pins, arrows and paths."""
     sliding = slides(shown)
-    in_world = [*_cams(shown), *wheels(shown), *_blocks(shown, sliding), *_ground(shown, sliding)]
+    in_world = [*_cams(shown), *wheels(shown), *_slides(shown, sliding), *_supports(shown)]
     return [*_links(shown, sliding), *_between(shown), *(_in_frame(shown, shape) for shape in in_world)]
 
 
@@ -96,33 +96,25 @@ def _cams(shown: Instant) -> Iterator[Shape]:
         yield Shape("contact", cam.joint, cam.follower, cam.contact[None])
 
 
-def _blocks(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
-    """Yield the moving parts of slides."""
-    racks = racks_of(shown)
+def _slides(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
+    """Yield the moving parts of slides, and rails under blocks or under a fixed block through which a rod slides."""
+    racks, middle = racks_of(shown), _middle(shown)
     for slide in sliding:
-        if slide.slider in racks:
-            continue  # the rack itself slides
         at, along = place(shown, slide)
+        is_rack, is_on_ground = slide.slider in racks, slide.holder == GROUND_NAME
+        if is_on_ground or (slide.slider == GROUND_NAME and not slide.turns):
+            ends = slide.ends if is_on_ground else np.array([at, at])
+            side = _outwards(along, at, middle)
+            yield Shape("bed" if is_rack and is_on_ground else "rail", slide.name, GROUND_NAME, ends, direction=side)
+        if is_rack:
+            continue  # the rack itself slides
         if not slide.turns:
             yield Shape("block", slide.name, slide.slider, at[None], shown.colour(slide.slider), direction=along)
-        elif slide.holder == GROUND_NAME:
+        elif is_on_ground:
             yield Shape("die", slide.name, die_frame(slide.name), at[None], palette.BAR, direction=along)
         else:
             ends = shown.placed(slide.holder, slide.ends)
             yield Shape("slot", slide.name, slide.holder, ends, shown.colour(slide.holder))
-
-
-def _ground(shown: Instant, sliding: Sequence[Slide]) -> Iterator[Shape]:
-    """Yield supports, and rails under blocks or under a fixed block through which a rod slides."""
-    yield from _supports(shown)
-    racks, middle = racks_of(shown), _middle(shown)
-    for slide in sliding:
-        at, along = place(shown, slide)
-        if slide.holder == GROUND_NAME:
-            kind = "bed" if slide.slider in racks else "rail"
-            yield Shape(kind, slide.name, GROUND_NAME, slide.ends, direction=_outwards(along, at, middle))
-        elif slide.slider == GROUND_NAME and not slide.turns:
-            yield Shape("rail", slide.name, GROUND_NAME, np.array([at, at]), direction=_outwards(along, at, middle))
 
 
 def _supports(shown: Instant) -> Iterator[Shape]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.errors import LogError
 from kinfmu.log import write_rrd
 from kinfmu.log.viewer import headless
@@ -106,6 +107,17 @@ def test_links_have_the_poses_of_the_run(run: Run, tmp_path: Path) -> None:
         np.testing.assert_allclose(shifts[60 * 10**9], [[x, y, 0]], atol=1e-6)
         half = run[angle][60] / 2
         np.testing.assert_allclose(turns[60 * 10**9], [[0, 0, np.sin(half), np.cos(half)]], atol=1e-6)
+
+
+def test_what_joints_add_to_bodies_moves_with_them(tmp_path: Path) -> None:
+    path = tmp_path / "rack.rrd"
+    mechanism = kinfmu.load("rack_steering")
+    write_rrd(kinfmu.solve(mechanism, np.linspace(0.0, 0.5, 6)), path)
+    found = {entity for entity in entities(path) if entity.startswith("/linkage/bodies")}
+    assert {f"/linkage/bodies/{part}/mesh" for part in ("rack/rack", "pinion/wheel", "pinion/spoke")} <= found
+    (teeth,) = statics(path, "/linkage/bodies/rack/rack/mesh", STRIPS)
+    (rim,) = statics(path, "/linkage/bodies/pinion/wheel/mesh", STRIPS)
+    assert 0.0 < np.ptp(np.array(teeth)[:, 1]) < np.ptp(np.array(rim)[:, 1])
 
 
 def test_a_gap_breaks_the_curves_and_turns_the_linkage_grey(run_with_gap: Run, tmp_path: Path) -> None:
