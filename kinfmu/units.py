@@ -8,6 +8,7 @@ Variables are named `<body>.x .y .phi`, their rates `.vx .vy .omega`, accelerati
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
 
@@ -110,18 +111,94 @@ def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
 _DERIVATIVES = {"x": ("x", "vx", "ax"), "y": ("y", "vy", "ay"), "phi": ("phi", "omega", "alpha")}
 
 
-def derivative_name(name: str, order: int) -> str:
-    """Return 'coupler.vx' for 'coupler.x' and order 1; order 0 gives the name itself."""
-    owner, _, coordinate = name.rpartition(".")
-    return f"{owner}.{_DERIVATIVES[coordinate][order]}"
+class CoordinateName(str):
+    """The name of a coordinate, such as 'coupler.x', with the facts that it states.
+
+    It is made from these facts, so that no code reads them from the text again. It is a `str` since columns, FMU
+    variables and symbols of formulas go by this name.
+
+    Args:
+        owner: The body or the point of interest.
+        axis: 'x', 'y' or 'phi'.
+
+    Attributes:
+        owner: As given.
+        axis: As given.
+        is_angle: True for an angle [rad], False for a length.
+
+    """
+
+    __slots__ = ("axis", "is_angle", "owner")
+    owner: str
+    axis: str
+    is_angle: bool
+
+    def __new__(cls, owner: str, axis: str) -> CoordinateName:
+        name = super().__new__(cls, f"{owner}.{axis}")
+        name.owner, name.axis, name.is_angle = owner, axis, axis == "phi"
+        return name
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]  # for copies: what `__new__` takes
+        return self.owner, self.axis
+
+    def quantity(self, order: int = 0, per: str = "time") -> Quantity:
+        """Return the quantity of the coordinate, or of its derivative of an order."""
+        return Quantity("angle" if self.is_angle else "length", order, per)
+
+    def derivative(self, order: int) -> str:
+        """Return 'coupler.vx' for 'coupler.x' and order 1; order 0 gives the name itself."""
+        return f"{self.owner}.{_DERIVATIVES[self.axis][order]}" if order else self
 
 
-def quantity_of(name: str, order: int = 0, per: str = "time") -> Quantity:
-    """Return the quantity of a coordinate such as 'coupler.x' or 'coupler.phi', or of its derivative."""
-    return Quantity("angle" if name.endswith(".phi") else "length", order, per)
+class InputName(str):
+    """The name of an input, such as 'crank_angle' or 'crank_speed', with the facts that it states.
+
+    Args:
+        driver: The driver.
+        noun: What the driver drives: 'angle', 'position' or 'length'.
+        order: 0 for the value, 1 for its speed, 2 for its acceleration.
+
+    Attributes:
+        driver: As given.
+        noun: As given.
+        quantity: The quantity of the input.
+
+    """
+
+    __slots__ = ("driver", "noun", "quantity")
+    driver: str
+    noun: str
+    quantity: Quantity
+
+    def __new__(cls, driver: str, noun: str, order: int = 0) -> InputName:
+        name = super().__new__(cls, f"{driver}_{(noun, 'speed', 'acceleration')[order]}")
+        name.driver, name.noun = driver, noun
+        name.quantity = Quantity("angle" if noun == "angle" else "length", order)
+        return name
+
+    def __getnewargs__(self) -> tuple[str, str, int]:  # type: ignore[override]  # for copies: what `__new__` takes
+        return self.driver, self.noun, self.quantity.order
+
+    def derivative(self, order: int) -> InputName:
+        """Return the input of the same driver for its value, speed or acceleration."""
+        return InputName(self.driver, self.noun, order)
 
 
-def is_coordinate(name: str) -> bool:
-    """Return True for a name such as 'coupler.x'."""
-    owner, _, coordinate = name.rpartition(".")
-    return bool(owner) and coordinate in _DERIVATIVES
+VariableName = CoordinateName | InputName  # what has a derivative with a name of its own
+
+
+def read_coordinate(text: str) -> CoordinateName | None:
+    """Return the coordinate that a name in a file states; None if the text is no such name."""
+    owner, _, axis = text.rpartition(".")
+    return CoordinateName(owner, axis) if owner and axis in _DERIVATIVES else None
+
+
+def read_inputs(texts: Sequence[str]) -> tuple[InputName, ...] | None:
+    """Return the inputs that names in a file state, three for each driver; None if the texts are no such names."""
+    inputs: list[InputName] = []
+    for value in texts[::3]:
+        driver, _, noun = value.rpartition("_")
+        if not driver or noun not in ("angle", "position", "length"):
+            return None
+        inputs += [InputName(driver, noun, order) for order in range(3)]
+    return tuple(inputs) if inputs == list(texts) else None

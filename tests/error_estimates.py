@@ -23,7 +23,7 @@ from kinfmu import AngleDriver, ConstantSpeed, Mechanism, SlideDriver
 from kinfmu.drivers import Driver
 from kinfmu.plan import compile_plan
 from kinfmu.run import Run
-from kinfmu.units import derivative_name
+from kinfmu.units import read_coordinate
 from tests.gallery import geometry
 from tests.gallery.references import REFERENCES
 from tests.power_series import Series, mp
@@ -103,10 +103,12 @@ def compared(family: str, place: str, run: Run, size: float, exact: Sequence[Exa
         for order in range(3):
             error = scale = mp.zero
             for name, series in motion.items():
-                unit = 1 if name.endswith(".phi") else mp.mpf(size)
+                coordinate = read_coordinate(name)
+                assert coordinate is not None
+                unit = 1 if coordinate.is_angle else mp.mpf(size)
                 value = mp.factorial(order) * series.c[order]
-                gap = mp.mpf(float(run[derivative_name(name, order)][k])) - value
-                if name.endswith(".phi") and order == 0:
+                gap = mp.mpf(float(run[coordinate.derivative(order)][k])) - value
+                if coordinate.is_angle and order == 0:
                     gap -= 2 * mp.pi * mp.nint(gap / (2 * mp.pi))
                     value = mp.mpf(float(run[name][k]))  # with the turns kept
                 error, scale = max(error, abs(gap) / unit), max(scale, abs(value) / unit)

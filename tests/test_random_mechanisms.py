@@ -22,7 +22,7 @@ import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, PointOnLine, Revolute, Run, SlideDriver, Translational
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from kinfmu.units import derivative_name
+from kinfmu.units import read_coordinate
 from tests.gallery import geometry
 from tests.oracle import mp
 from tests.power_series import Series, sqrt
@@ -416,7 +416,9 @@ def _assert_close(run: Run, exact: Mapping[str, list[Any]], order: int, least: f
     """Columns of a kind agree; `least` is their largest magnitude where they stand still."""
     largest = max(least, *(abs(value) for column in exact.values() for value in column))
     for name, column in exact.items():
-        for ours, value in zip(run[derivative_name(name, order)], column, strict=True):
+        coordinate = read_coordinate(name)
+        assert coordinate is not None
+        for ours, value in zip(run[coordinate.derivative(order)], column, strict=True):
             gap = mp.mpf(float(ours)) - value
             if name.endswith(".phi") and order == 0:
                 gap -= 2 * mp.pi * mp.nint(gap / (2 * mp.pi))

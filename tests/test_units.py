@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from fractions import Fraction
 
@@ -9,15 +10,17 @@ import pytest
 
 from kinfmu.units import (
     METRES,
+    CoordinateName,
+    InputName,
     Quantity,
-    derivative_name,
     display_units,
     every_unit,
     factors,
     in_turns,
     looks_like_degrees,
     quantity_in,
-    quantity_of,
+    read_coordinate,
+    read_inputs,
     unit_of,
 )
 
@@ -108,13 +111,51 @@ def test_display_units_are_degrees_and_millimetres() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "rate", "acceleration"),
-    [("a.x", "a.vx", "a.ax"), ("a.y", "a.vy", "a.ay"), ("a.phi", "a.omega", "a.alpha")],
+    ("axis", "names"),
+    [("x", ["a.x", "a.vx", "a.ax"]), ("y", ["a.y", "a.vy", "a.ay"]), ("phi", ["a.phi", "a.omega", "a.alpha"])],
 )
-def test_rates_and_accelerations_have_names_of_their_own(name: str, rate: str, acceleration: str) -> None:
-    assert [derivative_name(name, order) for order in range(3)] == [name, rate, acceleration]
+def test_rates_and_accelerations_have_names_of_their_own(axis: str, names: list[str]) -> None:
+    assert [CoordinateName("a", axis).derivative(order) for order in range(3)] == names
 
 
-def test_what_a_coordinate_measures_follows_from_its_name() -> None:
-    assert quantity_of("crank.phi", 1) == Quantity("angle", 1)
-    assert quantity_of("phi.x") == Quantity("length")
+def test_a_coordinate_is_made_of_its_owner_and_its_axis() -> None:
+    angle, length = CoordinateName("crank", "phi"), CoordinateName("phi", "x")
+    assert (angle, length) == ("crank.phi", "phi.x")
+    assert (angle.is_angle, length.is_angle) == (True, False)
+    assert (angle.quantity(1), length.quantity()) == (Quantity("angle", 1), Quantity("length"))
+    assert str(angle) == f"{angle}" == "crank.phi"
+    assert repr((angle,)) == "('crank.phi',)"
+
+
+def test_an_input_is_made_of_its_driver_and_its_noun() -> None:
+    value = InputName("crank", "angle")
+    assert [value.derivative(order) for order in range(3)] == ["crank_angle", "crank_speed", "crank_acceleration"]
+    assert [value.derivative(order).quantity for order in range(3)] == [Quantity("angle", order) for order in range(3)]
+    assert InputName("ram", "length", 1).quantity == Quantity("length", 1)
+
+
+@pytest.mark.parametrize("name", [CoordinateName("crank", "phi"), InputName("ram", "length", 2)])
+def test_a_copied_name_keeps_its_facts(name: CoordinateName | InputName) -> None:
+    for copied in (copy.copy(name), copy.deepcopy(name)):
+        assert type(copied) is type(name)
+        assert copied == name
+        assert copied.derivative(1) == name.derivative(1)
+
+
+def test_names_in_files_become_values() -> None:
+    coordinate = read_coordinate("coupler.x")
+    assert coordinate is not None
+    assert (coordinate.owner, coordinate.axis) == ("coupler", "x")
+    assert [read_coordinate(text) for text in ("x", ".x", "coupler.z", "coupler.vx")] == [None] * 4
+    inputs = read_inputs(["big_ram_length", "big_ram_speed", "big_ram_acceleration"])
+    assert inputs is not None
+    assert {name.driver for name in inputs} == {"big_ram"}
+    assert read_inputs([]) == ()
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [["crank_angle"], ["crank_angle", "crank_speed", "rod_acceleration"], ["_angle", "_speed", "_acceleration"]],
+)
+def test_texts_that_are_no_inputs_are_recognized(texts: list[str]) -> None:
+    assert read_inputs(texts) is None

@@ -19,6 +19,8 @@ from kinfmu.errors import AmbiguousStartError, AssemblyError, KinfmuError, liste
 from kinfmu.mechanism import Mechanism, Point, Start
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.anchor import find_anchor
+from kinfmu.plan.origin import in_world, relative_to
+from kinfmu.units import CoordinateName
 
 MOST = 64  # assemblies after which the search ends
 _SEED = 1989
@@ -58,7 +60,7 @@ class Assemblies:
     mechanism: Mechanism
     drivers: Mapping[str, float] = field(hash=False)
     found: tuple[Assembly, ...]
-    distinguished_by: tuple[str, ...]
+    distinguished_by: tuple[CoordinateName, ...]
     is_complete: bool
 
     def as_json(self) -> dict[str, Any]:
@@ -125,7 +127,7 @@ def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
     model, rng = load_model(plan), np.random.default_rng(_SEED)
     u, anchor = model.ANCHOR
     scales = np.array(model.UNKNOWN_SCALES, dtype=float)
-    is_angle = np.array([name.endswith(".phi") for name in model.UNKNOWNS], dtype=bool)
+    is_angle = np.array(model.UNKNOWN_IS_ANGLE, dtype=bool)
     rest = (0.0,) * len(anchor)
     known = [np.array(anchor, dtype=float)]
     poses = [_pose(plan, model, model.position(u, anchor, rest, rest, -0.0)[-1])]
@@ -159,21 +161,19 @@ def _poses(plan: SolvePlan) -> tuple[list[FloatArray], bool]:
 def _pose(plan: SolvePlan, model: Any, values: tuple[float, ...]) -> FloatArray:
     """Return all coordinates in the mechanism's order, relative to the plan's origin, angles within half a turn."""
     at = {**plan.fixed, **dict(zip(plan.outputs, model.outputs(values), strict=True))}
-    offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
     names = plan.mechanism.coordinate_names
-    q = np.array([at[name] - offset[name.rpartition(".")[2]] for name in names])
-    return _reduced(names, q)
+    return _reduced(names, relative_to(plan.origin, names, at))
 
 
-def _reduced(names: Sequence[str], q: FloatArray) -> FloatArray:
+def _reduced(names: Sequence[CoordinateName], q: FloatArray) -> FloatArray:
     """Return the pose with angles within half a turn."""
-    turned = [name.endswith(".phi") for name in names]
+    turned = [name.is_angle for name in names]
     return np.where(turned, np.remainder(q + math.pi, math.tau) - math.pi, q)
 
 
 def _apart(plan: SolvePlan, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the distance of two poses in each coordinate, modulo whole turns [rad, sizes], (n,)."""
-    turned = np.array([name.endswith(".phi") for name in plan.mechanism.coordinate_names])
+    turned = np.array([name.is_angle for name in plan.mechanism.coordinate_names])
     around = np.abs(np.remainder(b - a + math.pi, math.tau) - math.pi)
     return np.where(turned, around, np.abs(b - a) / plan.size)
 
@@ -182,12 +182,12 @@ def _distance(plan: SolvePlan, a: FloatArray, b: FloatArray) -> float:
     return float(_apart(plan, a, b).max(initial=0.0))
 
 
-def _distinguishing(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[str, ...]:
+def _distinguishing(plan: SolvePlan, poses: Sequence[FloatArray]) -> tuple[CoordinateName, ...]:
     """Return few coordinates, angles first, of which at least one differs between any two poses."""
     names = plan.mechanism.coordinate_names
     open_pairs = [_apart(plan, a, b) for k, a in enumerate(poses) for b in poses[k + 1 :]]
-    order = sorted(range(len(names)), key=lambda k: not names[k].endswith(".phi"))
-    chosen: list[str] = []
+    order = sorted(range(len(names)), key=lambda k: not names[k].is_angle)
+    chosen: list[CoordinateName] = []
     while open_pairs:
         seen = {k: sum(float(pair[k]) > _APART for pair in open_pairs) for k in order}
         best = max(order, key=lambda k: seen[k])
@@ -292,10 +292,8 @@ def _moved_to(system: System, assembled: Assembled, u: FloatArray) -> FloatArray
 
 def _named(plan: SolvePlan, pose: FloatArray) -> dict[str, float]:
     """Return all coordinates by name, in the world."""
-    offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
     names = plan.mechanism.coordinate_names
-    reduced = _reduced(names, pose).tolist()
-    return {name: value + offset[name.rpartition(".")[2]] for name, value in zip(names, reduced, strict=True)}
+    return dict(zip(names, in_world(plan.origin, _reduced(names, pose)).tolist(), strict=True))
 
 
 def _rounded(named: Mapping[str, float], body: str) -> Start:
@@ -327,7 +325,7 @@ def _some_pose(mechanism: Mechanism) -> FloatArray:
 
 def _in_world(mechanism: Mechanism, q: FloatArray) -> FloatArray:
     _, origin = localized(mechanism)
-    return np.asarray(q + np.tile([origin.x, origin.y, 0.0], len(q) // 3))
+    return in_world(origin, q)
 
 
 def _assemble_from_random_starts(mechanism: Mechanism) -> FloatArray | None:
@@ -371,8 +369,8 @@ def _lines(assemblies: Assemblies) -> Iterator[str]:
             yield f"              {how} [bodies.{body}] start{_start(given[body], start)}"
 
 
-def _value(name: str, value: float, unit: str) -> str:
-    return f"{name} {degrees(value)}" if name.endswith(".phi") else f"{name} {value:.6g} {unit}"
+def _value(name: CoordinateName, value: float, unit: str) -> str:
+    return f"{name} {degrees(value)}" if name.is_angle else f"{name} {value:.6g} {unit}"
 
 
 def _start(given: Start, start: Start) -> str:

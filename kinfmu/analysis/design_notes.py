@@ -113,9 +113,9 @@ def _still_bodies(mechanism: Mechanism, paths: Sequence[DriverPath]) -> Iterator
         for pose in path.poses[1:]:
             now = path.coordinates(pose)
             moves |= {
-                name.rpartition(".")[0]
-                for name, value in now.items()
-                if abs(value - first[name]) > _STILL * (1.0 if name.endswith(".phi") else size)
+                name.owner
+                for name in path.plan.outputs
+                if abs(now[name] - first[name]) > _STILL * (1.0 if name.is_angle else size)
             }
     welded = _welded(mechanism)
     still = [body.name for body in mechanism.moving_bodies if body.name not in moves and body.name not in welded]

@@ -49,7 +49,7 @@ class DriverPath:
 
     def speeds(self, pose: Pose) -> dict[str, float]:
         """Return the rates of all coordinates per unit of the driver, by name."""
-        rates = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
+        rates: dict[str, float] = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
         return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
@@ -142,7 +142,7 @@ def _turned(solver: Solver, plan: SolvePlan, path: float) -> tuple[_Leg, int | N
 def _is_back(plan: SolvePlan, before: tuple[float, ...], after: tuple[float, ...]) -> bool:
     """Return True if two poses are equal modulo whole turns."""
     for name, a, b in zip(plan.outputs, before, after, strict=True):
-        apart = math.remainder(b - a, math.tau) if name.endswith(".phi") else (b - a) / plan.size
+        apart = math.remainder(b - a, math.tau) if name.is_angle else (b - a) / plan.size
         if abs(apart) > _REPEATS:
             return False
     return True

@@ -17,6 +17,7 @@ from kinfmu.errors import KinfmuError, MobilityError, listed
 from kinfmu.joints import Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.units import CoordinateName
 
 _SAMPLES = 4  # poses of the motion that the joints allow; a row dependent at all of them is dependent
 _IN_SPAN = 1e-7  # part of a gradient outside the span of the others; smaller counts as zero
@@ -56,13 +57,13 @@ class DriverAdvice:
 
     missing: int
     surplus: tuple[SurplusDriver, ...]
-    loose: tuple[str, ...]
+    loose: tuple[CoordinateName, ...]
     suggestions: tuple[Suggestion, ...]
 
     @property
     def loose_bodies(self) -> tuple[str, ...]:
         """Names of the bodies with a loose coordinate."""
-        return tuple(dict.fromkeys(name.rpartition(".")[0] for name in self.loose))
+        return tuple(dict.fromkeys(name.owner for name in self.loose))
 
 
 def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None:

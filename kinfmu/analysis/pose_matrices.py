@@ -17,6 +17,7 @@ from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import listed
 from kinfmu.plan import SolvePlan, localized
+from kinfmu.plan.origin import relative_to
 from kinfmu.sweep import solve
 
 SMALL_TURN = math.radians(1.0)  # [rad]; enough to restore the rank near a singular point
@@ -59,7 +60,6 @@ def _pose(system: System, plan: SolvePlan, value: float) -> FloatArray | None:
         asked: dict[str, Any] = {driver.inputs[0]: [value + nearer]}
         run = solve(plan, **asked)
         if run.good[0]:
-            offset = {"x": plan.origin.x, "y": plan.origin.y, "phi": 0.0}
-            q = np.array([run[name][0] - offset[name.rpartition(".")[2]] for name in system.coordinates])
+            q = relative_to(plan.origin, system.coordinates, {name: run[name][0] for name in system.coordinates})
             return q if nearer == 0.0 else close(system, q, np.array([value]))[0]
     return None

@@ -11,6 +11,7 @@ import numpy as np
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.equations.system import System
 from kinfmu.plan import localized
+from kinfmu.plan.origin import relative_to
 from kinfmu.solver.python import Pose
 from kinfmu.solver.python.bridge import Bridge
 from kinfmu.solver.python.limit import NO_BLOCK, Limit
@@ -166,7 +167,7 @@ _MOVES = 1e-3  # of the largest motion; a body that moves less is fixed
 _MOST_COORDINATES = 600  # coordinates; the singular values of more take too long
 
 
-def parting(path: DriverPath, at_limit: dict[str, float]) -> tuple[str, ...]:
+def parting(path: DriverPath, at_limit: Mapping[str, float]) -> tuple[str, ...]:
     """Return the bodies that move in the null direction of Phi_q at a limit pose, in file order.
 
     at_limit: all coordinates by name. Empty for large mechanisms.
@@ -175,8 +176,7 @@ def parting(path: DriverPath, at_limit: dict[str, float]) -> tuple[str, ...]:
         return ()
     local, origin = localized(path.plan.mechanism)
     system = System(local)
-    offset = {"x": origin.x, "y": origin.y, "phi": 0.0}
-    q = np.array([at_limit[name] - offset[name.rpartition(".")[2]] for name in system.coordinates])
+    q = relative_to(origin, system.coordinates, at_limit)
     free = np.linalg.svd(system.scaled_jacobian(q))[2][-1]  # (n,)
     moves = np.abs(free).reshape(-1, 3).max(axis=1)
     return tuple(

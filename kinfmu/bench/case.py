@@ -19,7 +19,7 @@ from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector
 from kinfmu.sweep import run_times
-from kinfmu.units import derivative_name
+from kinfmu.units import CoordinateName
 
 STEPS_BETWEEN = 5  # steps of a sweep from one sample of the reference to the next
 
@@ -50,7 +50,7 @@ class Case:
         return self.plan.mechanism
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def columns(self) -> tuple[CoordinateName, ...]:
         """Names of the generalized coordinates."""
         return self.plan.outputs
 
@@ -93,9 +93,7 @@ def of_gallery(name: str) -> Case:
     plan = compile_plan(plan.mechanism, plan.outputs[: plan.coordinate_count])
     with (gallery.folder() / name / "reference.csv").open(encoding="utf-8", newline="") as file:
         reference = list(csv.DictReader(file))
-    exact = np.array(
-        [[[float(row[derivative_name(c, k)]) for c in plan.outputs] for k in range(3)] for row in reference]
-    )
+    exact = np.array([[[float(row[c.derivative(k)]) for c in plan.outputs] for k in range(3)] for row in reference])
     times = [float(row["time"]) for row in reference]
     grid = run_times(plan.mechanism.run).tolist()
     first, second = grid.index(times[0]), grid.index(times[1])
@@ -122,10 +120,10 @@ def along_driver(
     return Case(name, plan, list(u), [(value,) for value in u], ones, none, list(known), exact, scale)
 
 
-def _scale(names: Sequence[str], exact: FloatArray) -> FloatArray:
+def _scale(names: Sequence[CoordinateName], exact: FloatArray) -> FloatArray:
     """(3, m) the largest magnitude of each column; where it is zero all along that of its kind, else 1."""
     largest: FloatArray = np.abs(exact).max(axis=0)
-    angles = np.array([name.endswith(".phi") for name in names])
+    angles = np.array([name.is_angle for name in names])
     for order in range(3):
         for kind in (angles, ~angles):
             of_kind = largest[order, kind].max(initial=0.0)

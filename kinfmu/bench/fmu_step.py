@@ -15,7 +15,7 @@ from kinfmu.bench.rounds import in_turn, spread
 from kinfmu.errors import FmuError
 from kinfmu.fmu.build import build
 from kinfmu.mechanism import Mechanism
-from kinfmu.units import derivative_name
+from kinfmu.units import read_coordinate
 
 STEPS = 720  # in a round, of one degree each: whole turns
 ROUNDS = 60
@@ -44,8 +44,8 @@ def _fifteen(fmu: Path) -> list[str]:
     from fmpy import read_model_description
 
     names = [v.name for v in read_model_description(str(fmu)).modelVariables if v.causality == "output"]
-    first = [name for name in names if name.rpartition(".")[2] in ("x", "y", "phi")][:5]
-    return [derivative_name(name, order) for order in range(3) for name in first]
+    first = list(filter(None, map(read_coordinate, names)))[:5]
+    return [name.derivative(order) for order in range(3) for name in first]
 
 
 def _toy(folder: Path) -> Path:

@@ -18,7 +18,6 @@ from kinfmu.fmu import description
 from kinfmu.fmu.build import build
 from kinfmu.fmu.native.archive import OPTIMIZED
 from kinfmu.mechanism import Mechanism
-from kinfmu.units import derivative_name
 
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40
@@ -80,8 +79,8 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], No
         library.fmi3EnterInitializationMode(instance, ctypes.c_bool(False), zero, zero, ctypes.c_bool(False), zero)
     library[f"{prefix}ExitInitializationMode"](instance)
     references = about.interface.value_references()
-    first = [variable.name for variable in about.interface.part("values")][:5]
-    outputs = [references[derivative_name(name, order)] for order in range(3) for name in first]
+    motion = [about.interface.part(part)[:5] for part in ("values", "rates", "accelerations")]
+    outputs = [references[variable.name] for variables in motion for variable in variables]
     return _rounds(fmi, library, instance, outputs), seconds
 
 

@@ -7,7 +7,7 @@ thousand loops is a run of a thousand units, with a table of what differs from o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
@@ -15,9 +15,7 @@ from typing import NamedTuple
 from kinfmu.equations.graph import Graph, Node, reachable, symbols
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
-from kinfmu.units import derivative_name
-
-RateOf = Callable[[str, int], str]  # name of a coordinate's or driver value's derivative of an order
+from kinfmu.units import CoordinateName, VariableName
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +32,7 @@ class Kind:
     constants: int
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[CoordinateName, ...]:
         return tuple(name for block in self.blocks for name in block.coordinates)
 
     @property
@@ -50,9 +48,9 @@ class Kind:
 class UnitMember(NamedTuple):
     """What a unit has for the names of its kind: symbols from outside, numbers, and its own coordinates."""
 
-    given: tuple[str, ...]
+    given: tuple[VariableName, ...]
     constants: tuple[float, ...]
-    own: tuple[str, ...]
+    own: tuple[CoordinateName, ...]
 
 
 class UnitRun(NamedTuple):
@@ -74,10 +72,10 @@ class _Form(NamedTuple):
 _Unit = tuple[Block, ...]
 
 
-def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[UnitRun]:
+def runs_of(blocks: Sequence[Block]) -> list[UnitRun]:
     """Return the blocks, in their order, as runs; units of equal formulas share a kind also in different runs."""
     units = _units(blocks)
-    forms = [_form(unit, rate_of) for unit in units]
+    forms = [_form(unit) for unit in units]
     of_text: dict[tuple[object, ...], list[int]] = {}
     for k, form in enumerate(forms):
         of_text.setdefault(form.text, []).append(k)
@@ -87,7 +85,7 @@ def runs_of(blocks: Sequence[Block], rate_of: RateOf) -> list[UnitRun]:
         table = zip(*(forms[k].member.constants for k in numbers), strict=True)
         differs[text] = [len(set(column)) > 1 for column in table]
         first = numbers[0]
-        kinds[text] = _kind(f"_{len(kinds) + 1}", units[first], forms[first], differs[text], rate_of, len(numbers))
+        kinds[text] = _kind(f"_{len(kinds) + 1}", units[first], forms[first], differs[text], len(numbers))
     runs, solved = [], 0
     for text, row in groupby(forms, key=lambda form: form.text):
         members = []
@@ -116,7 +114,7 @@ def _continues(head: Block, block: Block) -> bool:
     name, motion = block.assigned[0]
     if head.unknowns:
         return any(symbol.name in head.unknowns for symbol in symbols(motion[:1]))
-    return name.rpartition(".")[0] == head.assigned[0][0].rpartition(".")[0]
+    return name.owner == head.assigned[0][0].owner
 
 
 def positions(blocks: Sequence[Block]) -> Iterator[Sequence[Node]]:
@@ -137,17 +135,22 @@ def _groups(unit: _Unit) -> Iterator[Sequence[Node]]:
         yield block.acceleration
 
 
-def _form(unit: _Unit, rate_of: RateOf) -> _Form:
+def _variable(symbol: Node) -> VariableName:
+    """Return the coordinate or the input of a symbol; the rows of a plan hold no others but parameters."""
+    return symbol.value  # type: ignore[return-value]  # a CoordinateName or an InputName
+
+
+def _form(unit: _Unit) -> _Form:
     coordinates = tuple(name for block in unit for name in block.coordinates)
-    own = {name: f"own{k}{name[name.rindex('.') :]}" for k, name in enumerate(coordinates)}
+    own = {name: CoordinateName(f"own{k}", name.axis) for k, name in enumerate(coordinates)}
     roots = [list(group) for group in _groups(unit)]
     nodes = reachable([node for group in roots for node in group])
     number = {node: k for k, node in enumerate(nodes)}
     met = symbols([node for group in positions(unit) for node in group])
-    given = tuple(node.name for node in met if node.name not in own and not is_parameter(node))
+    given = tuple(_variable(node) for node in met if node.name not in own and not is_parameter(node))
     new_name = {
-        rate_of(name, order): f"{canonical}{order}"
-        for name, canonical in [*own.items(), *((name, f"given{k}") for k, name in enumerate(given))]
+        name.derivative(order): f"{canonical}{order}"
+        for name, canonical in (*own.items(), *((name, f"given{k}") for k, name in enumerate(given)))
         for order in range(3)
     }
     lines: list[object] = []
@@ -169,14 +172,18 @@ def _form(unit: _Unit, rate_of: RateOf) -> _Form:
     return _Form(tuple(lines), nodes, UnitMember(given, tuple(constants), coordinates))
 
 
-def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of: RateOf, units: int) -> Kind:
+def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], units: int) -> Kind:
     own, given = form.member.own, form.member.given
     if units == 1:
-        return Kind(label, unit, tuple((name, rate_of(name, 1), rate_of(name, 2)) for name in given), 0)
+        return Kind(label, unit, tuple((name, name.derivative(1), name.derivative(2)) for name in given), 0)
     graph = Graph()
-    names = {name: f"own{k}{name[name.rindex('.') :]}" for k, name in enumerate(own)}
-    names |= {name: f"given{k}.phi" for k, name in enumerate(given)}
-    new_name = {rate_of(name, k): derivative_name(new, k) for name, new in names.items() for k in range(3)}
+    names = {name: CoordinateName(f"own{k}", name.axis) for k, name in enumerate(own)}
+    of_given: dict[VariableName, CoordinateName] = {
+        name: CoordinateName(f"given{k}", "phi") for k, name in enumerate(given)
+    }
+    new_name = {
+        name.derivative(k): new.derivative(k) for name, new in (*names.items(), *of_given.items()) for k in range(3)
+    }
     new: dict[Node, Node] = {}
     is_own = iter(differs)
     count = 0
@@ -192,11 +199,11 @@ def _kind(label: str, unit: _Unit, form: _Form, differs: Sequence[bool], rate_of
         else:
             new[node] = graph.copy(node, *(new[arg] for arg in node.args))
     renamed = tuple(_renamed(block, names, new) for block in unit)
-    outside = tuple((new_name[name], new_name[rate_of(name, 1)], new_name[rate_of(name, 2)]) for name in given)
+    outside = tuple((new_name[name], new_name[name.derivative(1)], new_name[name.derivative(2)]) for name in given)
     return Kind(label, renamed, outside, count)
 
 
-def _renamed(block: Block, names: dict[str, str], new: dict[Node, Node]) -> Block:
+def _renamed(block: Block, names: dict[CoordinateName, CoordinateName], new: dict[Node, Node]) -> Block:
     return Block(
         assigned=tuple((names[name], tuple(new[node] for node in motion)) for name, motion in block.assigned),  # type: ignore[misc]
         unknowns=tuple(names[name] for name in block.unknowns),

@@ -14,7 +14,7 @@ from kinfmu.equations.graph import Node
 from kinfmu.measures import DistanceBetween
 from kinfmu.plan import Block, SolvePlan
 from kinfmu.plan.trace import is_parameter, parameter_symbol
-from kinfmu.units import derivative_name
+from kinfmu.units import VariableName
 
 LISTS = ("x", "x1", "x2")  # coordinates, their rates, their accelerations
 
@@ -44,20 +44,17 @@ class Lists:
 
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
-        self._rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
-        self.runs = runs_of(plan.blocks, self.rate_of)
+        self.runs = runs_of(plan.blocks)
         self.kinds = {run.kind.label: run.kind for run in self.runs}
         assigned = [name for block in plan.blocks for name, _ in block.assigned]
         self.given_outright = len(assigned)
-        self.order = [*plan.unknowns, *assigned, *(driver.inputs[0] for driver in plan.drivers)]
-        self.place = {name: k for k, name in enumerate(self.order)}
-        self.parameters = {parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)}
+        self.order: list[VariableName] = [*plan.unknowns, *assigned, *(driver.inputs[0] for driver in plan.drivers)]
+        self.place: dict[str, int] = {name: k for k, name in enumerate(self.order)}
+        self.parameters: dict[str, int] = {
+            parameter_symbol(parameter.name): k for k, parameter in enumerate(plan.parameters)
+        }
         _, derived = parametric(plan)
         self.derived = {node: k for k, node in enumerate(derived)}
-
-    def rate_of(self, name: str, order: int) -> str:
-        """Return the name of a derivative of a coordinate or of a driver's value."""
-        return self._rates[name][order] if name in self._rates else derivative_name(name, order)
 
     def numbered(self) -> list[tuple[int, UnitRun]]:
         """Return the runs with their numbers, from 1."""
@@ -65,7 +62,7 @@ class Lists:
 
     def places(self, order: int) -> dict[str, int]:
         """Return the place in its list of each symbol of an order."""
-        return {self.rate_of(name, order): k for name, k in self.place.items()}
+        return {name.derivative(order): k for k, name in enumerate(self.order)}
 
     def outputs(self, order: int) -> list[tuple[Node, int | None]]:
         """Return each output of an order with its place in the list, None for a formula."""

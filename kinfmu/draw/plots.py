@@ -19,7 +19,7 @@ from kinfmu.run.axis import Axis, axis_of
 from kinfmu.run.channels import coordinates
 from kinfmu.scene import palette
 from kinfmu.scene.shown import ROUND_OFF, shown_range
-from kinfmu.units import derivative_name, quantity_of, unit_of
+from kinfmu.units import CoordinateName, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
     write(path, lambda: _sheet(run, names))
 
 
-def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[str, ...]:
+def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[CoordinateName, ...]:
     """Return the names of the coordinates to plot."""
     names = coordinates(run, columns) if columns else run.names or run.outputs
     if len(names) > MOST_COORDINATES:
@@ -75,7 +75,7 @@ def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[str, ...]:
     return names
 
 
-def _sheet(run: Run, names: Sequence[str]) -> Figure:
+def _sheet(run: Run, names: Sequence[CoordinateName]) -> Figure:
     from matplotlib.figure import Figure
 
     axis = axis_of(run)
@@ -108,9 +108,9 @@ def _sheet(run: Run, names: Sequence[str]) -> Figure:
     return made
 
 
-def _panel(axes: Axes, run: Run, axis: Axis, name: str, order: int) -> None:
+def _panel(axes: Axes, run: Run, axis: Axis, name: CoordinateName, order: int) -> None:
     """Draw one curve over the whole run."""
-    column = derivative_name(name, order)
+    column = name.derivative(order)
     is_kept = column not in run.absent
     values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan) if is_kept else np.full(len(run), np.nan)
     known = values[np.isfinite(values)]
@@ -127,20 +127,19 @@ def _panel(axes: Axes, run: Run, axis: Axis, name: str, order: int) -> None:
         axes.set_ylim(*shown)
     axes.locator_params(axis="y", nbins=4)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
-    unit = unit_of(quantity_of(name, order, axis.per), run.length_unit).replace("2", "\N{SUPERSCRIPT TWO}")
-    axes.set_ylabel(f"{column.rpartition('.')[2]} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    unit = unit_of(name.quantity(order, axis.per), run.length_unit).replace("2", "\N{SUPERSCRIPT TWO}")
+    axes.set_ylabel(f"{column.removeprefix(f'{name.owner}.')} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
     if not is_kept:
         axes.text(0.5, 0.5, "not kept", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
     for first, last in _gaps(run, axis.values):
         axes.axvspan(first, last, color=ink(_LOST), linewidth=0.0, zorder=0.0)
 
 
-def _shown(run: Run, axis: Axis, name: str, order: int, known: FloatArray) -> tuple[float, float] | None:
+def _shown(run: Run, axis: Axis, name: CoordinateName, order: int, known: FloatArray) -> tuple[float, float] | None:
     """Return the range of an axis, so that noise about a constant is a straight line; None for matplotlib's default."""
     if not len(known):
         return -1.0, 1.0
-    kind = quantity_of(name).kind
-    same_kind = [k for k, other in enumerate(run.outputs) if quantity_of(other).kind == kind]
+    same_kind = [k for k, other in enumerate(run.outputs) if other.is_angle == name.is_angle]
     positions = run.values[run.good][:, same_kind]
     size = float(np.max(np.abs(positions), initial=0.0, where=np.isfinite(positions)))
     usual = size / (axis.span or 1.0) ** order

@@ -10,7 +10,7 @@ from kinfmu.laws import ConstantSpeed, Law
 from kinfmu.measures import AngleBetween, CoordinateOf, DistanceBetween, Measure, PositionAlong
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Axis, BodyName, BodyPair, Placement, PointName, PointPair
-from kinfmu.units import Quantity, Radians
+from kinfmu.units import InputName, Quantity, Radians
 
 
 class Driver(ABC):
@@ -53,9 +53,10 @@ class Driver(ABC):
         """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""
         self.law.check(f"[drivers.{self.name}]")
 
-    def inputs(self) -> tuple[str, str, str]:
+    def inputs(self) -> tuple[InputName, InputName, InputName]:
         """Return the names of the inputs for value, speed and acceleration."""
-        return f"{self.name}_{self.noun}", f"{self.name}_speed", f"{self.name}_acceleration"
+        value = InputName(self.name, self.noun)
+        return value, value.derivative(1), value.derivative(2)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import Any
 from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
+from kinfmu.units import CoordinateName
 
 Content = float | str | tuple[CurveData, int] | None
 
@@ -37,8 +38,13 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Name of a symbol."""
-        return str(self.value)
+        """Name of a symbol: a CoordinateName, an InputName, or of another kind."""
+        return self.value  # type: ignore[return-value]  # symbols hold their names
+
+    @property
+    def coordinate(self) -> CoordinateName | None:
+        """The coordinate of a symbol; None for other nodes."""
+        return self.value if isinstance(self.value, CoordinateName) else None
 
     @property
     def curve(self) -> tuple[CurveData, int]:

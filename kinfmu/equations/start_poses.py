@@ -69,6 +69,6 @@ def distance_from_start(system: System, start: StartValues, pose: FloatArray) ->
     for name, counts, value, q in zip(system.coordinates, is_given, start.q, pose, strict=True):
         if counts:
             off = float(q) - float(value)
-            off = math.remainder(off, math.tau) if name.endswith(".phi") else off / system.size
+            off = math.remainder(off, math.tau) if name.is_angle else off / system.size
             largest = max(largest, abs(off))
     return largest

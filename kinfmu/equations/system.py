@@ -70,7 +70,7 @@ class System:
         self.rows = tuple(rows)
         self.joint_row_count = len(rows) - len(mechanism.drivers)
         self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)
-        is_angle = [name.endswith(".phi") for name in self.coordinates]
+        is_angle = [name.is_angle for name in self.coordinates]
         self.column_scales: FloatArray = np.where(is_angle, 1.0, self.size)  # (n,) coordinates per unit of motion
 
     def evaluate(self, q: Sequence[Any], u: Sequence[Any]) -> list[Any]:

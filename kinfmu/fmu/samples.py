@@ -213,7 +213,7 @@ class Samples:
         if "solver.iterations" in self._absent:
             iterations[:] = 0
         interface = self._interface
-        return Run(
+        return Run.of_texts(
             t=self._t[rows].copy(),
             outputs=tuple(variable.name for variable in interface.part("values")),
             coordinate_count=interface.coordinate_count,

@@ -14,7 +14,7 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
-from kinfmu.units import Quantity, derivative_name, quantity_of, unit_of
+from kinfmu.units import CoordinateName, Quantity, unit_of
 
 SMALLEST_TOLERANCE = 1e-15  # round-off: below it no sample would be ok
 _COORDINATE_WORDS = {
@@ -163,19 +163,18 @@ def _inputs(plan: SolvePlan) -> Iterator[Variable]:
             )
 
 
-def _output(plan: SolvePlan, name: str, order: int, linear_in: tuple[str, ...]) -> Variable:
-    owner, _, coordinate = name.rpartition(".")
-    kind = "body" if owner in {body.name for body in plan.mechanism.bodies} else "point"
+def _output(plan: SolvePlan, name: CoordinateName, order: int, linear_in: tuple[str, ...]) -> Variable:
+    kind = "body" if name.owner in {body.name for body in plan.mechanism.bodies} else "point"
     drivers = plan.depends(name)
     return Variable(
-        derivative_name(name, order),
+        name.derivative(order),
         "Real",
         "output",
         "continuous",
-        f"{_COORDINATE_WORDS[coordinate][order]} of {kind} {owner} in the world",
+        f"{_COORDINATE_WORDS[name.axis][order]} of {kind} {name.owner} in the world",
         initial="calculated",
-        unit=unit_of(quantity_of(name, order), plan.mechanism.length_unit),
-        derivative_of=derivative_name(name, order - 1) if order else None,
+        unit=unit_of(name.quantity(order), plan.mechanism.length_unit),
+        derivative_of=name.derivative(order - 1) if order else None,
         dependencies=_input_names(plan, drivers, order, linear_in),
         linear_in=() if order else linear_in,
         initial_dependencies=(*_initial_names(plan, drivers, order, linear_in), *plan.parameters_of(name)),
@@ -298,18 +297,17 @@ def _parameters(plan: SolvePlan) -> Iterator[Variable]:
 
 def _fixed(plan: SolvePlan) -> Iterator[Variable]:
     """Yield the coordinates that the joints fix: constants, or values that follow from parameters."""
-    for name, value in plan.fixed.items():
-        owner, _, coordinate = name.rpartition(".")
+    for name in plan.fixed_nodes:
         parameters = plan.parameters_of(name)
         yield Variable(
             name,
             "Real",
             "calculatedParameter" if parameters else "local",
             "fixed" if parameters else "constant",
-            f"{owner}: {coordinate}, fixed by the joints",
+            f"{name.owner}: {name.axis}, fixed by the joints",
             initial="calculated" if parameters else "exact",
-            unit=unit_of(quantity_of(name), plan.mechanism.length_unit),
-            start=None if parameters else value,
+            unit=unit_of(name.quantity(), plan.mechanism.length_unit),
+            start=None if parameters else plan.fixed[name],
             initial_dependencies=parameters or None,
         )
 
@@ -337,7 +335,7 @@ def linear_inputs(plan: SolvePlan) -> dict[str, tuple[str, ...]]:
     of Newton's method count as linear in no input, even if they are.
     """
     inputs = tuple(driver.inputs[0] for driver in plan.drivers)
-    known = {name: _Dependence(frozenset((name,)), frozenset()) for name in inputs}
+    known: dict[str, _Dependence] = {name: _Dependence(frozenset((name,)), frozenset()) for name in inputs}
     for block in plan.blocks:
         known |= dict.fromkeys(block.unknowns, _Dependence(frozenset(), frozenset(inputs)))
         for name, motion in block.assigned:

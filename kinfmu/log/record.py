@@ -123,20 +123,20 @@ def run_of(
 
 def _empty(about: Mapping[str, Any], n: int) -> Run:
     """Return a run of n samples that are not filled in yet; columns that were not kept hold NaN."""
-    outputs, inputs, watches = (tuple(about[key]) for key in ("outputs", "input_names", "watch_names"))
+    outputs, inputs, watches = (about[key] for key in ("outputs", "input_names", "watch_names"))
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
     blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
     blank["inputs"] = np.zeros((n, len(inputs)))  # they are read before they are filled
     blank |= {name: np.empty(n) for name in ("residual", "margin")}
     blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
-    empty = Run(
+    empty = Run.of_texts(
         t=np.empty(n),
         outputs=outputs,
         coordinate_count=about["coordinate_count"],
         fixed=about["fixed"],
         input_names=inputs,
-        watch_names=watches,
+        watch_names=tuple(watches),
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
         axis=about["axis"],

@@ -11,11 +11,10 @@ from kinfmu.errors import LogError, listed
 from kinfmu.mechanism.valid import is_line, quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.axis import SAMPLE, TIME
-from kinfmu.units import METRES, is_coordinate
+from kinfmu.units import METRES, read_coordinate, read_inputs
 
 MOST_COLUMNS = 500_000  # three times those of the largest mechanism
 LEVELS = ("info", "warning", "error")
-_ORDERS = ("", "_speed", "_acceleration")  # of the inputs of a driver
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}(?:\.[a-z]{1,5})?")
 
 
@@ -109,7 +108,7 @@ def _are_lines(value: Any) -> bool:
 
 
 def _are_coordinates(value: Any) -> bool:
-    return _are_lines(value) and all(_NAME.fullmatch(name) and is_coordinate(name) for name in value)
+    return _are_lines(value) and all(_NAME.fullmatch(name) and read_coordinate(name) for name in value)
 
 
 def _are_constants(value: Any) -> bool:
@@ -117,11 +116,7 @@ def _are_constants(value: Any) -> bool:
 
 
 def _are_inputs(value: Any) -> bool:
-    return (
-        _are_lines(value)
-        and len(value) % 3 == 0
-        and all(_NAME.fullmatch(name) and name.endswith(_ORDERS[k % 3]) for k, name in enumerate(value))
-    )
+    return _are_lines(value) and all(map(_NAME.fullmatch, value)) and read_inputs(value) is not None
 
 
 def _is_event(entry: Any) -> bool:

@@ -16,7 +16,7 @@ from kinfmu.log.record import is_integer, layout, tables
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import Event, Run
 from kinfmu.scene.scene import scene
-from kinfmu.units import METRES, derivative_name, quantity_of
+from kinfmu.units import METRES, CoordinateName
 
 SOURCE = "kinfmu"  # of log messages that are events of the run
 STATUS_SOURCE = "kinfmu.status"  # of log messages that follow from the samples
@@ -69,7 +69,7 @@ class JointTopic:
     def __init__(self, writer: McapWriter, run: Run, topic: str, columns: Sequence[int], orders: Sequence[int]) -> None:
         names = tuple(run.outputs[k] for k in columns)
         metres = METRES[run.length_unit]
-        self._to_si = np.array([1.0 if quantity_of(name).kind == "angle" else metres for name in names])
+        self._to_si = np.array([1.0 if name.is_angle else metres for name in names])
         self._columns = slice(None) if len(columns) == len(run.outputs) else list(columns)
         self._orders = orders
         self._writer = writer
@@ -177,10 +177,7 @@ def event_in(message: bytes, t: float) -> Event | None:
 
 def joint_topics(writer: McapWriter, run: Run) -> list[JointTopic]:
     """Return the topics /joint_states and /joint_accelerations of the columns that are kept."""
-    kept = [
-        [k for k, name in enumerate(run.outputs) if derivative_name(name, order) not in run.absent]
-        for order in range(3)
-    ]
+    kept = [[k for k, name in enumerate(run.outputs) if name.derivative(order) not in run.absent] for order in range(3)]
     topics = []
     if kept[0]:
         orders = (0, 1) if kept[0] == kept[1] else (0,)
@@ -195,7 +192,7 @@ def _joint_state(names: tuple[str, ...], with_velocity: bool) -> Template:
     return template.sequence(len(names) if with_velocity else 0).sequence(0)
 
 
-def _si_units(names: tuple[str, ...], order: int) -> str:
-    kinds = {quantity_of(name).kind for name in names}
+def _si_units(names: tuple[CoordinateName, ...], order: int) -> str:
+    kinds = {name.quantity().kind for name in names}
     per_time = ("", "/s", "/s2")[order]
     return ", ".join(unit + per_time for kind, unit in (("angle", "rad"), ("length", "m")) if kind in kinds)

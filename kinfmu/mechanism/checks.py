@@ -57,9 +57,9 @@ def check_members(mechanism: Mechanism) -> None:
         _check_references(bodies, member)
         _check_values(mechanism, member)
     for driver in mechanism.drivers:
-        for name in driver.inputs():
-            if name in mechanism.parameters:
-                raise MechanismError(f"[parameters] {name}: driver '{driver.name}' has an input of this name already")
+        for given in driver.inputs():
+            if given in mechanism.parameters:
+                raise MechanismError(f"[parameters] {given}: driver '{driver.name}' has an input of this name already")
     for name, target in mechanism.points.items():
         _check_point(bodies, f"[points] {name}", target)
         if name in bodies:
@@ -70,7 +70,7 @@ def check_members(mechanism: Mechanism) -> None:
                 f"[outputs] coordinates = {quoted(mechanism.coordinates)} must be 'moving', 'all' or a list of names"
             )
     else:
-        known = dict.fromkeys(mechanism.coordinate_names)
+        known: dict[str, None] = dict.fromkeys(mechanism.coordinate_names)
         for name in mechanism.coordinates:
             if name not in known:
                 raise MechanismError(

@@ -20,7 +20,7 @@ from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.parameters import LawConstant, Parameter, law_constants, parameter_values, with_law_constants
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.valid import quoted
-from kinfmu.units import Quantity
+from kinfmu.units import CoordinateName, Quantity
 
 COORDINATES = ("x", "y", "phi")
 
@@ -95,9 +95,9 @@ class Mechanism:
         return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
 
     @property
-    def coordinate_names(self) -> tuple[str, ...]:
+    def coordinate_names(self) -> tuple[CoordinateName, ...]:
         """All generalized coordinates x, y, phi of the moving bodies, in file order."""
-        return tuple(f"{body.name}.{c}" for body in self.moving_bodies for c in COORDINATES)
+        return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
 
     @property
     def unused_parameters(self) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def _ambiguous(system: System, start: StartValues, found: Assembled, leaving: li
     spread = np.ptp(np.array(leaving) / system.column_scales, axis=0)
     widest = int(spread.argmax())
     name, unit = system.coordinates[widest], system.mechanism.length_unit
-    values = " or ".join(_value(branch[widest], is_angle=name.endswith(".phi"), unit=unit) for branch in leaving)
+    values = " or ".join(_value(branch[widest], is_angle=name.is_angle, unit=unit) for branch in leaving)
     return AmbiguousStartError(
         f"the start pose is singular ({_at(system, start.u)}) and {len(leaving)} branches leave it: at "
         f"{_at(system, found.u)} {name} can be {values}; give a start pose near it, on the branch wanted",

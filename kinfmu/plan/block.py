@@ -13,8 +13,8 @@ from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.equations.system import System
 from kinfmu.plan.companions import BlockStructure
 from kinfmu.plan.structure import RowTracer, given_value
-from kinfmu.plan.trace import Tracer
-from kinfmu.units import derivative_name
+from kinfmu.plan.trace import Tracer, is_parameter
+from kinfmu.units import CoordinateName
 
 _DETERMINANT_SAMPLES = 48
 
@@ -32,8 +32,8 @@ class Block:
     coordinates, rates and accelerations under their contract names.
     """
 
-    assigned: tuple[tuple[str, tuple[Node, Node, Node]], ...]
-    unknowns: tuple[str, ...]
+    assigned: tuple[tuple[CoordinateName, tuple[Node, Node, Node]], ...]
+    unknowns: tuple[CoordinateName, ...]
     row_names: tuple[str, ...]
     assigned_by: tuple[str, ...]  # row that gives each assigned coordinate
     row_scales: tuple[float, ...]
@@ -45,7 +45,7 @@ class Block:
     usual: tuple[float, ...]  # of three unknowns and more: largest lengths of the rows (if tall, columns) of J
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[CoordinateName, ...]:
         return (*(name for name, _ in self.assigned), *self.unknowns)
 
     @property
@@ -61,9 +61,10 @@ class Rates:
         self.graph = tracer.graph
         self.first: dict[Node, Node] = {}
         self.both: dict[Node, Node] = {}
-        for name, symbol in tracer.symbols.items():
+        for name in tracer.mechanism.coordinate_names:
             if name not in fixed:
-                rate, acceleration = (self.graph.symbol(derivative_name(name, order)) for order in (1, 2))
+                symbol = tracer.symbols[name]
+                rate, acceleration = (self.graph.symbol(name.derivative(order)) for order in (1, 2))
                 self._add(symbol, rate, acceleration)
         for driver in tracer.mechanism.drivers:
             value, speed, acceleration = (self.graph.symbol(name) for name in driver.inputs())
@@ -159,17 +160,16 @@ def _determinant_scale(
         return 1.0, ()
     rng = np.random.default_rng(1989)
     flat = [entry for row in jacobian for entry in row]
-    values = {symbol.name: anchor[symbol.name] for symbol in symbols(flat)}
+    met = symbols(flat)
     matrices = []
     for sample in range(_DETERMINANT_SAMPLES):
-        turned = {
-            name: value
-            if sample == 0 or name.endswith(".")  # parameters keep their values
-            else rng.uniform(-np.pi, np.pi)
-            if name.endswith(".phi")
-            else value + size * rng.uniform(-0.5, 0.5)
-            for name, value in values.items()
-        }
+        turned = {}
+        for symbol in met:
+            value = anchor[symbol.name]
+            if sample > 0 and not is_parameter(symbol):
+                is_angle = symbol.coordinate is not None and symbol.coordinate.is_angle
+                value = rng.uniform(-np.pi, np.pi) if is_angle else value + size * rng.uniform(-0.5, 0.5)
+            turned[symbol.name] = value
         matrices.append(np.reshape(evaluate(flat, turned), (len(jacobian), -1)))
     m, k = matrices[0].shape
     usual: tuple[float, ...] = ()

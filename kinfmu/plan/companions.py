@@ -16,6 +16,7 @@ import numpy as np
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.system import FloatArray, System
+from kinfmu.units import CoordinateName
 
 _POSES = 64  # of the motion at which a block is looked at; with their steps, one turn each way
 _STEP = 0.2  # [rad, sizes]; between them
@@ -35,13 +36,13 @@ class BlockStructure:
     left for Newton, with their rows; companions: redundant rows solved with them by least squares.
     """
 
-    assigned: tuple[tuple[str, int], ...]
-    unknowns: tuple[str, ...]
+    assigned: tuple[tuple[CoordinateName, int], ...]
+    unknowns: tuple[CoordinateName, ...]
     rows: tuple[int, ...]
     companions: tuple[int, ...] = ()
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[CoordinateName, ...]:
         return (*(name for name, _ in self.assigned), *self.unknowns)
 
     @property
@@ -77,7 +78,7 @@ def with_companions(
     implying = _combinations(system, redundancy, pose)
     for dependent in redundancy.redundant:
         index = dependent.index
-        home = {name: k for k, block in enumerate(found) for name in block.coordinates}
+        home: dict[str, int] = {name: k for k, block in enumerate(found) for name in block.coordinates}
         met = {home[name] for name in meets(index) if name in home}
         if not met:
             continue

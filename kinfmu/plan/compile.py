@@ -18,7 +18,7 @@ from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, Motion, PlanParameter, SolvePlan, nodes_of, position_count
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
-from kinfmu.units import Quantity
+from kinfmu.units import CoordinateName, Quantity
 
 
 def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> SolvePlan:
@@ -81,7 +81,7 @@ def plan_from(
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
     parameters = _parameters(mechanism)
-    at_anchor = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
+    at_anchor: dict[str, float] = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
     at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in parameters}
     blocks = _needed(
         [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
@@ -114,35 +114,39 @@ def plan_from(
 
 def _outputs(
     mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
-) -> tuple[list[Motion], int, dict[str, Node]]:
+) -> tuple[list[Motion[CoordinateName]], int, dict[CoordinateName, Node]]:
     """Return outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":
         wanted = [name for name in mechanism.coordinate_names if name not in known]
     elif mechanism.coordinates == "all":
         wanted = list(mechanism.coordinate_names)
     else:
-        wanted = list(mechanism.coordinates)
+        of_name: dict[str, CoordinateName] = {name: name for name in mechanism.coordinate_names}
+        wanted = [of_name[name] for name in mechanism.coordinates]
 
-    def in_world(name: str, node: Node) -> Node:
-        offset = {"x": origin.x, "y": origin.y}.get(name.rpartition(".")[2], 0.0)
-        return node + offset
+    def in_world(name: CoordinateName, node: Node) -> Node:
+        return node + {"x": origin.x, "y": origin.y, "phi": 0.0}[name.axis]
 
     nodes = [(name, in_world(name, known.get(name, tracer.symbols[name]))) for name in wanted]
-    fixed = {name: in_world(name, node) for name, node in known.items() if name not in wanted}
+    still = [name for name in mechanism.coordinate_names if name in known and name not in wanted]
+    fixed = {name: in_world(name, known[name]) for name in still}
     coordinate_count = len(nodes)
     for name, target in mechanism.points.items():
-        for coordinate, node in zip(("x", "y"), tracer.point(target, known), strict=True):
+        for axis, node in zip(("x", "y"), tracer.point(target, known), strict=True):
+            coordinate = CoordinateName(name, axis)
             value = in_world(coordinate, node)
             if all(is_parameter(symbol) for symbol in symbols([value])):
-                fixed[f"{name}.{coordinate}"] = value
+                fixed[coordinate] = value
             else:
-                nodes.append((f"{name}.{coordinate}", value))
+                nodes.append((coordinate, value))
     positions = [node for _, node in nodes]
     motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
     return [Motion(*motion) for motion in motions], coordinate_count, fixed
 
 
-def _chosen(motions: Sequence[Motion], coordinate_count: int, outputs: Sequence[str]) -> tuple[list[Motion], int]:
+def _chosen(
+    motions: Sequence[Motion[CoordinateName]], coordinate_count: int, outputs: Sequence[str]
+) -> tuple[list[Motion[CoordinateName]], int]:
     known = [motion.name for motion in motions]
     if isinstance(outputs, str):
         raise RequestError(f"outputs: '{outputs}' must be a list of names, such as ['{known[0]}']")
@@ -196,7 +200,7 @@ def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...
     return tuple(found)
 
 
-def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion, ...]:
+def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion[str], ...]:
     graph = tracer.graph
     time, one = graph.symbol("time"), graph.constant(1.0)
     laws = []

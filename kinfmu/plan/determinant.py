@@ -43,7 +43,7 @@ def _harmonics(root: Node, parameters: Mapping[str, float]) -> _Terms | None:
             values[node] = {("cos", ()): float(node.constant or 0.0)}
         elif node.op == "symbol" and node.name in parameters:
             values[node] = {("cos", ()): parameters[node.name]}
-        elif node.op == "symbol" and node.name.endswith(".phi"):
+        elif node.coordinate is not None and node.coordinate.is_angle:
             angles[node] = {node.name: 1}
         elif node.op in ("sin", "cos") and node.args[0] in angles:
             values[node] = {(node.op, tuple(angles[node.args[0]].items())): 1.0}

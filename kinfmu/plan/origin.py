@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from kinfmu.equations.system import size_of
+import numpy as np
+
+from kinfmu.equations.system import FloatArray, size_of
 from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Point, Start
+from kinfmu.units import CoordinateName
 
 FAR = 4.0  # sizes from the world's origin beyond which a mechanism is planned about a ground point of its own
 
@@ -25,6 +29,17 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     if is_tied or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first
+
+
+def relative_to(origin: Point, names: Sequence[CoordinateName], values: Mapping[str, float]) -> FloatArray:
+    """Return coordinates as seen from an origin, in the order of their names; values: in the world, by name."""
+    offset = {"x": origin.x, "y": origin.y, "phi": 0.0}
+    return np.array([values[name] - offset[name.axis] for name in names])
+
+
+def in_world(origin: Point, q: FloatArray) -> FloatArray:
+    """Return all coordinates of a mechanism in the world; q: (n,) as seen from the origin."""
+    return np.asarray(q + np.tile([origin.x, origin.y, 0.0], len(q) // 3))
 
 
 def _moved(mechanism: Mechanism, dx: float, dy: float) -> Mechanism:

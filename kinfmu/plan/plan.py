@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from kinfmu.equations.assembly import Assembled
 from kinfmu.equations.graph import Node, evaluate, reachable, symbols
@@ -13,14 +13,14 @@ from kinfmu.mechanism import LawConstant, Mechanism, Point
 from kinfmu.plan.block import Block
 from kinfmu.plan.conditions import PlanCondition
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.units import Quantity
+from kinfmu.units import CoordinateName, InputName, Quantity
 
 
 class DriverInfo(NamedTuple):
     """A driver seen from outside: names of its inputs for value, speed and acceleration, and its quantity."""
 
     name: str
-    inputs: tuple[str, str, str]
+    inputs: tuple[InputName, InputName, InputName]
     quantity: Quantity
 
 
@@ -33,10 +33,13 @@ class PlanParameter(NamedTuple):
     description: str
 
 
-class Motion(NamedTuple):
-    """Something that moves: its position, rate and acceleration as nodes."""
+Name = TypeVar("Name", bound=str)
 
-    name: str
+
+class Motion(NamedTuple, Generic[Name]):
+    """Something that moves, an output or a driver: its position, rate and acceleration as nodes."""
+
+    name: Name
     position: Node
     rate: Node
     acceleration: Node
@@ -71,12 +74,12 @@ class SolvePlan:
     drivers: tuple[DriverInfo, ...]
     law_constants: tuple[LawConstant, ...]
     parameters: tuple[PlanParameter, ...]
-    laws: tuple[Motion, ...]
+    laws: tuple[Motion[str], ...]
     jumps: tuple[tuple[Node, Node], ...]
     blocks: tuple[Block, ...]
-    outputs_motion: tuple[Motion, ...]
+    outputs_motion: tuple[Motion[CoordinateName], ...]
     coordinate_count: int
-    fixed_nodes: Mapping[str, Node]
+    fixed_nodes: Mapping[CoordinateName, Node]
     watches: tuple[tuple[str, Node], ...]
     conditions: tuple[PlanCondition, ...]
     anchor: Assembled
@@ -93,17 +96,17 @@ class SolvePlan:
         return dict(zip(self.fixed_nodes, evaluate(nodes, self.parameter_values), strict=True))
 
     @property
-    def outputs(self) -> tuple[str, ...]:
+    def outputs(self) -> tuple[CoordinateName, ...]:
         """Names of the outputs: q first, then points of interest."""
         return tuple(motion.name for motion in self.outputs_motion)
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def coordinates(self) -> tuple[CoordinateName, ...]:
         """Names of the generalized coordinates q."""
         return self.outputs[: self.coordinate_count]
 
     @property
-    def unknowns(self) -> tuple[str, ...]:
+    def unknowns(self) -> tuple[CoordinateName, ...]:
         """Coordinates found by Newton, block after block."""
         return tuple(name for block in self.blocks for name in block.unknowns)
 
@@ -130,7 +133,8 @@ class SolvePlan:
         for block in self.blocks:
             scales = f"{block.row_scales} {block.determinant_scale!r} {block.usual}"
             lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in nodes_of(block)]}")
-        lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in (*self.laws, *self.outputs_motion)]
+        motions: tuple[Motion[str] | Motion[CoordinateName], ...] = (*self.laws, *self.outputs_motion)
+        lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in motions]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]
         lines += [f"condition {name} {number[node]} {required}" for name, node, required in self.conditions]
@@ -152,7 +156,7 @@ class SolvePlan:
         place = {name: k for k, name in enumerate(self.mechanism.coordinate_names)}
         z = []
         for name in self.unknowns:
-            scale = 1.0 if name.endswith(".phi") else self.size
+            scale = 1.0 if name.is_angle else self.size
             z.append(round(float(self.anchor.q[place[name]]) / scale, 11) * scale + 0.0)
         return tuple(map(float, self.anchor.u)), tuple(z)
 
@@ -194,8 +198,8 @@ class SolvePlan:
     def _behind(self) -> dict[str, frozenset[str]]:
         """Inputs and parameters, by the names of their symbols, behind each output and each fixed coordinate."""
         behind = self._behind_coordinates
-        found = {motion.name: _behind_all([motion.position], behind) for motion in self.outputs_motion}
-        return found | {name: _behind_all([node], behind) for name, node in self.fixed_nodes.items()}
+        nodes = [(motion.name, motion.position) for motion in self.outputs_motion]
+        return {name: _behind_all([node], behind) for name, node in (*nodes, *self.fixed_nodes.items())}
 
     @cached_property
     def _behind_coordinates(self) -> dict[str, frozenset[str]]:

@@ -17,6 +17,7 @@ from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import MobilityError, listed
 from kinfmu.plan.companions import BlockStructure, with_companions
 from kinfmu.plan.trace import Tracer, is_parameter
+from kinfmu.units import CoordinateName
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
     driving = range(system.joint_row_count, len(system.rows))
     open_rows = [index for index in (*kept, *driving) if index not in used]
     unknown = [name for name in system.coordinates if name not in known]
-    number = {name: k for k, name in enumerate(unknown)}
+    number: dict[str, int] = {name: k for k, name in enumerate(unknown)}
     meets = {
         index: [number[symbol.name] for symbol in symbols([row(index, known)]) if symbol.name in number]
         for index in open_rows
@@ -111,14 +112,13 @@ def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[in
         if index in used:
             continue
         free = [symbol for symbol in symbols([row(index, values)]) if not is_parameter(symbol)]
-        if len(free) != 1:
+        coordinate = free[0].coordinate if len(free) == 1 else None
+        value = None if coordinate is None else given_value(tracer, row, index, coordinate, values)
+        if coordinate is None or value is None:
             continue
-        value = given_value(tracer, row, index, free[0].name, values)
-        if value is None:
-            continue
-        values[free[0].name] = value
+        values[coordinate] = value
         used.add(index)
-        for again in touching[free[0].name.partition(".")[0]]:
+        for again in touching[coordinate.owner]:
             heapq.heappush(waiting, again)
     return {name: values[name] for name in system.coordinates if name in values}, used
 
@@ -128,15 +128,15 @@ def _with_assignments(
     row: RowTracer,
     known: Mapping[str, Node],
     rows: Sequence[int],
-    columns: Sequence[str],
+    columns: Sequence[CoordinateName],
 ) -> BlockStructure:
     """Return a block with assignments: rows that give a coordinate outright, without circles among them."""
-    needs: dict[str, set[str]] = {}  # assigned coordinate -> coordinates of the block in its row
-    assigned: dict[str, int] = {}
+    needs: dict[CoordinateName, set[CoordinateName]] = {}  # assigned coordinate -> coordinates of the block in its row
+    assigned: dict[CoordinateName, int] = {}
     for index in rows:
         traced = row(index, known)
-        inside = [symbol.name for symbol in symbols([traced]) if symbol.name in columns]
-        for name in sorted(inside, key=lambda name: (name.endswith(".phi"), columns.index(name))):
+        inside = [one.coordinate for one in symbols([traced]) if one.coordinate is not None and one.name in columns]
+        for name in sorted(inside, key=lambda name: (name.is_angle, columns.index(name))):
             if name in assigned or linear_coefficient(traced, tracer.symbols[name]) is None:
                 continue
             others = {other for other in inside if other != name}
@@ -145,7 +145,7 @@ def _with_assignments(
             assigned[name] = index
             needs[name] = others
             break
-    order: list[str] = []
+    order: list[CoordinateName] = []
     left = dict(assigned)
     while left:
         ready = [name for name in left if not needs[name] & left.keys()]
@@ -157,7 +157,7 @@ def _with_assignments(
     return BlockStructure(tuple((name, assigned[name]) for name in order), unknowns, rest)
 
 
-def _reaches(needs: Mapping[str, set[str]], start: set[str], goal: str) -> bool:
+def _reaches(needs: Mapping[CoordinateName, set[CoordinateName]], start: set[CoordinateName], goal: str) -> bool:
     """Return True if an assignment among `start` needs `goal`, directly or through others."""
     stack, seen = list(start), set(start)
     while stack:

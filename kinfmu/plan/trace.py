@@ -7,19 +7,25 @@ from collections.abc import Mapping
 from kinfmu.drivers import Driver
 from kinfmu.equations.graph import Graph, Node
 from kinfmu.joints import Joint
-from kinfmu.measures.placement import GROUND, BodyFrame, Placement
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 
 
-def parameter_symbol(name: str) -> str:
-    """Return the name of a parameter's symbol: it ends in a full stop, as no coordinate or input does."""
-    return f"{name}."
+class ParameterSymbol(str):
+    """The name of a parameter's symbol: with a full stop at its end it differs from every coordinate and input."""
+
+    __slots__ = ()
+
+
+def parameter_symbol(name: str) -> ParameterSymbol:
+    """Return the name of a parameter's symbol."""
+    return ParameterSymbol(f"{name}.")
 
 
 def is_parameter(symbol: Node) -> bool:
     """Return True for the symbol of a parameter."""
-    return symbol.name.endswith(".")
+    return isinstance(symbol.value, ParameterSymbol)
 
 
 class Tracer:
@@ -31,7 +37,7 @@ class Tracer:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
         self.graph = Graph()
-        self.symbols = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
+        self.symbols: dict[str, Node] = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
         self.targets = {driver.name: self.graph.symbol(driver.inputs()[0]) for driver in mechanism.drivers}
         own = [name for name, parameter in mechanism.parameters.items() if parameter.expression is None]
         self.members = members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in own})
@@ -50,7 +56,7 @@ class Tracer:
 
     def point(self, name: str, known: Mapping[str, Node]) -> tuple[Node, Node]:
         """World coordinates of a point 'body.point'."""
-        x, y = self._placement((name.partition(".")[0],), known).point(name)
+        x, y = self._placement((body_of(name),), known).point(name)
         return self.graph.lift(x), self.graph.lift(y)
 
     def _placement(self, bodies: tuple[str, ...], known: Mapping[str, Node]) -> Placement:
@@ -59,6 +65,6 @@ class Tracer:
             if body == GROUND_NAME:
                 poses[body] = GROUND
             else:
-                names = (f"{body}.{coordinate}" for coordinate in ("x", "y", "phi"))
+                names = (f"{body}.{axis}" for axis in ("x", "y", "phi"))
                 poses[body] = BodyFrame.of(*(known.get(name, self.symbols[name]) for name in names))
         return Placement(poses, self._points)

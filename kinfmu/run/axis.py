@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.errors import listed
-from kinfmu.units import ANGLES
+from kinfmu.units import ANGLES, InputName, unit_of
 
 FloatArray = NDArray[np.float64]
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
@@ -28,7 +28,7 @@ class HasAxis(Protocol):
     def t(self) -> FloatArray: ...
 
     @property
-    def input_names(self) -> tuple[str, ...]: ...
+    def input_names(self) -> tuple[InputName, ...]: ...
 
     @property
     def inputs(self) -> FloatArray: ...
@@ -92,7 +92,7 @@ def axis_of(run: HasAxis) -> Axis:
     if run.axis == SAMPLE:
         return Axis(SAMPLE, "", 1.0, run.t, _span(run.t), "time", _at_speeds(run), run.t)
     column = run.input_names.index(run.axis)
-    driver, kind = _driver(run.axis)
+    driver, kind = run.input_names[column].driver, run.input_names[column].quantity.kind
     inside = run.inputs[:, column]
     values, unit, factor = inside, "rad" if kind == "angle" else run.length_unit, 1.0
     if kind == "angle" and np.max(np.abs(inside), initial=0.0) < _LARGE:
@@ -117,7 +117,7 @@ def rates_per(run: HasAxis) -> str:
     moved = np.delete(run.inputs, (column, column + 1), axis=1)
     is_rate = np.delete(np.arange(len(run.input_names)) % 3 > 0, (column, column + 1))
     is_per_unit = bool(np.all(run.inputs[:, column + 1] == 1.0)) and not moved[:, is_rate].any()
-    return _driver(run.axis)[1] if is_per_unit else "time"
+    return run.input_names[column].quantity.kind if is_per_unit else "time"
 
 
 def axis_for(u: FloatArray, names: tuple[str, ...]) -> str:
@@ -136,12 +136,6 @@ def _is_monotonic(values: FloatArray) -> bool:
     return bool((before < after).all() if values[0] < values[-1] else (before > after).all())
 
 
-def _driver(name: str) -> tuple[str, str]:
-    """Return the driver of an input such as 'crank_angle', and 'angle' or 'length'."""
-    driver, _, kind = name.rpartition("_")
-    return driver, "angle" if kind == "angle" else "length"
-
-
 def _span(values: FloatArray) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
 
@@ -150,11 +144,10 @@ def _at_speeds(run: HasAxis) -> str:
     """Return 'Rates are at the speed crank = 3 rad/s.' if each driver has one speed, else that speeds were given."""
     shown = []
     for name in run.input_names[::3]:
-        driver, kind = _driver(name)
         column = run.input_names.index(name) + 1
         speeds = run.inputs[:, column]
         if len(speeds) and math.isfinite(speeds[0]) and np.all(speeds == speeds[0]):
-            shown.append(f"{driver} = {speeds[0]:.6g} {'rad' if kind == 'angle' else run.length_unit}/s")
+            shown.append(f"{name.driver} = {speeds[0]:.6g} {unit_of(name.derivative(1).quantity, run.length_unit)}")
     if len(shown) < len(run.input_names) // 3:
-        return f"Rates are at the speeds given for {listed(_driver(name)[0] for name in run.input_names[::3])}."
+        return f"Rates are at the speeds given for {listed(name.driver for name in run.input_names[::3])}."
     return f"Rates are at the speed{'s' if len(shown) > 1 else ''} {listed(shown)}."

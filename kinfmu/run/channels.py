@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
-from kinfmu.units import derivative_name
+from kinfmu.units import CoordinateName
 
 ALWAYS = ("time", "solver.status")  # without them a sample has no meaning
 DRAWN = "drawn"
@@ -104,7 +104,7 @@ def select(run: Run, channels: Sequence[str] | None = None, rate: float | None =
     return part.without(absent_columns(run, channels))
 
 
-def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
+def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
     """Return the coordinates of which `names` choose a column, in the order named.
 
     Args:
@@ -118,7 +118,7 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[str, ...]:
         RequestError: A name is unknown or chooses no coordinate.
 
     """
-    owners = {derivative_name(name, order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
+    owners = {name.derivative(order): name for order in range(3) for name in (*run.outputs, *run.fixed)}
     groups, columns = _groups(run), [place.name for place in run.places()]
     kept = dict.fromkeys(columns if names and names[0].startswith("-") else ())
     for name in names:
@@ -153,11 +153,8 @@ def _groups(run: Run) -> dict[str, set[str]]:
         "all": {*every, DRAWN},
         "none": set(),
         "inputs": set(run.input_names),
-        **{
-            group: {derivative_name(name, order) for name in run.names}
-            for order, group in enumerate(("q", "qd", "qdd"))
-        },
-        "points": {derivative_name(name, order) for name in points for order in range(3)},
+        **{group: {name.derivative(order) for name in run.names} for order, group in enumerate(("q", "qd", "qdd"))},
+        "points": {name.derivative(order) for name in points for order in range(3)},
         **{name: {f"solver.{name}"} for name in ("status", "residual", "iterations", "margin")},
         "error": {f"solver.error_{name}" for name in ("q", "qd", "qdd")},
         "watch": {f"watch.{name}" for name in run.watch_names},

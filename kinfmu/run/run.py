@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.errors import KinfmuError, MissingPackageError, suggestion
+from kinfmu.errors import KinfmuError, MissingPackageError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
-from kinfmu.units import derivative_name, quantity_of, unit_of
+from kinfmu.units import CoordinateName, InputName, read_coordinate, read_inputs, unit_of
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -105,13 +105,13 @@ class Run:
     """
 
     t: FloatArray
-    outputs: tuple[str, ...]
+    outputs: tuple[CoordinateName, ...]
     coordinate_count: int
     values: FloatArray
     rates: FloatArray
     accelerations: FloatArray
-    fixed: Mapping[str, float]
-    input_names: tuple[str, ...]
+    fixed: Mapping[CoordinateName, float]
+    input_names: tuple[InputName, ...]
     inputs: FloatArray
     status: IntArray
     iterations: IntArray
@@ -127,6 +127,29 @@ class Run:
     events: tuple[Event, ...] = ()
     absent: frozenset[str] = frozenset()
     axis: str = TIME
+
+    @classmethod
+    def of_texts(
+        cls, outputs: Iterable[str], fixed: Mapping[str, float], input_names: Sequence[str], **fields: Any
+    ) -> Run:
+        """Return the run whose names are texts, as files and FMUs hold them; fields: the others, as they are.
+
+        Raises:
+            KinfmuError: A name is no coordinate, or the inputs are not three for each driver.
+
+        """
+        coordinates = {text: read_coordinate(text) for text in (*outputs, *fixed)}
+        inputs = read_inputs(input_names)
+        wrong = [text for text, name in coordinates.items() if name is None]
+        if wrong or inputs is None:
+            raise KinfmuError(f"{listed(wrong or input_names)}: no names of {'coordinates' if wrong else 'inputs'}")
+        named = {text: name for text, name in coordinates.items() if name is not None}
+        return cls(
+            outputs=tuple(named[text] for text in outputs),
+            fixed={named[text]: value for text, value in fixed.items()},
+            input_names=inputs,
+            **fields,
+        )
 
     @cached_property
     def mechanism(self) -> Mechanism | None:
@@ -152,7 +175,7 @@ class Run:
         return toml_text.text(self.mechanism_source)
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def names(self) -> tuple[CoordinateName, ...]:
         """Names of the generalized coordinates, the columns of q."""
         return self.outputs[: self.coordinate_count]
 
@@ -235,18 +258,18 @@ class Run:
     def _places(self) -> Iterator[ColumnPlace]:
         per = rates_per(self)
         yield ColumnPlace("time", "s" if self.axis == TIME else "1", "t", None)
-        for k, name in enumerate(self.input_names):
-            yield ColumnPlace(name, self.input_unit(name), "inputs", k)
+        for k, given in enumerate(self.input_names):
+            yield ColumnPlace(given, unit_of(given.quantity, self.length_unit), "inputs", k)
         for order, table in enumerate(("values", "rates", "accelerations")):
             for k, name in enumerate(self.outputs):
-                unit = unit_of(quantity_of(name, order, per), self.length_unit)
-                yield ColumnPlace(derivative_name(name, order), unit, table, k)
-        for name in ("status", "residual", "iterations", "margin"):
-            yield ColumnPlace(f"solver.{name}", "1", name, None)
-        for k, name in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
-            yield ColumnPlace(name, "1", "error", k)
-        for k, name in enumerate(self.watch_names):
-            yield ColumnPlace(f"watch.{name}", "1", "watch", k)
+                unit = unit_of(name.quantity(order, per), self.length_unit)
+                yield ColumnPlace(name.derivative(order), unit, table, k)
+        for table in ("status", "residual", "iterations", "margin"):
+            yield ColumnPlace(f"solver.{table}", "1", table, None)
+        for k, error in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
+            yield ColumnPlace(error, "1", "error", k)
+        for k, watch in enumerate(self.watch_names):
+            yield ColumnPlace(f"watch.{watch}", "1", "watch", k)
 
     def _column(self, place: ColumnPlace) -> NDArray[Any]:
         table: NDArray[Any] = getattr(self, place.table)
@@ -281,13 +304,6 @@ class Run:
         """
         return _optional("polars").DataFrame({column.name: column.values for column in self.columns()})
 
-    def input_unit(self, name: str) -> str:
-        """Return the unit of an input such as 'crank_angle', 'crank_speed' or 'slide_position'."""
-        first = self.input_names[self.input_names.index(name) // 3 * 3]
-        kind = "angle" if first.endswith("_angle") else "length"
-        order = ("speed", "acceleration").index(name.rpartition("_")[2]) + 1 if name != first else 0
-        return unit_of(quantity_of(".phi" if kind == "angle" else ".x", order), self.length_unit)
-
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return the column of a name, (n,); of a fixed coordinate its constant, with rates of zero.
 
@@ -299,7 +315,7 @@ class Run:
             raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
         for fixed, value in self.fixed.items():
             for order in range(3):
-                if name == derivative_name(fixed, order):
+                if name == fixed.derivative(order):
                     return np.full(len(self.t), value if order == 0 else 0.0)
         names = []
         for place in self.places(kept=False):

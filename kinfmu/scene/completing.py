@@ -39,9 +39,11 @@ def recomputed(run: Run, mechanism: Mechanism) -> Mapping[str, FloatArray] | Non
         found = solve(plan, **{name: run.inputs[good, 3 * k] for k, name in enumerate(values)})
     except KinfmuError:
         return None
-    columns = {name: found[name] for name in (*plan.outputs, *plan.fixed)}
-    for name in set(run.names) & columns.keys():
-        size = 1.0 if name.endswith(".phi") else plan.size
+    columns: dict[str, FloatArray] = {name: found[name] for name in (*plan.outputs, *plan.fixed)}
+    for name in run.names:
+        if name not in columns:
+            continue
+        size = 1.0 if name.is_angle else plan.size
         if not np.all(np.abs(columns[name] - run[name][good]) <= _SAME * size):  # False for NaN
             return None
     return {name: _spread(column, good, len(run)) for name, column in columns.items()}

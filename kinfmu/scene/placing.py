@@ -14,7 +14,9 @@ def poses_of(run: Run, mechanism: Mechanism) -> tuple[dict[str, FloatArray], dic
 
     Coordinates that are not outputs of the run are recomputed, if they follow from its drivers' values.
     """
-    columns = {name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent}
+    columns: dict[str, FloatArray] = {
+        name: run.values[:, k] for k, name in enumerate(run.outputs) if name not in run.absent
+    }
     columns |= {name: np.full(len(run), value) for name, value in run.fixed.items()}
     if not columns.keys() >= set(mechanism.coordinate_names):
         columns |= recomputed(run, mechanism) or {}

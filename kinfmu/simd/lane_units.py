@@ -27,7 +27,6 @@ from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import FUNCTIONS, Node, reachable
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
-from kinfmu.units import derivative_name
 
 VECTORS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LISTED = {"sin": "sine", "cos": "cosine"}  # lists of the predicted sines and cosines
@@ -120,10 +119,11 @@ class LaneUnit:
                     lines += [] if held else self._linear(writer, block, order)
                 for name, nodes in block.assigned:
                     lines += [f"{line};" for line in writer.statements([nodes[order]])]
-                    lines.append(f"{identifier(derivative_name(name, order))} = {writer.expression(nodes[order])};")
-        names = [name for block in self.kind.blocks for name, _ in block.assigned]
-        names = names if held else list(self.kind.coordinates)
-        rates = [(derivative_name(name, order), order, self.where[name][1]) for name in names for order in (1, 2)]
+                    lines.append(f"{identifier(name.derivative(order))} = {writer.expression(nodes[order])};")
+        names = [
+            name for block in self.kind.blocks for name in (block.coordinates if not held else dict(block.assigned))
+        ]
+        rates = [(name.derivative(order), order, self.where[name][1]) for name in names for order in (1, 2)]
         lines += [f"{LISTS[order]}_{field}[i] = {identifier(name)};" for name, order, field in rates]
         return self._function(stage, "", [*self._loads(writer.used, {name for name, _, _ in rates}), *lines])
 
@@ -182,7 +182,7 @@ class LaneUnit:
         lines += [f"{line};" for line in (*evaluated, f"per_det = 1.0 / ({determinant(jacobian)})")]
         lines += [f"{one} = {text};" for one, text in zip(steps, values, strict=True)]
         for name, one in zip(block.unknowns, steps, strict=True):
-            scale = "" if name.endswith(".phi") else f" * {1.0 / self.size!r}"
+            scale = "" if name.is_angle else f" * {1.0 / self.size!r}"
             lines += [f"{identifier(name)} -= {one};", f"size = fabs({one}){scale};"]
             lines.append("lanes->moved[i] = size > lanes->moved[i] ? size : lanes->moved[i];")
             for unknown, sine, cosine in self.turning:
@@ -223,7 +223,7 @@ class LaneUnit:
         lines += [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
         if order == 1:
             lines.append(f"per_det = 1.0 / hold[{self.cached(None)}][i];")
-        z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+        z = [identifier(name.derivative(order)) for name in block.unknowns]
         jacobian = [[writer.expression(entry) if many else "" for entry in row] for row in block.jacobian]
         values = opposite_solution(jacobian, b, "* per_det")
         return lines + [f"{one} = {text};" for one, text in zip(z, values, strict=True)]

@@ -71,7 +71,7 @@ class _Lanes(Lists):
 
         These are the unknown angles, then the driver's angle and all angles equal to it.
         """
-        angles = {name: k for k, name in enumerate(self.plan.unknowns) if name.endswith(".phi")}
+        angles: dict[str, int] = {name: k for k, name in enumerate(self.plan.unknowns) if name.is_angle}
         (driver,) = self.plan.drivers
         if driver.quantity.kind == "angle":
             last = len(self.plan.unknowns)
@@ -216,7 +216,7 @@ def repeats(plan: SolvePlan) -> bool:
     That holds if angles occur in sines and cosines only, or are equal to other angles up to a constant. A plan with a
     gear or a coupling of angles does not repeat: its poses depend on the number of turns.
     """
-    angles = {name for block in plan.blocks for name in block.coordinates if name.endswith(".phi")}
+    angles: set[str] = {name for block in plan.blocks for name in block.coordinates if name.is_angle}
     angles |= {driver.inputs[0] for driver in plan.drivers if driver.quantity.kind == "angle"}
 
     def is_turned(node: Node) -> bool:

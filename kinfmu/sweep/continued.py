@@ -54,7 +54,7 @@ def continued(mechanism: Mechanism, settings: Settings) -> Continued:
     if not pose.good:
         return Continued(changed, anew(pose.message))
     pose = pose if pose.status == Status.OK else solver.anchor
-    start = dict(zip(plan.outputs, solver.outputs(pose), strict=True))
+    start: dict[str, float] = dict(zip(plan.outputs, solver.outputs(pose), strict=True))
     bodies = tuple(
         body if body.is_ground else replace(body, start=Start(*(start[f"{body.name}.{c}"] for c in COORDINATES)))
         for body in changed.bodies

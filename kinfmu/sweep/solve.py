@@ -199,7 +199,7 @@ def _run_of(
         values=tables[0],
         rates=tables[1],
         accelerations=tables[2],
-        fixed=engine.fixed,
+        fixed=dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
         input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
         inputs=inputs,
         status=result.status,

@@ -14,7 +14,7 @@ from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
-from kinfmu.run.channels import select
+from kinfmu.run.channels import coordinates, select
 from tests.log.runs import fourbar, with_gap
 
 
@@ -24,7 +24,7 @@ def run() -> Run:
 
 
 def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) -> None:
-    panels = _sheet(run, ("coupler.x", "rocker.phi")).axes
+    panels = _sheet(run, coordinates(run, ["coupler.x", "rocker.phi"])).axes
     assert [panel.get_ylabel() for panel in panels] == [
         "x [m]",
         "vx [m/s]",
@@ -57,7 +57,7 @@ def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
     assert _gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
     assert _gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
     assert _gaps(run, run.t) == []
-    panel = _sheet(gap, ("coupler.x",)).axes[0]
+    panel = _sheet(gap, coordinates(gap, ["coupler.x"])).axes[0]
     assert len(panel.patches) == 1
     assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
 
@@ -86,13 +86,13 @@ def test_a_long_run_is_drawn_by_its_extremes() -> None:
 def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path: Path) -> None:
     plot(fourbar(np.array([60.0])), tmp_path / "one.png", ["coupler.x"])
     plot(with_gap(run, 0, 180), tmp_path / "none.png", ["coupler.x"])
-    panels = _sheet(run, ("rocker.x",)).axes
+    panels = _sheet(run, coordinates(run, ["rocker.x"])).axes
     assert set(panels[0].lines[0].get_ydata()) == {1.0}
     assert set(panels[1].lines[0].get_ydata()) == {0.0}
 
 
 def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> None:
-    panels = _sheet(select(run, ["q"]), ("coupler.x",)).axes
+    panels = _sheet(select(run, ["q"]), coordinates(select(run, ["q"]), ["coupler.x"])).axes
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
 

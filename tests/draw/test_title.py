@@ -14,6 +14,7 @@ from kinfmu.draw import figure, plot
 from kinfmu.draw.plots import _sheet
 from kinfmu.draw.sheet import Sheet, title_lines
 from kinfmu.run import Run
+from kinfmu.run.channels import coordinates
 from tests.log.runs import fourbar
 
 pytest.importorskip("matplotlib")
@@ -64,7 +65,7 @@ def test_the_title_of_a_figure_is_in_the_picture(title: str, unit: str | None) -
 
 @pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
 def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) -> None:
-    figure = _sheet(titled(title), ("coupler.x",))
+    figure = _sheet(titled(title), coordinates(fourbar(np.arange(10.0)), ["coupler.x"]))
     figure.canvas.draw()
     (box,) = (text.get_window_extent() for text in figure.texts)
     assert box.x1 <= figure.bbox.x1
@@ -75,6 +76,9 @@ def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) ->
 @pytest.mark.parametrize("stop", [1.0, 1e5, 9e5, 0.0123456])
 def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
     run = fourbar(np.arange(10.0))
-    figure = _sheet(dataclasses.replace(run, t=np.linspace(0.0, stop, 10)), ("coupler.x", "coupler.y"))
+    figure = _sheet(
+        dataclasses.replace(run, t=np.linspace(0.0, stop, 10)),
+        coordinates(run, ["coupler.x", "coupler.y"]),
+    )
     figure.canvas.draw()
     assert figure.axes[-1].xaxis.get_tightbbox().x1 <= figure.bbox.x1

@@ -21,7 +21,7 @@ def fourbar(t: np.ndarray) -> Run:
     phi, w, zero, one = DEGREE * t, DEGREE, np.zeros_like(t), np.ones_like(t)
     c, s = np.cos(phi), np.sin(phi)
     status = np.where(np.isclose(s, 0.0), Status.BRIDGED, Status.OK).astype(np.int64)
-    return Run(
+    return Run.of_texts(
         t=t,
         outputs=("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi", "A.x", "A.y"),
         coordinate_count=5,

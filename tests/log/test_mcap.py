@@ -90,7 +90,7 @@ def test_a_run_without_samples_reads_back(run: Run, tmp_path: Path) -> None:
 def test_negative_zero_infinity_and_bits_of_nan_survive(run: Run, tmp_path: Path) -> None:
     values = run.values.copy()
     values[:4, 0] = [-0.0, np.inf, np.nextafter(0.0, 1.0), np.frombuffer(b"\x01\0\0\0\0\0\xf8\x7f")[0]]
-    odd = dataclasses.replace(run, values=values, fixed={"crank.x": -0.0, "crank.y": 0.1 + 0.2})
+    odd = dataclasses.replace(run, values=values, fixed=dict(zip(run.fixed, (-0.0, 0.1 + 0.2), strict=False)))
     write_mcap(odd, tmp_path / "run.mcap")
     assert_same(odd, read(tmp_path / "run.mcap"))
     assert np.signbit(read(tmp_path / "run.mcap").fixed["crank.x"])

@@ -16,7 +16,6 @@ from kinfmu import Run
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import AmbiguousStartError
 from kinfmu.plan import compile_plan
-from kinfmu.units import derivative_name
 from tests.stress.branch import INSIDE, OUTSIDE, TURN, BranchPath, Expected, Floats, Interval, branch_of
 from tests.stress.drawn import Drawn, Frame
 from tests.stress.families import FAMILIES, STARTS_ANYWHERE, Draw, RedrawError
@@ -208,10 +207,10 @@ class Trial:
         large = self.branch.magnitudes
         for name in run.outputs:
             column = columns[name]
-            is_angle = name.endswith(".phi")
+            is_angle = name.is_angle
             for order, exact in enumerate((column.d0, column.d1, column.d2)):
                 exact = np.broadcast_to(exact, (len(which),))
-                ours = numbers.array(run[derivative_name(name, order)][which])
+                ours = numbers.array(run[name.derivative(order)][which])
                 error = ours - exact
                 if is_angle and order == 0:
                     principal = np.asarray(exact, dtype=float)

@@ -16,6 +16,7 @@ from kinfmu.bench.engines.engine import Engine, Way
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
+from kinfmu.units import CoordinateName
 
 Bodies = Mapping[str, tuple[str, str]]  # two points of each moving body, its frame's origin and one on its x-axis
 
@@ -63,18 +64,17 @@ def _ready(named: Mapping[str, Any], speed: float, acceleration: float) -> Any:
     return linkage
 
 
-def _rows(columns: Sequence[str], points: Mapping[str, Sequence[FloatArray]], bodies: Bodies) -> Motion:
+def _rows(columns: Sequence[CoordinateName], points: Mapping[str, Sequence[FloatArray]], bodies: Bodies) -> Motion:
     """(n, 3 m) from positions, velocities and accelerations (n, 2) of points."""
     tables: list[list[FloatArray]] = [[], [], []]
     for column in columns:
-        body, _, letter = column.rpartition(".")
-        origin, other = bodies[body]
-        if letter == "phi":
+        origin, other = bodies[column.owner]
+        if column.is_angle:
             (dx, dy), v, a = (np.subtract(to, at).T for to, at in zip(points[other], points[origin], strict=True))
             square = dx * dx + dy * dy
             values = [np.unwrap(np.arctan2(dy, dx)), (dx * v[1] - dy * v[0]) / square, (dx * a[1] - dy * a[0]) / square]
         else:
-            values = [table[:, "xy".index(letter)] for table in points[origin]]
+            values = [table[:, "xy".index(column.axis)] for table in points[origin]]
         for table, value in zip(tables, values, strict=True):
             table.append(value)
     return list(np.array([value for table in tables for value in table]).T)
@@ -88,7 +88,7 @@ def _length(case: Case, body: str, a: str, b: str) -> float:
 
 def _start(case: Case, body: str, point: str) -> tuple[float, float]:
     """Where a body's point lies at the first sample: the circles meet in two places, the nearer one is taken."""
-    pose = {**case.plan.fixed, **dict(zip(case.columns, case.exact[0, 0].tolist(), strict=True))}
+    pose: dict[str, float] = {**case.plan.fixed, **dict(zip(case.columns, case.exact[0, 0].tolist(), strict=True))}
     x, y, phi = (pose[f"{body}.{letter}"] for letter in ("x", "y", "phi"))
     s_x, s_y = case.mechanism.body_points[f"{body}.{point}"]
     return x + math.cos(phi) * s_x - math.sin(phi) * s_y, y + math.sin(phi) * s_x + math.cos(phi) * s_y

@@ -87,7 +87,7 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
     """Return the tables that the solver reads from a model; solved: the blocks that need Newton."""
     anchor_u, anchor_z = plan.anchor_values
     kinds = [driver.quantity.kind for driver in plan.drivers]
-    scales = [1.0 if name.endswith(".phi") else plan.size for name in plan.unknowns]
+    scales = [1.0 if name.is_angle else plan.size for name in plan.unknowns]
     distances = distance_rows(plan, solved)
     ends = list(accumulate(len(block.unknowns) for block in solved))
     return [
@@ -112,8 +112,8 @@ def tables(plan: SolvePlan, solved: Sequence[Block]) -> list[str]:
         *_strings("kf_driver_names", [driver.name for driver in plan.drivers]),
         *array("bool kf_driver_is_angle", booleans(kind == "angle" for kind in kinds)),
         *_strings("kf_unknown_names", plan.unknowns),
-        *array("bool kf_unknown_is_angle", booleans(name.endswith(".phi") for name in plan.unknowns)),
-        *array("bool kf_output_is_angle", booleans(name.endswith(".phi") for name in plan.outputs)),
+        *array("bool kf_unknown_is_angle", booleans(name.is_angle for name in plan.unknowns)),
+        *array("bool kf_output_is_angle", booleans(name.is_angle for name in plan.outputs)),
         *_strings("kf_watch_names", plan.watch_names),
         *_strings("kf_parameter_names", [parameter.name for parameter in plan.parameters]),
         *_strings("kf_block_row_names", [", ".join(block.row_names) for block in solved]),

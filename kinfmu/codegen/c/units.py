@@ -34,7 +34,6 @@ from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
-from kinfmu.units import derivative_name
 
 
 class Units:
@@ -252,13 +251,11 @@ class Units:
                 lines += self._linear(writer, block, order)
             for coordinate, motion in block.assigned:
                 lines += [f"{line};" for line in writer.statements([motion[order]])]
-                lines.append(f"{identifier(derivative_name(coordinate, order))} = {writer.expression(motion[order])};")
-            found += [derivative_name(coordinate, order) for coordinate in block.coordinates]
+                lines.append(f"{identifier(coordinate.derivative(order))} = {writer.expression(motion[order])};")
+            found += [coordinate.derivative(order) for coordinate in block.coordinates]
         lines = self._loads(writer, found) + lines
         out = LISTS[order]
-        lines += [
-            f"{out}[row->{field}] = {identifier(derivative_name(one, order))};" for one, field in self.own.items()
-        ]
+        lines += [f"{out}[row->{field}] = {identifier(one.derivative(order))};" for one, field in self.own.items()]
         solving = " const double *given, bool held," if self.kind.solved else ""
         ready = " const double *x1," if order == 2 else ""
         signature = (
@@ -275,7 +272,7 @@ class Units:
         entries = block.entries if k == 2 and is_small(block) else ()
         before = [f"{line};" for line in writer.statements([*right, *entries])]
         b = [f"b{i}" for i in range(m)]
-        z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
+        z = [identifier(unknown.derivative(order)) for unknown in block.unknowns]
         taken = [f"    {one} = given[row->{self.own[name]}];" for one, name in zip(z, block.unknowns, strict=True)]
         solved = [f"{one} = {writer.expression(node)};" for one, node in zip(b, right, strict=True)]
         if is_small(block):
@@ -325,7 +322,7 @@ def places(kind: Kind) -> dict[str, tuple[int, str]]:
     for field, names in zip(given, kind.given, strict=True):
         found |= {name: (order, field) for order, name in enumerate(names)}
     for field, name in zip(own, kind.coordinates, strict=True):
-        found |= {derivative_name(name, order): (order, field) for order in range(3)}
+        found |= {name.derivative(order): (order, field) for order in range(3)}
     return found
 
 

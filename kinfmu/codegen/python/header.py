@@ -60,7 +60,8 @@ def header(plan: SolvePlan, curves: Mapping[CurveData, str], extra: Sequence[str
         f"PARAMETERS = {tuple((parameter.name, parameter.value) for parameter in plan.parameters)!r}",
         f"WATCHES = {plan.watch_names!r}",
         f"UNKNOWNS = {plan.unknowns!r}",
-        f"UNKNOWN_SCALES = {tuple(1.0 if n.endswith('.phi') else plan.size for n in plan.unknowns)!r}",
+        f"UNKNOWN_SCALES = {tuple(1.0 if n.is_angle else plan.size for n in plan.unknowns)!r}",
+        f"UNKNOWN_IS_ANGLE = {tuple(name.is_angle for name in plan.unknowns)!r}",
         f"BLOCKS = {tuple(places(solved))!r}",
         *([f"BLOCK_DRIVERS = {plan.block_drivers!r}"] if len(plan.drivers) > 1 else []),
         f"ANCHOR = {(anchor_u, anchor_z)!r}",
@@ -163,7 +164,7 @@ _HEAD = (
 
 def angle_places(plan: SolvePlan) -> tuple[int, ...]:
     """Return the places of the angles among the outputs."""
-    return tuple(k for k, name in enumerate(plan.outputs) if name.endswith(".phi"))
+    return tuple(k for k, name in enumerate(plan.outputs) if name.is_angle)
 
 
 def differences(plan: SolvePlan) -> list[str]:

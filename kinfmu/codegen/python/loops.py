@@ -33,7 +33,6 @@ from kinfmu.equations.graph import Node, reachable
 from kinfmu.plan import Block
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.curve import CurveData
-from kinfmu.units import derivative_name
 
 
 class Loops:
@@ -55,7 +54,10 @@ class Loops:
             names[order]: f"{LISTS[order]}[g{i}]" for i, names in enumerate(kind.given) for order in range(3)
         }
         for order in range(3):
-            self.places |= {derivative_name(name, order): f"{LISTS[order]}[{place}]" for name, place in own.items()}
+            self.places |= {
+                name.derivative(order): f"{LISTS[order]}[{place}]"
+                for name, place in zip(kind.coordinates, own.values(), strict=True)
+            }
         self.own = own
         self.hold: dict[str, Node | None] = {}  # names that later functions take from the position
 
@@ -131,7 +133,7 @@ class Loops:
             if block.unknowns:
                 lines += self._solution(writer, block, order)
             lines += self._assignments(writer, block, order)
-            found += [derivative_name(coordinate, order) for coordinate in block.coordinates]
+            found += [coordinate.derivative(order) for coordinate in block.coordinates]
         self._import(writer)
         lines = self._loaded(writer, [*self.hold, *found]) + lines
         lists = LISTS[1 : order + 1]
@@ -143,11 +145,11 @@ class Loops:
         lines = writer.statements([*right, *block.entries])
         b = [f"b{i}" for i in range(len(right))]
         lines += [f"{one} = {writer.expression(node)}" for one, node in zip(b, right, strict=True)]
-        z = [identifier(derivative_name(unknown, order)) for unknown in block.unknowns]
+        z = [identifier(unknown.derivative(order)) for unknown in block.unknowns]
         jacobian = jacobian_text(writer, block)
         self.hold.setdefault(kept_name(block, self.label), None)
         taken = [f"given[{self.own[name]}]" for name in block.unknowns]
-        places = [self.places[derivative_name(name, order)] for name in block.unknowns]
+        places = [self.places[name.derivative(order)] for name in block.unknowns]
         return [
             *lines,
             f"if {_HELD}:",
@@ -160,7 +162,7 @@ class Loops:
     def _assignments(self, writer: Writer, block: Block, order: int) -> list[str]:
         lines = []
         for coordinate, motion in block.assigned:
-            name = derivative_name(coordinate, order)
+            name = coordinate.derivative(order)
             lines += writer.statements([motion[order]])
             lines.append(f"{identifier(name)} = {self.places[name]} = {writer.expression(motion[order])}")
         return lines
@@ -169,7 +171,7 @@ class Loops:
         writer = Writer(self.names, self.positions)
         lines = [line for block in self.kind.blocks for line in self._assignments(writer, block, order)]
         self._import(writer)
-        found = [derivative_name(coordinate, order) for block in self.kind.blocks for coordinate, _ in block.assigned]
+        found = [coordinate.derivative(order) for block in self.kind.blocks for coordinate, _ in block.assigned]
         return self._later(name, LISTS[1 : order + 1], self._loaded(writer, [*self.hold, *found]) + lines)
 
     def _matrices(self, block: Block) -> list[str]:

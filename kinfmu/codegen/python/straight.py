@@ -21,7 +21,6 @@ from kinfmu.codegen.python.header import bound, curve_names, differences, drive,
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block, SolvePlan
-from kinfmu.units import derivative_name
 
 
 def straight(plan: SolvePlan) -> str:
@@ -36,14 +35,13 @@ class _Straight:
         self.curves = curve_names(plan)
         self.unknowns = plan.unknowns
         self.places = places(self.solved)
-        self.rates = {driver.inputs[0]: driver.inputs for driver in plan.drivers}
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
         self.position_nodes: list[Node] = []
         self.formulas: dict[str, Node] = {}  # of rates and accelerations of assigned coordinates
         for block in plan.blocks:
             for name, motion in block.assigned:
                 self.names.assign(motion[0], name)
-                self.formulas |= {self._rate_of(name, order): motion[order] for order in (1, 2)}
+                self.formulas |= {name.derivative(order): motion[order] for order in (1, 2)}
             self.position_nodes += [motion[0] for _, motion in block.assigned]
             self.position_nodes += [*block.residuals, *block.entries]
         self.parametric, self.prolog = parametric(plan)
@@ -52,10 +50,6 @@ class _Straight:
         self.definitions = Definitions(self.formulas)
         self.inputs = [[driver.inputs[order] for driver in plan.drivers] for order in range(3)]
         self.exports: dict[str, Node | None] = {}  # names that later stages read from `values`
-
-    def _rate_of(self, name: str, order: int) -> str:
-        """Return the name of a derivative of a coordinate or of a driver's value."""
-        return self.rates[name][order] if name in self.rates else derivative_name(name, order)
 
     def module(self) -> str:
         """Return constants and functions; with parameters the functions are in `bound`, which binds their values."""
@@ -135,7 +129,7 @@ class _Straight:
         moves = []
         for k, name in enumerate(self.unknowns):
             move = f"abs({identifier(name)} - p{k})"
-            moves.append(move if name.endswith(".phi") else f"{move} / {self.plan.size!r}")
+            moves.append(move if name.is_angle else f"{move} / {self.plan.size!r}")
         return f"max({', '.join(moves)})" if len(moves) > 1 else moves[0]
 
     def _solved(self, writer: Writer, k: int, block: Block) -> list[str]:
@@ -167,7 +161,7 @@ class _Straight:
             *unpacking(map(identifier, self.inputs[1]), "ud"),
             *unpacking(map(identifier, self.inputs[2]), "udd"),
         ]
-        lines += unpacking([identifier(derivative_name(name, 1)) for name in self.unknowns], "zd")
+        lines += unpacking([identifier(name.derivative(1)) for name in self.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
     def _alone(self) -> list[list[str]]:
@@ -179,7 +173,7 @@ class _Straight:
         for order, right in ((1, alone.velocity), (2, alone.acceleration)):
             lines += indented(self._linear_lines(writer, order, right, definitions, done))
         self._import(writer)
-        first, second = (tupled(identifier(derivative_name(name, order)) for name in self.unknowns) for order in (1, 2))
+        first, second = (tupled(identifier(name.derivative(order)) for name in self.unknowns) for order in (1, 2))
         about = "First and second derivative of the unknowns with respect to the driver."
         tangent = [
             "",
@@ -210,7 +204,7 @@ class _Straight:
         writer = Writer(self.names, self.known)
         lines = self._linear_lines(writer, order, right, self.definitions, set(), held=True)
         self._import(writer)
-        result = tupled(identifier(derivative_name(name, order)) for name in self.unknowns)
+        result = tupled(identifier(name.derivative(order)) for name in self.unknowns)
         return [*indented(lines), f"    return {result}", ""]
 
     def _linear_lines(
@@ -226,7 +220,7 @@ class _Straight:
         """Return the linear solves of one order, block after block, with the definitions that they need."""
         lines = []
         for k, block in enumerate(self.solved):
-            z = [identifier(derivative_name(name, order)) for name in block.unknowns]
+            z = [identifier(name.derivative(order)) for name in block.unknowns]
             vector, entries = right(block), block.entries
             lines += definitions.lines(writer, _names(vector), done)
             lines += writer.statements([*vector, *entries])
@@ -266,7 +260,7 @@ class _Straight:
 
         With one driver by the chain rule: zd = z' ud, zdd = z'' ud^2 + z' udd.
         """
-        rates, accelerations = ([identifier(derivative_name(unknown, k)) for unknown in self.unknowns] for k in (1, 2))
+        rates, accelerations = ([identifier(unknown.derivative(k)) for unknown in self.unknowns] for k in (1, 2))
         if len(self.plan.drivers) != 1:
             lines = unpacking(rates, "first")
             return lines if order == 1 else lines + unpacking(accelerations, "second")
@@ -332,7 +326,7 @@ class _Straight:
 
     def _import(self, writer: Writer) -> None:
         """Record what a later stage reads from the position stage."""
-        coordinates = {name for block in self.plan.blocks for name in block.coordinates} | set(self.inputs[0])
+        coordinates = {*(name for block in self.plan.blocks for name in block.coordinates), *self.inputs[0]}
         for node in writer.used:
             if node in self.parametric:
                 continue

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from kinfmu.errors import FmuError, listed
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.mechanism.valid import quoted
-from kinfmu.units import METRES, derivative_name, is_coordinate
+from kinfmu.units import METRES, read_coordinate, read_inputs
 
 _ALONE = {  # parts with a fixed list of variables
     "residual": ("solver.residual",),
@@ -34,16 +34,19 @@ def check(interface: Interface) -> None:
 def _check_motion(interface: Interface) -> None:
     """Raise an FmuError unless the outputs are coordinates, with their rates, and every driver has three inputs."""
     outputs = _names(interface.part("values"))
+    coordinates = []
     for name in (*outputs, *_names(interface.part("fixed"))):
-        if not is_coordinate(name):
+        coordinate = read_coordinate(name)
+        if coordinate is None:
             raise FmuError(f"{quoted(name)} is no coordinate such as 'crank.phi'")
+        coordinates.append(coordinate)
     for order, part in enumerate(("values", "rates", "accelerations")):
-        if _names(interface.part(part)) != [derivative_name(name, order) for name in outputs]:
+        if _names(interface.part(part)) != [name.derivative(order) for name in coordinates[: len(outputs)]]:
             raise FmuError(f"part {part} does not hold the derivatives of the outputs")
     if not 0 <= interface.coordinate_count <= len(outputs):
         raise FmuError(f"{interface.coordinate_count} of {len(outputs)} outputs cannot be coordinates")
     inputs = _names(interface.part("inputs"))
-    if len(inputs) % 3 or _names(interface.part("driven")) != [f"driven.{name}" for name in inputs]:
+    if read_inputs(inputs) is None or _names(interface.part("driven")) != [f"driven.{name}" for name in inputs]:
         raise FmuError("part driven does not hold the inputs, three for each driver")
     for name in _names(interface.part("watch")):
         if not name.startswith("watch."):

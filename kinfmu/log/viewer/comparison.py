@@ -22,6 +22,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
+from kinfmu.units import CoordinateName
 
 MOST_LISTED = 6  # coordinates that a line names
 
@@ -110,7 +111,7 @@ def in_common(a: Run, b: Run, names: tuple[str, str] = ("A", "B")) -> str:
     )
 
 
-def _common(a: Run, b: Run) -> list[str]:
+def _common(a: Run, b: Run) -> list[CoordinateName]:
     return [name for name in a.outputs if name in b.outputs]
 
 

@@ -11,7 +11,7 @@ from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
 from kinfmu.scene.shown import shown_range
-from kinfmu.units import Quantity, derivative_name, quantity_of, unit_of
+from kinfmu.units import Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
 KINDS = ("angle", "length")
@@ -43,12 +43,12 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
     axis = axis_of(run)
     found = {}
     for kind in KINDS:
-        columns = [k for k, name in enumerate(run.outputs) if quantity_of(name).kind == kind]
+        columns = [k for k, name in enumerate(run.outputs) if name.quantity().kind == kind]
         if not columns:
             continue
         size = 0.0
         for order, table in enumerate((run.values, run.rates, run.accelerations)):
-            kept = [k for k in columns if derivative_name(run.outputs[k], order) not in run.absent]
+            kept = [k for k in columns if run.outputs[k].derivative(order) not in run.absent]
             if not kept:
                 continue
             values = np.where(run.good[:, None], table[:, kept], np.nan)
@@ -57,7 +57,7 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
             found[ORDERS[order], kind] = Group(
                 path=f"{ORDERS[order]}/{kind}",
                 title=_title(Quantity(kind, order, axis.per), run.length_unit),
-                names=tuple(derivative_name(run.outputs[k], order) for k in kept),
+                names=tuple(run.outputs[k].derivative(order) for k in kept),
                 colours=tuple(colours[run.outputs[k]] for k in kept),
                 values=values,
                 shown=shown_range(values, size / (axis.span or 1.0) ** order),
@@ -125,8 +125,7 @@ def _colours(run: Run) -> dict[str, palette.Colour]:
     """Return the colour of each output: that of its body or point, lighter for y."""
     owners: list[str] = []
     for name in (*run.outputs[: run.coordinate_count], *run.fixed, *run.outputs):
-        owner = name.rpartition(".")[0]
-        if owner not in owners:
-            owners.append(owner)
-    plain = {name: palette.body(owners.index(name.rpartition(".")[0])) for name in run.outputs}
-    return {name: palette.lighter(colour) if name.endswith(".y") else colour for name, colour in plain.items()}
+        if name.owner not in owners:
+            owners.append(name.owner)
+    plain = {name: palette.body(owners.index(name.owner)) for name in run.outputs}
+    return {name: palette.lighter(colour) if name.axis == "y" else colour for name, colour in plain.items()}

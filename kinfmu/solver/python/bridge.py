@@ -192,8 +192,8 @@ def moved(model: Model, bridge: Bridge, pose: Pose, u: float) -> Bridge | None:
     if arrived is None:
         return None
     raised = []
-    for name, scale, a, b in zip(model.UNKNOWNS, model.UNKNOWN_SCALES, arrived.z, node.z, strict=True):
-        raised.append(whole_turns(a - b) if name.endswith(".phi") else 0)
+    for is_angle, scale, a, b in zip(model.UNKNOWN_IS_ANGLE, model.UNKNOWN_SCALES, arrived.z, node.z, strict=True):
+        raised.append(whole_turns(a - b) if is_angle else 0)
         if not abs(a - turned(b, raised[-1])) <= AGREED * scale:
             return None
     try:

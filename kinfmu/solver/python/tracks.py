@@ -49,6 +49,7 @@ class Track:
         self.DRIVER_KINDS = tuple(model.DRIVER_KINDS[own])
         self.REACH = tuple(model.REACH[own])
         self.UNKNOWNS = self.of(model.UNKNOWNS)
+        self.UNKNOWN_IS_ANGLE = self.of(model.UNKNOWN_IS_ANGLE)
         self.UNKNOWN_SCALES = self.of(model.UNKNOWN_SCALES)
         self.ROW_SCALES = tuple([model.ROW_SCALES[k] for k in self.blocks])
         at = {block: k for k, block in enumerate(self.blocks)}

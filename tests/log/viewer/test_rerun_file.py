@@ -18,6 +18,7 @@ from kinfmu.log.viewer.comparison import in_common, write_comparison
 from kinfmu.log.viewer.rerun_file import _check_whole
 from kinfmu.run import Run
 from kinfmu.run.channels import select
+from kinfmu.units import CoordinateName
 from tests.log.runs import KINDS, fourbar, without_samples
 
 SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
@@ -209,7 +210,7 @@ def test_runs_of_different_times_are_compared_by_interpolation(tmp_path: Path) -
 
 def renamed(run: Run, *kept: str) -> Run:
     """A run of another mechanism, whose coordinates have other names but for those that are kept."""
-    outputs = tuple(name if name in kept else f"other_{name}" for name in run.outputs)
+    outputs = tuple(name if name in kept else CoordinateName(f"other_{name.owner}", name.axis) for name in run.outputs)
     return dataclasses.replace(run, outputs=outputs, mechanism_source="", info={})
 
 
@@ -220,7 +221,7 @@ def test_a_comparison_states_what_runs_of_two_mechanisms_have_in_common(run: Run
     part = renamed(run, "crank.phi", "A.x")
     some = "A and B have 2 of 7 and 7 coordinates in common, whose differences are shown: crank.phi, A.x"
     assert in_common(run, part) == some
-    more = dataclasses.replace(run, outputs=(*run.outputs[:-1], "B.y"))
+    more = dataclasses.replace(run, outputs=(*run.outputs[:-1], CoordinateName("B", "y")))
     assert in_common(run, more, ("a.mcap", "b.mcap")) == (
         "a.mcap and b.mcap have 6 of 7 and 7 coordinates in common, whose differences are shown: "
         f"{', '.join(run.outputs[:-1])}"
