@@ -1,4 +1,4 @@
-"""The contract of a driver, a constraint row whose target moves, and the drivers: one a measure that can be driven."""
+"""Drivers: constraint rows whose target moves, one class for each quantity that can be driven."""
 
 from __future__ import annotations
 

@@ -55,19 +55,11 @@ def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, A
             raise MechanismError(f"{where}, line {k}: {error}") from None
         if len(cells) != 2:
             raise MechanismError(f"{where}, line {k}: {len(cells)} columns; there must be two, x and u")
-        if place == 0 and not any(map(_is_number, cells)):
+        if place == 0 and not any(map(_DECIMAL.fullmatch, cells)):
             units = (_unit(cells[0]), _unit(cells[1]))
         else:
             rows.append((_number(where, k, cells[0], units[0]), _number(where, k, cells[1], units[1])))
     return tuple(rows)
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        read_decimal(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _unit(title: str) -> str:
@@ -77,9 +69,10 @@ def _unit(title: str) -> str:
 
 
 def _number(where: str, line: int, cell: str, unit: str) -> float | str:
-    if not _is_number(cell):
-        raise MechanismError(f"{where}, line {line}: {quoted(cell)} must be a number")
-    number = read_decimal(cell)
+    try:
+        number = read_decimal(cell)
+    except ValueError:
+        raise MechanismError(f"{where}, line {line}: {quoted(cell)} must be a number") from None
     if not math.isfinite(number):
         raise MechanismError(f"{where}, line {line}: {cell} must be a finite number")
     return f"{number!r} {unit}" if unit else number
