@@ -1,7 +1,7 @@
 /* Advance: from a good pose to other driver values, along one continuous branch. See kinfmu/solver/python/advance.py. */
 #include "internal.h"
 
-void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places)
+inline void kf_path_init(kf_path *path, kf_pose *start, const double *target, int driver, kf_pose *places)
 {
     path->places = places;
     path->target = target;
@@ -23,7 +23,7 @@ void kf_path_init(kf_path *path, kf_pose *start, const double *target, int drive
     path->end = NULL;
 }
 
-kf_pose *kf_path_spare(const kf_path *path)
+inline kf_pose *kf_path_spare(const kf_path *path)
 {
     kf_pose *place = path->places;
     while (place == path->pose || place == path->before || place == path->regular) {
@@ -32,7 +32,7 @@ kf_pose *kf_path_spare(const kf_path *path)
     return place;
 }
 
-const double *kf_path_ahead(kf_path *path, double *s)
+inline const double *kf_path_ahead(kf_path *path, double *s)
 {
     int k;
     if (-path->length <= path->distance && path->distance <= path->length) {
@@ -46,7 +46,7 @@ const double *kf_path_ahead(kf_path *path, double *s)
     return path->u;
 }
 
-void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margin)
+inline void kf_path_accept(kf_path *path, kf_pose *trial, double s, double margin)
 {
     path->margin = margin;
     if (s == path->distance) {
@@ -76,7 +76,7 @@ void kf_path_limit(kf_path *path, double s)
                      || kf_is_beyond(path->target, path->limit.u, path->direction, s);
 }
 
-kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
+inline kf_pose *kf_path_terminate(kf_path *path, kf_limit *limit)
 {
     kf_pose *const end = path->end;
     const kf_pose *const regular = path->regular;

@@ -151,10 +151,7 @@ int kf_build(kf_solver *solver, kf_pose *pose, int block, double zero)
     if (best >= 0) {
         const int number = kf_spare_bridge(solver);
         kf_bridge *const bridge = &KF_POOL(solver)->bridges[number];
-        int k;
-        for (k = 0; k < KF_UNKNOWNS; ++k) {
-            bridge->raised[k] = 0.0;
-        }
+        memset(bridge->raised, 0, KF_UNKNOWNS * sizeof(double));
         kf_make_bridge(bridge, solver, best, 0.0);
         if (kf_bridge_closes(solver, bridge, &solver->scratch.follow[0].found)) {
             return number;

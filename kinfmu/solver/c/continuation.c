@@ -176,17 +176,15 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
     kf_model *const ahead = &solver->scratch.ahead;
     kf_pose *const trial = &solver->scratch.poses[0];
     double *const slope = solver->scratch.zd;
-    double p[KF_ROOM(KF_PARAMETERS)], watches[KF_ROOM(KF_WATCHES)], s = 0.0, step = 1.0;
-    int turn, k, most = 0, block = -1;
+    double p[KF_ROOM(KF_PARAMETERS)], s = 0.0, step = 1.0;
+    int turn, k, block = -1;
     bool is_there = true;
     kf_solver_start(solver);
     solver->tolerance = tolerance;
     for (k = 0; k < KF_PARAMETERS; ++k) {
         is_there = is_there && parameters[k] == kf_parameters_written[k];
     }
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        slope[k] = 0.0;
-    }
+    memset(slope, 0, KF_UNKNOWNS * sizeof(double));
     for (turn = 0; turn < MOST_STEPS && !is_there; ++turn) {
         const kf_found *const found = &solver->anchor.found;
         const double there = fmin(s + step, 1.0);
@@ -226,13 +224,7 @@ bool kf_solver_bind(kf_solver *solver, const double *parameters)
             kf_append(solver->message, "too far from the parameters as written");
         }
     } else if (!(solver->anchor.found.watch <= solver->tolerance)) {
-        kf_watches(&solver->model, &solver->anchor.found, watches);
-        for (k = 1; k < KF_WATCHES; ++k) {
-            most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
-        }
-        kf_append(solver->message, "redundant row %s does not close: gap about ", kf_watch_names[most]);
-        kf_append_number(solver->message, "%.4g", fabs(watches[most]) * KF_SIZE);
-        kf_append(solver->message, " %s", kf_length_unit);
+        kf_append_watch(solver->message, &solver->model, &solver->anchor.found, "gap about ", "%.4g");
     } else {
         solver->message[0] = '\0';
         solver->unsolvable = false;

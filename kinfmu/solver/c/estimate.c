@@ -52,9 +52,7 @@ static void make_source(kf_solver *solver, const kf_pose *pose, const kf_driven 
         held[k] = k == block || (drive->held != NULL && drive->held[k]);
         rows += k < block ? kf_block_rows[k] : 0;
     }
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        given[k] = 0.0;
-    }
+    memset(given, 0, KF_UNKNOWNS * sizeof(double));
     kf_worst_case_step(&solver->model, &pose->found, block, rows, given + kf_first_of(block));
     KF_VELOCITY(&solver->model, &pose->found, kf_at_rest, given, held, all_of);
     for (k = 0; k < KF_UNKNOWNS; ++k) {
@@ -126,9 +124,7 @@ static bool round_node(kf_solver *solver, const kf_span *span, int place, double
     }
     drive = drive_of(solver, node, KF_SPEEDS(&solver->model), kf_at_rest);
     count = kf_worst_blocks(&solver->model, &node->found, NULL, worst, &weight);
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        squares[k] = 0.0;
-    }
+    memset(squares, 0, KF_UNKNOWNS * sizeof(double));
     for (i = 0; i < count; ++i) {
         make_source(solver, node, &drive, worst[i], weight);
         if (!move(solver, node, &drive, there)) {
@@ -167,9 +163,7 @@ static bool make_source_of_bridge(kf_solver *solver, const kf_pose *pose, const 
     double *const rounding = scratch->x2; /* of the unknowns */
     const double half = span->half;
     int k;
-    for (k = 0; k < KF_UNKNOWNS; ++k) {
-        rounding[k] = 0.0;
-    }
+    memset(rounding, 0, KF_UNKNOWNS * sizeof(double));
     if (!round_node(solver, span, 2, rounding) || !round_node(solver, span, 3, rounding)) {
         return false;
     }

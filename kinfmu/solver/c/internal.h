@@ -39,6 +39,7 @@ void kf_rates(const kf_model *model, const kf_found *found, const double *ud, co
 void kf_second_rates(const kf_model *model, const kf_found *found, const double *udd, const double *x1,
                      const double *given, const bool *held, double *x2);
 #define KF_AT(model, value, buffer) kf_driven_at(model, value, buffer)
+#define KF_IS_ON_A_TRACK(block) (kf_block_drivers[block] != KF_MIXED)
 #define KF_VELOCITY kf_rates
 #define KF_ACCELERATION kf_second_rates
 #else
@@ -47,6 +48,7 @@ void kf_second_rates(const kf_model *model, const kf_found *found, const double 
 #define KF_VELOCITY kf_velocity
 #define KF_ACCELERATION kf_acceleration
 #define KF_AT(model, value, buffer) (value)
+#define KF_IS_ON_A_TRACK(block) ((void)(block), false)
 #endif
 #define KF_IS_ONE(solver) (KF_DRIVERS == 1 || (KF_TRACKS && KF_ALONG(solver) >= 0)) /* derivatives are over a driver */
 #define KF_NAMED_DRIVER(solver) (KF_TRACKS ? KF_ALONG(solver) : -1) /* the driver that messages name; -1: all */
@@ -207,6 +209,7 @@ int kf_first_of(int block);
 
 /* solver.c */
 KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status);
+bool kf_is_refused(kf_solver *solver, const double *u, int driver, bool mixed);
 kf_status kf_checked(kf_solver *solver, kf_pose *pose);
 #if KF_TRACKS
 kf_status kf_solve_along(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose);
@@ -220,5 +223,9 @@ void kf_append(char *message, const char *format, ...);
 void kf_append_number(char *message, const char *format, double value);
 void kf_append_place(char *message, const double *u, int digits, int driver); /* -1: all of them */
 bool kf_differs(const double *a, const double *b, int digits);
+
+/* Append the redundant row with the largest gap; about, format: of the gap. */
+void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about,
+                     const char *format);
 
 #endif

@@ -3,6 +3,31 @@
 
 #include <math.h>
 
+static double dot(int m, const double *a, const double *b)
+{
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < m; ++i) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+/* Form A^T B (k, k) of two matrices (m, k), with `diagonal` added to its diagonal. */
+static void multiply(int m, int k, const double *a, const double *b, double diagonal, double *product)
+{
+    int i, j, row;
+    for (i = 0; i < k; ++i) {
+        for (j = 0; j < k; ++j) {
+            double sum = i == j ? diagonal : 0.0;
+            for (row = 0; row < m; ++row) {
+                sum += a[row * k + i] * b[row * k + j];
+            }
+            product[i * k + j] = sum;
+        }
+    }
+}
+
 /* Factors of A (k, k): the equilibrated rows' LU, row after row; the rows' order; their scales. */
 bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
 {
@@ -12,11 +37,7 @@ bool kf_lu(int k, const double *matrix, double *factors, double *determinant)
     int i, j, column;
     *determinant = 1.0;
     for (i = 0; i < k; ++i) {
-        double square = 0.0, length;
-        for (j = 0; j < k; ++j) {
-            square += matrix[i * k + j] * matrix[i * k + j];
-        }
-        length = sqrt(square);
+        const double length = sqrt(dot(k, matrix + i * k, matrix + i * k));
         if (!(length > 0.0 && length < INFINITY)) {
             return false;
         }
@@ -97,48 +118,26 @@ void kf_lu_solve(int k, const double *factors, const double *right, double *x)
     const double *const lu = factors;
     const double *const order = factors + k * k;
     const double *const scales = order + k;
-    int i, j;
+    int i;
     for (i = 0; i < k; ++i) {
         x[i] = right[(int)order[i]] * scales[(int)order[i]];
     }
     for (i = 1; i < k; ++i) {
-        double sum = 0.0;
-        for (j = 0; j < i; ++j) {
-            sum += lu[i * k + j] * x[j];
-        }
-        x[i] -= sum;
+        x[i] -= dot(i, lu + i * k, x);
     }
     for (i = k - 1; i >= 0; --i) {
-        double sum = 0.0;
-        for (j = i + 1; j < k; ++j) {
-            sum += lu[i * k + j] * x[j];
-        }
-        x[i] = (x[i] - sum) / lu[i * k + i];
+        x[i] = (x[i] - dot(k - 1 - i, lu + i * k + i + 1, x + i + 1)) / lu[i * k + i];
     }
 }
 
 /* column -= 2 (reflector . column) / square * reflector */
 static void reflect(int m, const double *reflector, double square, double *column)
 {
-    double weight = 0.0;
+    const double weight = 2.0 * dot(m, reflector, column) / square;
     int i;
-    for (i = 0; i < m; ++i) {
-        weight += reflector[i] * column[i];
-    }
-    weight = 2.0 * weight / square;
     for (i = 0; i < m; ++i) {
         column[i] -= weight * reflector[i];
     }
-}
-
-static double dot(int m, const double *a, const double *b)
-{
-    double sum = 0.0;
-    int i;
-    for (i = 0; i < m; ++i) {
-        sum += a[i] * b[i];
-    }
-    return sum;
 }
 
 /* Householder factors of A (m, k), m >= k: the columns of R, then the reflectors, column after column. */
@@ -241,14 +240,8 @@ double kf_unclosed(int m, int k, const double *matrix, const double *right, doub
         for (row = 0; row < m; ++row) {
             b[i] -= matrix[row * k + i] * right[row];
         }
-        for (j = 0; j < k; ++j) {
-            double sum = i == j ? damping * damping : 0.0;
-            for (row = 0; row < m; ++row) {
-                sum += matrix[row * k + i] * matrix[row * k + j];
-            }
-            normal[i * k + j] = sum;
-        }
     }
+    multiply(m, k, matrix, matrix, damping * damping, normal);
     if (!kf_lu(k, normal, factors, &determinant)) {
         return 0.0;
     }
@@ -267,16 +260,7 @@ double kf_unclosed(int m, int k, const double *matrix, const double *right, doub
 double kf_orientation(int m, int k, const double *a, const double *b)
 {
     double product[KF_ROOM(KF_LARGEST_BLOCK)], factors[3 * KF_ROOM(KF_LARGEST_BLOCK)], determinant;
-    int i, j, row;
-    for (i = 0; i < k; ++i) {
-        for (j = 0; j < k; ++j) {
-            double sum = 0.0;
-            for (row = 0; row < m; ++row) {
-                sum += a[row * k + i] * b[row * k + j];
-            }
-            product[i * k + j] = sum;
-        }
-    }
+    multiply(m, k, a, b, 0.0, product);
     return kf_lu(k, product, factors, &determinant) ? determinant : 0.0;
 }
 

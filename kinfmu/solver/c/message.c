@@ -97,3 +97,16 @@ bool kf_differs(const double *a, const double *b, int digits)
     }
     return false;
 }
+
+void kf_append_watch(char *message, const kf_model *model, const kf_found *found, const char *about, const char *format)
+{
+    double watches[KF_ROOM(KF_WATCHES)];
+    int k, most = 0;
+    kf_watches(model, found, watches);
+    for (k = 1; k < KF_WATCHES; ++k) {
+        most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
+    }
+    kf_append(message, "redundant row %s does not close: %s", kf_watch_names[most], about);
+    kf_append_number(message, format, fabs(watches[most]) * KF_SIZE);
+    kf_append(message, " %s", kf_length_unit);
+}

@@ -27,12 +27,35 @@ KF_RARE kf_status kf_failed(kf_pose *pose, kf_status status)
     return status;
 }
 
+/* Set the message for driver values that no mechanism has: not finite, or a distance below 0. mixed: only distances in
+ * blocks that depend on several drivers are checked.
+ */
+bool kf_is_refused(kf_solver *solver, const double *u, int driver, bool mixed)
+{
+    const char *why = NULL;
+    double sum = 0.0;
+    int k;
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        sum += u[k];
+    }
+    for (k = 0; k < KF_DISTANCES; ++k) {
+        if (u[kf_distance_drivers[k]] < 0.0 && !(mixed && KF_IS_ON_A_TRACK(kf_distance_blocks[k]))) {
+            why = ": a distance cannot be negative";
+        }
+    }
+    why = sum - sum == 0.0 ? why : " is not a finite number";
+    solver->message[0] = '\0';
+    if (why != NULL) {
+        kf_append_place(solver->message, u, KF_ROUGHLY, driver);
+        kf_append(solver->message, "%s", why);
+    }
+    return why != NULL;
+}
+
 /* Set status and message of a pose whose rows or watches do not close. */
 static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
 {
     char *const message = solver->message;
-    double watches[KF_ROOM(KF_WATCHES)];
-    int k, most = 0;
     kf_append_place(message, KF_POSE_U(pose), KF_ROUGHLY, KF_NAMED_DRIVER(solver));
     if (!(pose->found.residual <= solver->tolerance)) {
         kf_append(message, ": the rows do not close: residual ");
@@ -40,13 +63,8 @@ static KF_RARE kf_status rejected(kf_solver *solver, kf_pose *pose)
         kf_append(message, " of the size");
         return pose->status = KF_NOT_CONVERGED;
     }
-    kf_watches(&solver->model, &pose->found, watches);
-    for (k = 1; k < KF_WATCHES; ++k) {
-        most = fabs(watches[k]) > fabs(watches[most]) ? k : most;
-    }
-    kf_append(message, ": redundant row %s does not close: gap ", kf_watch_names[most]);
-    kf_append_number(message, "%.3g", fabs(watches[most]) * KF_SIZE);
-    kf_append(message, " %s", kf_length_unit);
+    kf_append(message, ": ");
+    kf_append_watch(message, &solver->model, &pose->found, "gap ", "%.3g");
     return pose->status = KF_INCONSISTENT;
 }
 
@@ -97,6 +115,16 @@ static KF_WHOLE bool is_near(kf_solver *solver, kf_pose *start, const double *u,
     return false;
 }
 
+/* Take one trusted step of several drivers to a pose that is regular and closes; false if it is none. */
+static bool is_one_step(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
+{
+    double direction[KF_DRIVERS];
+    const double distance = kf_straight_path(KF_POSE_U(start), u, direction);
+    return distance <= KF_LONGEST_STEP && kf_trusted_step(solver, start, direction, distance, u, pose)
+           && pose->found.margin >= KF_REGULAR && pose->found.watch <= solver->tolerance
+           && pose->found.residual <= solver->tolerance;
+}
+
 /* Reject the pose if its rows or its watches do not close. */
 kf_status kf_checked(kf_solver *solver, kf_pose *pose)
 {
@@ -137,8 +165,7 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
 {
     kf_pose *found;
     kf_limit limit;
-    double sum = 0.0;
-    int map, k;
+    int map;
     if (solver->unsolvable) {
         return kf_failed(pose, KF_INCONSISTENT);
     }
@@ -148,25 +175,15 @@ inline kf_status KF_SOLVE_ALONG(kf_solver *solver, kf_pose *start, const double 
     if (is_same(u, KF_POSE_U(start))) {
         return again(solver, start, pose);
     }
-    for (k = 0; k < KF_DRIVERS; ++k) {
-        sum += u[k];
-    }
     map = start->map;
     if (KF_IS_FOLLOWED && is_near(solver, start, u, pose, &map)) { /* most samples */
         return KF_OK;
     }
-    solver->message[0] = '\0';
-    if (!(sum - sum == 0.0)) {
-        kf_append_place(solver->message, u, KF_ROUGHLY, KF_NAMED_DRIVER(solver));
-        kf_append(solver->message, " is not a finite number");
+    if (kf_is_refused(solver, u, KF_NAMED_DRIVER(solver), false)) {
         return kf_failed(pose, KF_OUTSIDE);
     }
-    for (k = 0; k < KF_DISTANCES; ++k) {
-        if (u[kf_distance_drivers[k]] < 0.0) {
-            kf_append_place(solver->message, u, KF_ROUGHLY, KF_NAMED_DRIVER(solver));
-            kf_append(solver->message, ": a distance cannot be negative");
-            return kf_failed(pose, KF_OUTSIDE);
-        }
+    if (!KF_IS_FOLLOWED && is_one_step(solver, start, u, pose)) { /* most samples of several drivers */
+        return KF_OK;
     }
     found = kf_advance(solver, start, map, u, &limit);
     if (found == NULL) {

@@ -196,7 +196,6 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
 kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     kf_status status;
-    double sum = 0.0;
     int k;
     bool is_same = start->has_tracks;
     if (solver->unsolvable) {
@@ -204,7 +203,6 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     }
     for (k = 0; k < KF_DRIVERS; ++k) {
         is_same = is_same && u[k] == KF_POSE_U(start)[k];
-        sum += u[k];
     }
     if (is_same) {
         *pose = *start;
@@ -213,20 +211,10 @@ kf_status kf_solve(kf_solver *solver, kf_pose *start, const double *u, kf_pose *
     if (kf_is_near(solver, start, u, pose)) { /* most samples */
         return KF_OK;
     }
-    solver->message[0] = '\0';
-    if (!(sum - sum == 0.0)) {
-        kf_append_place(solver->message, u, KF_ROUGHLY, -1);
-        kf_append(solver->message, " is not a finite number");
+    if (kf_is_refused(solver, u, -1, true)) {
         return kf_failed(pose, KF_OUTSIDE);
     }
 #if KF_MIXES
-    for (k = 0; k < KF_DISTANCES; ++k) {
-        if (kf_block_drivers[kf_distance_blocks[k]] == KF_MIXED && u[kf_distance_drivers[k]] < 0.0) {
-            kf_append_place(solver->message, u, KF_ROUGHLY, -1);
-            kf_append(solver->message, ": a distance cannot be negative");
-            return kf_failed(pose, KF_OUTSIDE);
-        }
-    }
     status = kf_advance_mixed(solver, start, u, pose);
 #else
     status = kf_assembled(solver, start, u, u, start->found.x, pose);

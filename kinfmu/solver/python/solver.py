@@ -17,7 +17,7 @@ from .span import REGULAR
 from .status import Status
 from .survey import surveyed
 from .tracks import MIXED, Track, Tracks, on_track, rates_in_time, tracks_of
-from .trusted_step import LONGEST_STEP, keeps_branch, trusted_step
+from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
 
@@ -71,6 +71,11 @@ class Solver:
         refused = self._refused(start, u, self.model.DISTANCES)
         if refused is not None:
             return refused
+        if not self._one:  # most samples of several drivers: one trusted step, too
+            direction, distance = straight_path(self.model, start.u, u)
+            near = trusted_step(self.model, start, direction, distance, u) if distance <= LONGEST_STEP else None
+            if near is not None and near.margin >= REGULAR and near.watch <= self.tolerance >= near.residual:
+                return near
         pose = advance(self.model, start, u, singularities)
         if isinstance(pose, Limit):
             return failed(start, u, Status.OUTSIDE, limit_message(self.model, pose, u))
