@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engines import ENGINES, Engine, Way
+from kinfmu.bench.engines import ENGINES, Engine, Sampler
 from kinfmu.bench.rounds import Spread, samples_in_turn, spread
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
@@ -53,26 +53,28 @@ def measure(
     tell: Tell = lambda _: None,
     engines: Sequence[Engine] = ENGINES,
 ) -> Result:
-    """Errors of one whole sweep of every way; then times, all ways of a mechanism once a round."""
+    """Errors of one whole sweep of every sampler; then times, all samplers of a mechanism once a round."""
     measured: list[Measured] = []
     absent: dict[str, None] = {}
     for name in mechanisms:
         case = of_gallery(name)
-        ways: list[tuple[Engine, Setting, Way]] = []
+        samplers: list[tuple[Engine, Setting, Sampler]] = []
         for engine in engines:
             for setting in engine.settings:
                 tell(f"{name}: {engine.name}")
-                way = prepared(engine, case, setting, absent)
-                if way is not None:
-                    ways.append((engine, setting, way))
+                sampler = prepared(engine, case, setting, absent)
+                if sampler is not None:
+                    samplers.append((engine, setting, sampler))
         errors = []
-        for engine, _, way in ways:
+        for engine, _, sampler in samplers:
             tell(f"{name}: {engine.name}, errors")
-            errors.append(largest(case, way))
-        times = samples_in_turn([quietly(way) for _, _, way in ways], rounds, len(case.t), each=partial(tell, name))
+            errors.append(largest(case, sampler))
+        times = samples_in_turn(
+            [quietly(sampler) for _, _, sampler in samplers], rounds, len(case.t), each=partial(tell, name)
+        )
         measured += [
             Measured(name, engine.name, setting, setting == engine.usual, per_lap(engine, microseconds), error)
-            for (engine, setting, _), microseconds, error in zip(ways, times, errors, strict=True)
+            for (engine, setting, _), microseconds, error in zip(samplers, times, errors, strict=True)
         ]
     return Result(tuple(measured), tuple(absent))
 
@@ -82,34 +84,34 @@ def steps(mechanisms: Sequence[str] = MECHANISMS, rounds: int = ROUNDS, engines:
     return len(mechanisms) * (rounds + 2 * sum(len(engine.settings) for engine in engines))
 
 
-def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, None]) -> Way | None:
-    """A way to be measured; None if there is none, with a line in `absent` if a package is missing."""
+def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, None]) -> Sampler | None:
+    """A sampler to be measured; None if there is none, with a line in `absent` if a package is missing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other people's packages
-            return engine.way(case, setting)
+            return engine.sampler(case, setting)
     except MissingPackageError as error:
         absent[str(error)] = None
         return None
 
 
 def per_lap(engine: Engine, microseconds: Sequence[float]) -> Spread:
-    """What a sample takes, of an engine whose ways take each several times in a call."""
+    """What a sample takes, of an engine whose samplers take each several times in a call."""
     return spread([value / engine.laps for value in microseconds])
 
 
-def quietly(way: Way) -> Way:
-    """The same way without warnings of other people's packages on stderr, such as those of a singular matrix."""
+def quietly(sampler: Sampler) -> Sampler:
+    """The same sampler without warnings of other people's packages on stderr, such as those of a singular matrix."""
 
     def take(n: int) -> Sequence[Sequence[float]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return way(n)
+            return sampler(n)
 
     return take
 
 
-def largest(case: Case, way: Way) -> tuple[float, float, float]:
+def largest(case: Case, sampler: Sampler) -> tuple[float, float, float]:
     """Largest error of q, qd, qdd over a whole sweep."""
-    q, qd, qdd = case.errors(quietly(way)(len(case.t))).max(axis=0).tolist()
+    q, qd, qdd = case.errors(quietly(sampler)(len(case.t))).max(axis=0).tolist()
     return q, qd, qdd

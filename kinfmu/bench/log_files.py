@@ -35,7 +35,7 @@ TURNS = 0.5  # of the crank
 PER_DOUBLE, PER_ROW = 9.0, 20.0  # [bytes] that a file may take
 
 
-class Way(NamedTuple):
+class LogTask(NamedTuple):
     """Something that writes the first `rows` samples of a run to a file, or reads them."""
 
     name: str
@@ -52,22 +52,22 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str
     long_run = fourbar(samples)
     processor: dict[str, list[float]] = {}
     with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
-        found, absent = ways(long_run, Path(folder))
-        takes = [_timed(way.take, processor.setdefault(way.name, [])) for way in found]
+        found, absent = tasks(long_run, Path(folder))
+        takes = [_timed(task.take, processor.setdefault(task.name, [])) for task in found]
         clock = in_turn(takes, rounds, perf_counter)
-        sizes = [way.file.stat().st_size / way.rows for way in found]
+        sizes = [task.file.stat().st_size / task.rows for task in found]
     doubles = len(list(long_run.places()))
     lines = [
         f"{samples} samples of the four-bar, {doubles} columns of 8 bytes, {rounds} rounds in turn",
         f"{'':40}{'million rows/s':>16}{'best':>7}{'processor':>13}{'mcap/this':>11}{'size':>14}",
     ]
     usual = spread([value / found[0].rows for value in processor[found[0].name][1:]]).median
-    for way, seconds, size in zip(found, clock, sizes, strict=True):
-        speed = spread([way.rows / value / 1e6 for value in seconds])
-        busy = spread([value / way.rows for value in processor[way.name][1:]]).median  # the first round warms up
+    for task, seconds, size in zip(found, clock, sizes, strict=True):
+        speed = spread([task.rows / value / 1e6 for value in seconds])
+        busy = spread([value / task.rows for value in processor[task.name][1:]]).median  # the first round warms up
         share = "" if absent else f"{usual / busy:.1f}"
         figures = f"{speed.median:16.2f}{speed.high:7.2f}{busy * 1e6:6.2f} us/row{share:>11}{size:8.1f} B/row"
-        lines.append(f"{way.name:40}{figures}")
+        lines.append(f"{task.name:40}{figures}")
     allowed = PER_DOUBLE * doubles + PER_ROW
     recorded, best = found[-1].rows, min(clock[-1])
     lines.append(f"a Rerun recording of {recorded} samples, its record read, takes {best:.2f} s at best")
@@ -93,7 +93,7 @@ def fourbar(samples: int) -> Run:
     return replace(found, margin=found.margin, error=found.error)  # computed when they are read here
 
 
-def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
+def tasks(long_run: Run, folder: Path) -> tuple[list[LogTask], str]:
     """Return the measurements, the package mcap first if it is installed, and a note if it is not."""
     n = len(long_run)
     record, everything = folder / "record.mcap", folder / "everything.mcap"
@@ -101,11 +101,11 @@ def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
     reviewed = long_run.part(slice(0, MOST_ROWS))
     write_mcap(reviewed, short)
     found = [
-        Way("MCAP: the record", n, lambda: write_mcap(long_run, record, channels=["-drawn"]), record),
-        Way("MCAP: the record and what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
-        Way("the record read back", n, lambda: read(record), record),
-        Way("the record read back from all that", n, lambda: read(everything), everything),
-        Way("a record made a Rerun recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
+        LogTask("MCAP: the record", n, lambda: write_mcap(long_run, record, channels=["-drawn"]), record),
+        LogTask("MCAP: the record and what viewers draw", n, lambda: write_mcap(long_run, everything), everything),
+        LogTask("the record read back", n, lambda: read(record), record),
+        LogTask("the record read back from all that", n, lambda: read(everything), everything),
+        LogTask("a record made a Rerun recording", len(reviewed), lambda: write_rrd(read(short), recording), recording),
     ]
     try:
         return [_plain(long_run, folder / "plain.mcap"), *found], ""
@@ -113,7 +113,7 @@ def ways(long_run: Run, folder: Path) -> tuple[list[Way], str]:
         return found, str(error)
 
 
-def _plain(long_run: Run, file: Path) -> Way:
+def _plain(long_run: Run, file: Path) -> LogTask:
     """The record by the package mcap: messages that are ready bytes, one call each."""
     if find_spec("mcap") is None:
         raise MissingPackageError("mcap is not installed: pip install 'kinfmu[bench]'")
@@ -135,4 +135,4 @@ def _plain(long_run: Run, file: Path) -> Way:
                 writer.add_message(channel, stamp, message, stamp, number)
             writer.finish()
 
-    return Way("the record by the package mcap", len(part), take, file)
+    return LogTask("the record by the package mcap", len(part), take, file)

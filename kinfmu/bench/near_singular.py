@@ -33,7 +33,7 @@ class Passage(NamedTuple):
     beyond: Sequence[Sequence[float]]
 
 
-class Row(NamedTuple):
+class ChartRow(NamedTuple):
     """What was measured at one singular point; distances: [rad], falling."""
 
     title: str
@@ -41,7 +41,7 @@ class Row(NamedTuple):
     passages: Sequence[Passage]
 
 
-def near_singular(paths: tuple[Path, ...], rows: Sequence[Row], looks: Mapping[str, Look]) -> None:
+def near_singular(paths: tuple[Path, ...], rows: Sequence[ChartRow], looks: Mapping[str, Look]) -> None:
     """Draw the chart into .svg or .png files; looks: of the engines.
 
     Raises FigureError, MissingPackageError as `draw.writing.write` does.
@@ -49,7 +49,7 @@ def near_singular(paths: tuple[Path, ...], rows: Sequence[Row], looks: Mapping[s
     write(paths, lambda: _chart(rows, looks))
 
 
-def _chart(rows: Sequence[Row], looks: Mapping[str, Look]) -> Figure:
+def _chart(rows: Sequence[ChartRow], looks: Mapping[str, Look]) -> Figure:
     from matplotlib.figure import Figure
 
     height = _HEIGHT * len(rows)
@@ -69,7 +69,7 @@ def _chart(rows: Sequence[Row], looks: Mapping[str, Look]) -> Figure:
     return made
 
 
-def _panel(axes: Axes, row: Row, order: int, looks: Mapping[str, Look], *, is_last: bool) -> None:
+def _panel(axes: Axes, row: ChartRow, order: int, looks: Mapping[str, Look], *, is_last: bool) -> None:
     places = [math.log10(distance) for distance in row.distances]  # -1 ... -8
     nearest = min(places)
     x = [nearest - _GAP - place for place in places]

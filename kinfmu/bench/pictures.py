@@ -1,4 +1,4 @@
-"""What was measured as charts: run time against error, and the way through singular points."""
+"""What was measured as charts: run time against error, and the path through singular points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kinfmu import gallery
 from kinfmu.bench.accuracy import Measured
-from kinfmu.bench.near_singular import Passage, Row, near_singular
+from kinfmu.bench.near_singular import ChartRow, Passage, near_singular
 from kinfmu.bench.singular import DISTANCES, Near
 from kinfmu.bench.work_precision import Curve, Panel, work_precision
 from kinfmu.draw.chart import Look
@@ -82,7 +82,7 @@ def draw_singular(folder: Path, near: Sequence[Near]) -> tuple[Path, ...]:
             for one in near
             if one.point == point
         ]
-        rows.append(Row(point, DISTANCES, passages))
+        rows.append(ChartRow(point, DISTANCES, passages))
     near_singular(paths, rows, LOOKS)
     return paths
 

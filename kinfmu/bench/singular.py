@@ -10,15 +10,15 @@ import numpy as np
 
 from kinfmu.bench.accuracy import Tell, per_lap, prepared, quietly
 from kinfmu.bench.case import Case, along_driver
-from kinfmu.bench.engines import ENGINES, Engine, Way
+from kinfmu.bench.engines import ENGINES, Engine, Sampler
 from kinfmu.bench.rounds import Spread, samples_in_turn
-from kinfmu.bench.singular_points import POINTS, Point
+from kinfmu.bench.singular_points import POINTS, SingularCase
 from kinfmu.errors import MissingPackageError
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 
 DISTANCES = tuple(10.0 ** (-0.5 * k) for k in range(2, 17))  # [rad], 1e-1 to 1e-8
-STEP = math.radians(2.0)  # of the way there
+STEP = math.radians(2.0)  # of the path there
 ROUNDS = 7
 
 
@@ -34,18 +34,18 @@ class Near(NamedTuple):
     before: FloatArray
     at: FloatArray
     beyond: FloatArray
-    microseconds: Spread  # a sample of the whole way
+    microseconds: Spread  # a sample of the whole path
 
 
-def case_of(point: Point) -> Case:
-    """The way from the start past the point: steps of STEP, then the DISTANCES before, the point, those beyond."""
+def case_of(point: SingularCase) -> Case:
+    """The path from the start past the point: steps of STEP, then the DISTANCES before, the point, those beyond."""
     first, last = point.start, point.centre - 2.0 * DISTANCES[0]
-    way = np.linspace(first, last, math.ceil((last - first) / STEP) + 1).tolist()
+    steps = np.linspace(first, last, math.ceil((last - first) / STEP) + 1).tolist()
     before = [point.centre - d for d in DISTANCES]
     beyond = [point.centre + d for d in reversed(DISTANCES)]
-    u = [*way, *before, point.centre, *beyond]
+    u = [*steps, *before, point.centre, *beyond]
     plan = compile_plan(point.mechanism(), point.columns)
-    return along_driver(point.title, plan, u, range(len(way), len(u)), point.closed_form)
+    return along_driver(point.title, plan, u, range(len(steps), len(u)), point.closed_form)
 
 
 def measure(
@@ -60,26 +60,26 @@ def measure(
         except MissingPackageError as missing:
             absent[f"{point.title}: {missing}"] = None
             continue
-        ways: list[tuple[Engine, Way]] = []
+        samplers: list[tuple[Engine, Sampler]] = []
         for engine in engines:
-            way = prepared(engine, case, engine.usual, absent)
-            if way is not None:
-                ways.append((engine, quietly(way)))
+            sampler = prepared(engine, case, engine.usual, absent)
+            if sampler is not None:
+                samplers.append((engine, quietly(sampler)))
         k = len(DISTANCES)
         errors = []
-        for engine, way in ways:
-            errors.append(case.errors(way(len(case.t))))
+        for engine, sampler in samplers:
+            errors.append(case.errors(sampler(len(case.t))))
             tell(f"{point.title}: {engine.name}")
-        times = samples_in_turn([_whole(way, len(case.t)) for _, way in ways], rounds, 1, fewest=1)
-        for (engine, _), error, seconds in zip(ways, errors, times, strict=True):
+        times = samples_in_turn([_whole(sampler, len(case.t)) for _, sampler in samplers], rounds, 1, fewest=1)
+        for (engine, _), error, seconds in zip(samplers, errors, times, strict=True):
             microseconds = per_lap(engine, [value / len(case.t) for value in seconds])
             found.append(Near(point.title, engine.name, error[:k], error[k], error[:k:-1], microseconds))
     return tuple(found), tuple(absent)
 
 
-def _whole(way: Way, n: int) -> Callable[[int], object]:
-    """The whole way, counted as one sample."""
-    return lambda _: way(n)
+def _whole(sampler: Sampler, n: int) -> Callable[[int], object]:
+    """Return the sampler of the whole path, counted as one sample."""
+    return lambda _: sampler(n)
 
 
 def steps(engines: Sequence[Engine] = ENGINES) -> int:

@@ -49,7 +49,7 @@ crank = { type = "angle", of = "crank", law = "constant_speed", start = 0.5, spe
 """
 
 
-class Point(NamedTuple):
+class SingularCase(NamedTuple):
     """A singular point that a mechanism passes, and its motion there in closed form."""
 
     title: str
@@ -74,7 +74,7 @@ def _isosceles(u: float) -> FloatArray:
 
 FOURBAR = ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
 POINTS = (
-    Point(
+    SingularCase(
         "four-bar 4-1-3-2 at 180 deg",
         lambda: parse(CHANGE_POINT_FOURBAR, "change_point_fourbar"),
         FOURBAR,
@@ -82,7 +82,7 @@ POINTS = (
         1.0,
         lambda u: exact_fourbar(4, 1, 3, 2, u),
     ),
-    Point(
+    SingularCase(
         "reference four-bar at 180 deg",
         lambda: gallery.load("fourbar"),
         FOURBAR,
@@ -90,7 +90,7 @@ POINTS = (
         math.radians(60.0),
         _parallelogram,
     ),
-    Point(
+    SingularCase(
         "slider-crank, rod = crank, at 90 deg",
         lambda: parse(EQUAL_SLIDER_CRANK, "equal_slider_crank"),
         ("crank.phi", "rod.x", "rod.y", "rod.phi", "piston.x"),

@@ -27,7 +27,7 @@ _ELSEWHERE = {
 }
 
 
-class Setting(ArgumentType):
+class SettingArgument(ArgumentType):
     """NAME=VALUE."""
 
     name = "NAME=VALUE"
@@ -42,7 +42,7 @@ class Setting(ArgumentType):
 set_option = click.option(
     "--set",
     "settings",
-    type=Setting(),
+    type=SettingArgument(),
     multiple=True,
     help="Set a parameter or a law's constant, such as crank=40mm or crank.speed=30rpm. Repeat for several.",
 )

@@ -33,7 +33,7 @@ class Channel(NamedTuple):
     metadata: dict[str, str]
 
 
-class Block(NamedTuple):
+class MessageBlock(NamedTuple):
     """Messages of one channel and of one length: sequence numbers (n,), log times (n,) [ns], payloads (n, length)."""
 
     sequence: NDArray[np.uint32]
@@ -74,7 +74,7 @@ class McapReader:
         """Return the number of a topic's channel, None if there is none."""
         return next((number for number, channel in self.channels.items() if channel.topic == topic), None)
 
-    def blocks(self, channel: int, length: int | None = None) -> Iterator[Block]:
+    def blocks(self, channel: int, length: int | None = None) -> Iterator[MessageBlock]:
         """Yield the messages of a channel in file order; length: of each payload, if all are of one length.
 
         LogError for a damaged chunk, and for chunks whose unpacked size is larger than valid ones can be.
@@ -210,7 +210,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
     raise ValueError(f"compression {quoted(compression)} is not known; known: zstd, lz4")
 
 
-def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Block]:
+def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[MessageBlock]:
     """Yield the messages of a channel in an unpacked chunk at byte `place`; most: largest valid number of records."""
     length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
     if length and len(raw) % length == 0:
@@ -242,6 +242,6 @@ def _are_uniform(heads: NDArray[np.void]) -> bool:
     )
 
 
-def _block(records: Bytes) -> Block:
+def _block(records: Bytes) -> MessageBlock:
     heads = records[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0]
-    return Block(heads["sequence"], heads["log"], records[:, MESSAGE.itemsize :])
+    return MessageBlock(heads["sequence"], heads["log"], records[:, MESSAGE.itemsize :])

@@ -54,7 +54,7 @@ class Block:
         return tuple(entry for row in self.jacobian for entry in row)
 
 
-class Rates:
+class TimeDerivatives:
     """Derivatives with respect to time on the graph: each symbol's rate is the symbol of its next derivative."""
 
     def __init__(self, tracer: Tracer, fixed: Mapping[str, Node]) -> None:
@@ -89,7 +89,7 @@ def build_block(
     system: System,
     tracer: Tracer,
     row: RowTracer,
-    rates: Rates,
+    rates: TimeDerivatives,
     structure: BlockStructure,
     fixed: Mapping[str, Node],
     anchor: Mapping[str, float],

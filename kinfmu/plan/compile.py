@@ -12,7 +12,7 @@ from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
-from kinfmu.plan.block import Block, Rates, build_block
+from kinfmu.plan.block import Block, TimeDerivatives, build_block
 from kinfmu.plan.conditions import find_conditions, refuse_inconsistent, refuse_mobility, refuse_negative_distances
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, Motion, PlanParameter, SolvePlan, nodes_of, position_count
@@ -76,7 +76,7 @@ def plan_from(
     set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy, anchor.q)
     known = structure.fixed
-    rates, row = Rates(tracer, structure.fixed), RowTracer(system, tracer)
+    rates, row = TimeDerivatives(tracer, structure.fixed), RowTracer(system, tracer)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
@@ -113,7 +113,7 @@ def plan_from(
 
 
 def _outputs(
-    mechanism: Mechanism, origin: Point, tracer: Tracer, rates: Rates, known: Mapping[str, Node]
+    mechanism: Mechanism, origin: Point, tracer: Tracer, rates: TimeDerivatives, known: Mapping[str, Node]
 ) -> tuple[list[Motion[CoordinateName]], int, dict[CoordinateName, Node]]:
     """Return outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":

@@ -31,13 +31,13 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 @pytest.mark.parametrize("engine", [Shipped(), Native(), Generated(), Dense()], ids=lambda engine: engine.name)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Case) -> None:
-    way = engine.way(case, engine.usual)
-    assert way is not None
-    assert max(largest(case, way)) <= ROUND_OFF
+    sampler = engine.sampler(case, engine.usual)
+    assert sampler is not None
+    assert max(largest(case, sampler)) <= ROUND_OFF
 
 
 def test_fsolve_is_as_good_as_its_tolerance(case: Case) -> None:
-    rough, fine = (largest(case, Fsolve().way(case, Setting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
+    rough, fine = (largest(case, Fsolve().sampler(case, Setting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
     assert fine <= ROUND_OFF
     assert fine <= rough <= 1e-2
 
@@ -50,10 +50,10 @@ def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> N
     pytest.importorskip(package)
     jansen = of_gallery("jansen_leg")
     absent: dict[str, None] = {}
-    way = prepared(engine, jansen, engine.usual, absent)
-    assert way is not None
+    sampler = prepared(engine, jansen, engine.usual, absent)
+    assert sampler is not None
     assert not absent
-    assert max(largest(jansen, way)) <= 1e-11
+    assert max(largest(jansen, sampler)) <= 1e-11
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_peer_that_is_not_installed_is_reported_in_one_line(
     crank_rocker = of_gallery("crank_rocker")
     message = f"{name} is not installed: pip install 'kinfmu[bench]'"
     with pytest.raises(MissingPackageError) as caught:
-        engine.way(crank_rocker, engine.usual)
+        engine.sampler(crank_rocker, engine.usual)
     assert str(caught.value) == message
     absent: dict[str, None] = {}
     assert prepared(engine, crank_rocker, engine.usual, absent) is None
@@ -84,13 +84,13 @@ def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatc
 
 
 def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
-    assert Pylinkage().way(case, Pylinkage().usual) is None
+    assert Pylinkage().sampler(case, Pylinkage().usual) is None
 
 
 def test_better_predictors_need_fewer_corrections_for_the_same_error() -> None:
     crank_rocker = of_gallery("crank_rocker")
     for engine in (Generated(), Dense()):
-        errors = [largest(crank_rocker, engine.way(crank_rocker, Setting(k, corrections=1)))[0] for k in range(3)]
+        errors = [largest(crank_rocker, engine.sampler(crank_rocker, Setting(k, corrections=1)))[0] for k in range(3)]
         assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
 
 
@@ -99,8 +99,8 @@ def test_the_dense_engine_to_round_off_is_the_reference_to_the_bit(case: Case) -
     u, ud, udd = (np.array(table[0]) for table in (case.u, case.ud, case.udd))
     solution = solve_reference(system, case.rows, case.start_coordinates, u, ud, udd)
     chosen = [system.coordinates.index(name) for name in case.columns]
-    way = Dense().way(case, Setting(0))
-    assert way(1)[0] == [*solution.q[chosen], *solution.qd[chosen], *solution.qdd[chosen]]
+    sampler = Dense().sampler(case, Setting(0))
+    assert sampler(1)[0] == [*solution.q[chosen], *solution.qd[chosen], *solution.qdd[chosen]]
 
 
 def test_a_column_that_is_zero_is_judged_by_its_kind_and_a_sample_not_found_is_no_number() -> None:
@@ -171,9 +171,9 @@ def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
     point: singular.Point, engine: Engine
 ) -> None:
     case = singular.case_of(point)
-    way = engine.way(case, Setting())
-    assert way is not None
-    q, qd, qdd = case.errors(way(len(case.t))).max(axis=0)
+    sampler = engine.sampler(case, Setting())
+    assert sampler is not None
+    q, qd, qdd = case.errors(sampler(len(case.t))).max(axis=0)
     assert q <= 1e-13
     assert qd <= 1e-11
     assert qdd <= 1e-9

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from kinfmu.bench.engines.casadi_newton import Casadi
 from kinfmu.bench.engines.dense import Dense
-from kinfmu.bench.engines.engine import Engine, Way
+from kinfmu.bench.engines.engine import Engine, Sampler
 from kinfmu.bench.engines.generated import Generated
 from kinfmu.bench.engines.native import Native
 from kinfmu.bench.engines.pylinkage_dyads import Pylinkage
@@ -16,4 +16,4 @@ from kinfmu.bench.engines.shipped import Shipped
 
 ENGINES: tuple[Engine, ...] = (Shipped(), Native(), Generated(), Dense(), Fsolve(), Casadi(), Pylinkage())
 
-__all__ = ["ENGINES", "Casadi", "Dense", "Engine", "Fsolve", "Generated", "Native", "Pylinkage", "Shipped", "Way"]
+__all__ = ["ENGINES", "Casadi", "Dense", "Engine", "Fsolve", "Generated", "Native", "Pylinkage", "Sampler", "Shipped"]

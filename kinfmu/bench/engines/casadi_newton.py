@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Way
+from kinfmu.bench.engines.engine import Engine, Sampler
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.measures import arithmetic
@@ -24,7 +24,7 @@ class Casadi(Engine):
     settings: Sequence[Setting] = tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST))
     usual = Setting(0, FINEST)
 
-    def way(self, case: Case, setting: Setting) -> Way:
+    def sampler(self, case: Case, setting: Setting) -> Sampler:
         try:
             import casadi
         except ImportError:

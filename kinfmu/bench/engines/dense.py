@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.engines.engine import GAP, Engine, Sampler
 from kinfmu.bench.setting import ROUND_OFF, Setting, newton
 from kinfmu.equations.reference import Solution
 from kinfmu.equations.system import FloatArray, System
@@ -24,7 +24,7 @@ class Dense(Engine):
     settings: Sequence[Setting] = newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,))  # the slowest
     usual = Setting()
 
-    def way(self, case: Case, setting: Setting) -> Way:
+    def sampler(self, case: Case, setting: Setting) -> Sampler:
         system, rows, q0 = case.system, case.rows, case.start_coordinates
         chosen = [system.coordinates.index(name) for name in case.columns]
         gap = (GAP,) * (3 * len(chosen))

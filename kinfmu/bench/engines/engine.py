@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from kinfmu.bench.case import Case, Motion
 from kinfmu.bench.setting import Setting
 
-Way = Callable[[int], Motion]  # takes the first n samples of a case, and gives a row of q, qd, qdd for each
+Sampler = Callable[[int], Motion]  # takes the first n samples of a case, and gives a row of q, qd, qdd for each
 GAP = float("nan")  # in place of numbers that were not found
 
 
@@ -32,11 +32,11 @@ class Engine(ABC):
 
     @property
     def laps(self) -> int:
-        """How often a call of its ways goes through the samples: more than once for engines made for long arrays."""
+        """How often a call of a sampler takes the samples: more than once for engines made for long arrays."""
         return 1
 
     @abstractmethod
-    def way(self, case: Case, setting: Setting) -> Way | None:
+    def sampler(self, case: Case, setting: Setting) -> Sampler | None:
         """A function that takes samples, ready to be timed; None if the engine cannot state the mechanism.
 
         Raises MissingPackageError if its package is not installed.

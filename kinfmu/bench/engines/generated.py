@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.engines.engine import GAP, Engine, Sampler
 from kinfmu.bench.setting import Setting, newton
 from kinfmu.bench.stopping import model_with
 
@@ -17,7 +17,7 @@ class Generated(Engine):
     settings: Sequence[Setting] = newton()
     usual = Setting()
 
-    def way(self, case: Case, setting: Setting) -> Way:
+    def sampler(self, case: Case, setting: Setting) -> Sampler:
         model = model_with(case.plan, setting)
         start = case.start
         alone = len(case.u[0]) == 1
@@ -38,10 +38,10 @@ class Generated(Engine):
                         zd = tangent[0]
                         zdd = tangent[1] if setting.predictor > 1 else rest
                 else:
-                    s, way = 1.0, tuple([b - a for a, b in zip(here, u)])  # noqa: B905  one a driver, both
+                    s, sampler = 1.0, tuple([b - a for a, b in zip(here, u)])  # noqa: B905  one a driver, both
                     if setting.predictor:
-                        zd = model.velocity(values, way)
-                        zdd = model.acceleration(values, way, still, zd) if setting.predictor > 1 else rest
+                        zd = model.velocity(values, sampler)
+                        zdd = model.acceleration(values, sampler, still, zd) if setting.predictor > 1 else rest
                 try:
                     found = model.position(u, z, zd, zdd, s)
                     if alone:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Way
+from kinfmu.bench.engines.engine import Engine, Sampler
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.sweep.library import Library
@@ -16,7 +16,7 @@ from kinfmu.sweep.library import Library
 class Native(Engine):
     """What `kinfmu.solve(engine="native")` runs on: a call takes the samples there and back, again and again.
 
-    What a call costs once, such as the way from the anchor to the first sample, counts as little as in a long sweep.
+    What a call costs once, such as the path from the anchor to the first sample, counts as little as in a long sweep.
     """
 
     name = "kinfmu native"
@@ -24,7 +24,7 @@ class Native(Engine):
     usual = Setting()
     laps = 50
 
-    def way(self, case: Case, setting: Setting) -> Way:  # noqa: ARG002  there is one
+    def sampler(self, case: Case, setting: Setting) -> Sampler:  # noqa: ARG002  there is one
         try:
             library = Library(case.plan)
         except CompilerError as error:

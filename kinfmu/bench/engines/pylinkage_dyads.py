@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Way
+from kinfmu.bench.engines.engine import Engine, Sampler
 from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
@@ -28,7 +28,7 @@ class Pylinkage(Engine):
     settings: Sequence[Setting] = (Setting(0),)
     usual = Setting(0)
 
-    def way(self, case: Case, setting: Setting) -> Way | None:  # noqa: ARG002  there is one
+    def sampler(self, case: Case, setting: Setting) -> Sampler | None:  # noqa: ARG002  there is one
         if case.name not in _LINKAGES:
             return None
         try:

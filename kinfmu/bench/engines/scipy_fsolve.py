@@ -12,7 +12,7 @@ from itertools import chain
 from typing import Any
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.engines.engine import GAP, Engine, Sampler
 from kinfmu.bench.setting import Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism import Parameter
@@ -39,7 +39,7 @@ class Fsolve(Engine):
     settings: Sequence[Setting] = tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST))
     usual = Setting(0, DEFAULT)
 
-    def way(self, case: Case, setting: Setting) -> Way:
+    def sampler(self, case: Case, setting: Setting) -> Sampler:
         from scipy.optimize import fsolve
 
         model = _distinct(case)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Way
+from kinfmu.bench.engines.engine import GAP, Engine, Sampler
 from kinfmu.bench.setting import Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.solver.python import Solver
@@ -18,7 +18,7 @@ class Shipped(Engine):
     settings: Sequence[Setting] = (Setting(),)
     usual = Setting()
 
-    def way(self, case: Case, setting: Setting) -> Way:  # noqa: ARG002  there is one
+    def sampler(self, case: Case, setting: Setting) -> Sampler:  # noqa: ARG002  there is one
         solver = Solver(load_model(case.plan))
         start = solver.solve(solver.anchor, case.u[0])
         gap = (GAP,) * (3 * len(case.columns))
