@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
@@ -9,7 +10,13 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from kinfmu.codegen.c import compiler
+from kinfmu.fmu.native import archive
+from kinfmu.sweep import library
+
 GOLDEN = Path(__file__).parent / "golden"
+
+SHIPPED_FLAGS = {module: module.FLAGS for module in (compiler, archive, library)}
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.load_profile("kinfmu")
@@ -26,6 +33,27 @@ def python_fmus() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "default_flavour", default_flavour)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """C is compiled without optimization, which gives the same numbers, and once for all workers of a run."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINFMU_CACHE", str(folder / "compiled"))
+        for module, flags in SHIPPED_FLAGS.items():
+            quick = ["-O0" if flag.startswith("-O") else flag for flag in flags if flag != "-march=native"]
+            patch.setattr(module, "FLAGS", tuple(quick))
+        yield
+
+
+@pytest.fixture
+def optimized(monkeypatch: pytest.MonkeyPatch) -> None:
+    """C is compiled with the flags of the package, as for a user."""
+    for module, flags in SHIPPED_FLAGS.items():
+        monkeypatch.setattr(module, "FLAGS", flags)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

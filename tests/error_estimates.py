@@ -97,20 +97,24 @@ def statistics(numbers: Sequence[Number]) -> Statistics:
 
 def compared(family: str, place: str, run: Run, size: float, exact: Sequence[Exact]) -> Iterator[Number]:
     """Yield the estimates of a run with its errors; samples without numbers are left out."""
+    coordinates = {name: coordinate for name in exact[0] if (coordinate := read_coordinate(name)) is not None}
+    columns = {
+        name: [run[coordinate.derivative(order)].tolist() for order in range(3)]
+        for name, coordinate in coordinates.items()
+    }
     for k, motion in enumerate(exact):
         if not run.good[k]:
             continue
         for order in range(3):
             error = scale = mp.zero
             for name, series in motion.items():
-                coordinate = read_coordinate(name)
-                assert coordinate is not None
+                coordinate = coordinates[name]
                 unit = 1 if coordinate.is_angle else mp.mpf(size)
                 value = mp.factorial(order) * series.c[order]
-                gap = mp.mpf(float(run[coordinate.derivative(order)][k])) - value
+                gap = mp.mpf(columns[name][order][k]) - value
                 if coordinate.is_angle and order == 0:
                     gap -= 2 * mp.pi * mp.nint(gap / (2 * mp.pi))
-                    value = mp.mpf(float(run[name][k]))  # with the turns kept
+                    value = mp.mpf(columns[name][0][k])  # with the turns kept
                 error, scale = max(error, abs(gap) / unit), max(scale, abs(value) / unit)
             estimate = float(run.error[k, order])
             yield Number(

@@ -119,15 +119,15 @@ def test_ranges_need_no_more_outputs_than_the_file_asks_for() -> None:
 
 
 def test_a_large_mechanism_has_a_short_report() -> None:
-    report = kinfmu.check(fourbar_chain(80))
+    report = kinfmu.check(fourbar_chain(30))
     assert report.range is not None
     assert report.range.turns == 1
-    assert len(report.loops) == 80
+    assert len(report.loops) == 30
     assert {named.grashof.shape for named in report.loops} == {"parallelogram"}
     text = str(report)
-    assert "and 72 more four-bars and slider-cranks" in text
-    assert "bodies      161 moving: bar_0, bar_1, coupler_1" in text
-    assert "and 137 more" in text
+    assert "and 22 more four-bars and slider-cranks" in text
+    assert "bodies      61 moving: bar_0, bar_1, coupler_1" in text
+    assert "and 37 more" in text
     assert len(text) < 10_000
 
 

@@ -70,13 +70,6 @@ class Compiled:
         return [value for row in rows for value in row]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 @pytest.mark.parametrize("name", [*gallery.names(), "fourbar_chain:60", "open_chain:60"])
 def test_c_and_python_agree_to_the_bit(name: str) -> None:
     plan = compile_plan(kinfmu.load(name))

@@ -22,6 +22,8 @@ from kinfmu.errors import CompilerError
 
 SEVEN = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
 EIGHT = {"a.c": "int f(void);\nint f(void) { return 8; }\n"}
+pytestmark = pytest.mark.usefixtures("optimized")  # the flags of other processes, with which the cache is shared
+
 LOAD = f"from kinfmu.codegen.c import compiler; print(compiler.load({SEVEN!r}).f())"
 
 

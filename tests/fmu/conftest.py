@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 
 import kinfmu
-from kinfmu.codegen.c import compiler
 from kinfmu.fmu import build
 from kinfmu.fmu.interface import Drive
-from kinfmu.fmu.native import archive
 from kinfmu.mechanism import Mechanism, toml_file
 from tests.fmu.host import Host
 
@@ -36,17 +34,6 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Drive], Pa
         return paths[name, drive]
 
     return get
-
-
-@pytest.fixture(scope="package", autouse=True)
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compile libraries without optimization, into a cache of the tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        for module in (compiler, archive):
-            quick = ["-O0" if flag.startswith("-O") else flag for flag in module.FLAGS]  # the same numbers
-            patch.setattr(module, "FLAGS", quick)
-        yield
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,6 @@ from kinfmu.cli import main
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import CompilerError
 from kinfmu.fmu.build import default_flavour
-from kinfmu.fmu.native import archive
 from kinfmu.fmu.native.platforms import host
 
 module = import_module("kinfmu.fmu.build")
@@ -23,11 +22,9 @@ module = import_module("kinfmu.fmu.build")
 
 @pytest.fixture(autouse=True)
 def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Restore the defaults that other tests change; compile without optimization, into a folder of each test."""
+    """Restore the default that other tests change; compile into a folder of each test."""
     monkeypatch.setattr(module, "default_flavour", default_flavour)
     monkeypatch.setenv("KINFMU_CACHE", str(tmp_path / "cache"))
-    for one in (compiler, archive):
-        monkeypatch.setattr(one, "FLAGS", ["-O0" if flag.startswith("-O") else flag for flag in one.FLAGS])
     monkeypatch.chdir(tmp_path)
 
 

@@ -11,6 +11,7 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import kinfmu
 from kinfmu import AngleDriver, Body, ConstantSpeed, Mechanism, Revolute, Run
+from kinfmu.plan import SolvePlan, compile_plan
 from tests import mechanisms
 from tests.power_series import mp
 
@@ -37,9 +39,13 @@ class Case:
     mechanism: Mechanism
     motion: Callable[[LongArray], Motion]
 
+    @cached_property
+    def plan(self) -> SolvePlan:
+        return compile_plan(self.mechanism)
+
     def run(self, u: ArrayLike, **inputs: Any) -> Run:
         """The run over crank angles."""
-        return kinfmu.solve(self.mechanism, crank_angle=u, **inputs)
+        return kinfmu.solve(self.plan, crank_angle=u, **inputs)
 
     def errors(self, run: Run, speed: float = 1.0) -> NDArray[np.float64]:
         """Largest errors of q, qd, qdd of each good sample of a run at a constant speed, (n, 3); NaN for others.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 import re
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -72,10 +71,8 @@ class NativeLimit(ctypes.Structure):
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Native]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield Native(compile_plan(kinfmu.load("triple_rocker")))
+def native() -> Native:
+    return Native(compile_plan(kinfmu.load("triple_rocker")))
 
 
 def native_message(native: Native, limit: float, asked: float) -> str:

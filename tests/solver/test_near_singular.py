@@ -15,9 +15,7 @@ import pytest
 
 import kinfmu
 from kinfmu import Body
-from kinfmu.codegen.c import compiler
 from kinfmu.codegen.python import load_model
-from kinfmu.fmu.native import archive
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver, Status
@@ -39,14 +37,6 @@ ENGINES: tuple[Engine, ...] = ("python", "native")
 STRETCHED = math.acos(-11.0 / 12.0)  # [rad] of the five-bar's left arm, the right one mirrored
 GAPS = (1e-3, 1e-4, 5e-5, 1e-5)  # [rad] before it
 THERE_AND_BACK = [STRETCHED - gap for gap in (*GAPS, *GAPS[-2::-1])]
-
-
-@pytest.fixture(autouse=True)
-def compiled(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Libraries stay inside the tests, and are compiled quickly."""
-    monkeypatch.setenv("KINFMU_CACHE", str(tmp_path_factory.getbasetemp() / "compiled"))
-    for module in (compiler, archive):
-        monkeypatch.setattr(module, "FLAGS", ["-O0" if flag.startswith("-O") else flag for flag in module.FLAGS])
 
 
 @pytest.mark.parametrize("engine", ENGINES)

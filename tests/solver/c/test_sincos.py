@@ -35,11 +35,9 @@ void side_by_side(long n, const double *x, double *sine, double *cosine)
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        files = {"calls.c": CALLS, **compiler.sources(("sincos.h",))}
-        yield ctypes.CDLL(str(compiler.shared_library(files, (*STRICT, "-O3"))))
+def library() -> Any:
+    files = {"calls.c": CALLS, **compiler.sources(("sincos.h",))}
+    return ctypes.CDLL(str(compiler.shared_library(files, (*STRICT, "-O3"))))
 
 
 def evaluated(function: Any, x: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

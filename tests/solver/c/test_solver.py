@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import random
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -48,13 +48,6 @@ from tests.stress.trial import trial
 HEADERS = ("internal.h", "solver.h")
 QUICK = (*STRICT, "-O0")  # to compile
 Samples = Sequence[tuple[float, ...]]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KINFMU_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 def solver_of(plan: SolvePlan) -> Solver:
