@@ -105,9 +105,7 @@ def _loose(system: System, redundancy: Redundancy) -> list[str]:
     start = redundancy.assembly.start.q
     pose = next(iter(motion_samples(Part(system, redundancy.kept), start, 1)), start)
     free = null_space(system.scaled_jacobian(pose)[rows])
-    moves = {
-        name.partition(".")[0] for name, move in zip(system.coordinates, free, strict=True) if abs(move).max() > 1e-6
-    }
+    moves = {name.owner for name, move in zip(system.coordinates, free, strict=True) if abs(move).max() > 1e-6}
     return [body.name for body in system.mechanism.moving_bodies if body.name in moves]
 
 

@@ -21,6 +21,7 @@ from kinfmu import gallery, log
 from kinfmu.cli import main
 from kinfmu.cli.group import ORDER
 from kinfmu.fmu.native.platforms import host
+from kinfmu.units import CoordinateName
 from tests.cli.conftest import Command, read_csv
 from tests.log.runs import fourbar
 
@@ -203,7 +204,10 @@ def test_review_of_a_run_that_is_missing_is_reported(refuses: Callable[..., str]
 def test_review_says_what_two_runs_have_in_common(command: Command, tmp_path: Path) -> None:
     run = fourbar(np.arange(3.0))
     log.write_mcap(run, tmp_path / "a.mcap")
-    log.write_mcap(replace(run, outputs=tuple(f"b_{name}" for name in run.outputs)), tmp_path / "b.mcap")
+    log.write_mcap(
+        replace(run, outputs=tuple(CoordinateName(f"b_{name.owner}", name.axis) for name in run.outputs)),
+        tmp_path / "b.mcap",
+    )
     result = command("review", "a.mcap", "b.mcap", "--save", "both.rrd")
     assert (result.exit_code, result.stdout) == (0, "written: both.rrd\n")
     assert result.stderr == (

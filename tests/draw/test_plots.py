@@ -15,6 +15,7 @@ from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import coordinates, select
+from kinfmu.units import CoordinateName
 from tests.log.runs import fourbar, with_gap
 
 
@@ -66,12 +67,12 @@ def test_noise_about_a_constant_is_a_straight_line(run: Run) -> None:
     noise = 1e-16 * np.random.default_rng(3).normal(size=len(run))
     values = run.values + noise[:, None] * (np.array(run.outputs) == "coupler.phi")
     noisy = dataclasses.replace(run, values=values)
-    shown = _shown(noisy, axis_of(noisy), "coupler.phi", 0, noisy["coupler.phi"])
+    shown = _shown(noisy, axis_of(noisy), CoordinateName("coupler", "phi"), 0, noisy["coupler.phi"])
     assert shown
     assert shown[1] - shown[0] > 1.0
-    low, high = _shown(run, axis_of(run), "crank.phi", 1, run["crank.omega"]) or (0.0, 0.0)
+    low, high = _shown(run, axis_of(run), CoordinateName("crank", "phi"), 1, run["crank.omega"]) or (0.0, 0.0)
     assert low < run["crank.omega"][0] < high
-    assert _shown(run, axis_of(run), "coupler.x", 0, run["coupler.x"]) is None
+    assert _shown(run, axis_of(run), CoordinateName("coupler", "x"), 0, run["coupler.x"]) is None
 
 
 def test_a_long_run_is_drawn_by_its_extremes() -> None:
@@ -101,7 +102,7 @@ def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
         plot(run, tmp_path / "run.svg", ["cupler.x"])
     with pytest.raises(FigureError, match=r"run\.jpg: '\.jpg' is not a known format of figures; known: \.svg, \.png"):
         plot(run, tmp_path / "run.jpg")
-    names = tuple(f"body{k}.x" for k in range(31))
+    names = tuple(CoordinateName(f"body{k}", "x") for k in range(31))
     table = np.zeros((181, 31))
     wide = dataclasses.replace(run, outputs=names, coordinate_count=31, values=table, rates=table, accelerations=table)
     with pytest.raises(FigureError, match="31 coordinates are too many for one sheet, which holds 30; choose some"):
