@@ -27,6 +27,7 @@ struct kf_sweep {
 };
 
 /* sweep.c */
+void kf_put_gap(kf_job *job, int64_t sample, kf_status status);
 bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample);
 
 /* side_by_side.c */

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +19,23 @@ from kinfmu.plan import SolvePlan
 from kinfmu.simd import sources
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
+from kinfmu.sweep.engine import Driven, UnreachedError
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # lanes need them; results are equal
 MESSAGE = 480  # characters, as KF_MESSAGE
 MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 
-_double = ctypes.c_double
-_numbers = ctypes.POINTER(_double)
-_integers = ctypes.POINTER(ctypes.c_int64)
+MOST_KEPT = 100_000  # samples; memory that served longer sweeps goes back to the system
+
+_Place = ctypes.c_void_p  # of an array's first number
 
 
 class _Table(ctypes.Structure):
     """kf_table of sweep.h."""
 
-    _fields_ = (("start", _numbers), ("row", ctypes.c_ssize_t), ("column", ctypes.c_ssize_t))
+    _fields_ = (("start", _Place), ("row", ctypes.c_ssize_t), ("column", ctypes.c_ssize_t))
 
 
 class _Job(ctypes.Structure):
@@ -42,31 +43,52 @@ class _Job(ctypes.Structure):
 
     _fields_ = (
         ("count", ctypes.c_int64),
-        ("u", _numbers),
-        ("ud", _numbers),
-        ("udd", _numbers),
+        ("u", _Place),
+        ("ud", _Place),
+        ("udd", _Place),
         ("tables", _Table * 3),
-        ("outcomes", ctypes.c_void_p),
-        ("residual", _numbers),
-        ("watches", _numbers),
+        ("outcomes", _Place),
+        ("residual", _Place),
+        ("watches", _Place),
         ("most_failures", ctypes.c_int64),
         ("failure_count", ctypes.c_int64),
-        ("failures", _integers),
-        ("messages", ctypes.c_char_p),
+        ("failures", _Place),
+        ("messages", _Place),
         ("side_by_side", ctypes.c_int64),
         ("gaps", ctypes.c_int64),
     )
 
 
+class _Designs(ctypes.Structure):
+    """kf_designs of designs.h."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64),
+        ("parameters", _Place),
+        ("drive_step", ctypes.c_ssize_t),
+        ("times", _Place),
+        ("constants", _Place),
+        ("constant_step", ctypes.c_ssize_t),
+        ("start", ctypes.c_double),
+        ("samples", _Job),
+        ("table_step", ctypes.c_ssize_t * 3),
+        ("reached", _Place),
+        ("messages", _Place),
+    )
+
+
 _sweep, _job = ctypes.c_void_p, ctypes.POINTER(_Job)
-_FUNCTIONS: dict[str, tuple[Any, ...]] = {  # of sweep.h: types of the result and of the arguments
-    "kf_sweep_new": (_sweep, _double),
+_FUNCTIONS: dict[str, tuple[Any, ...]] = {  # of sweep.h and designs.h: types of the result and of the arguments
+    "kf_sweep_new": (_sweep, ctypes.c_double),
+    "kf_sweep_start": (None, _sweep, ctypes.c_double),
     "kf_sweep_free": (None, _sweep),
-    "kf_sweep_bind": (ctypes.c_bool, _sweep, _numbers),
+    "kf_sweep_bind": (ctypes.c_bool, _sweep, _Place),
     "kf_sweep_run": (ctypes.c_bool, _sweep, _job),
-    "kf_sweep_diagnose": (ctypes.c_bool, _sweep, _job, _numbers, _numbers),
+    "kf_sweep_diagnose": (ctypes.c_bool, _sweep, _job, _Place, _Place),
     "kf_sweep_message": (ctypes.c_char_p, _sweep),
-    "kf_drive_all": (ctypes.c_bool, ctypes.c_int64, *[_numbers] * 6),
+    "kf_sweep_starts": (ctypes.c_bool, _sweep, _Place, ctypes.c_double),
+    "kf_drive_all": (ctypes.c_bool, ctypes.c_int64, *[_Place] * 6),
+    "kf_designs_run": (ctypes.c_bool, _sweep, ctypes.POINTER(_Designs)),
 }
 
 
@@ -85,43 +107,49 @@ class LibraryResult:
     side_by_side: int
 
 
+class LawDriven(NamedTuple):
+    """Designs driven by the laws: times (n,), law constants (c,) or (m, c), and the time at which the laws start."""
+
+    times: FloatArray
+    constants: FloatArray
+    start: float
+
+
 class Library:
     """The compiled model and solver of a plan.
-
-    Args:
-        plan: The plan.
-        parameters: Values to set by continuation from those of the plan; default: those of the plan.
-        tolerance: Residual relative to the size above which a sample is not ok.
 
     Raises:
         CompilerError: It cannot be compiled, cached or loaded.
 
     """
 
-    def __init__(self, plan: SolvePlan, parameters: Sequence[float] = (), tolerance: float = TOLERANCE) -> None:
+    def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
-        self._parameters = parameters
-        self._tolerance = tolerance
         files = emit(plan) | compiler.runtime() | sources(plan)
         library = self._library = compiler.load(files, FLAGS)
+        self._idle: list[_Memory] = []
         for name, (result, *arguments) in _FUNCTIONS.items():
             function = getattr(library, name)
             function.restype, function.argtypes = result, arguments
 
-    def drive(self, times: FloatArray, constants: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return (n, d) driver values, speeds and accelerations at times."""
+    def drive(
+        self, times: FloatArray, constants: Sequence[float], parameters: Sequence[float] = ()
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return (n, d) driver values, speeds and accelerations at times; default parameters: those of the plan."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         driven = tuple(np.empty((len(times), len(self.plan.drivers))) for _ in range(3))
-        values = self._parameters or [parameter.value for parameter in self.plan.parameters]
-        given = (_start(np.array(numbers, dtype=float)) for numbers in (values, constants))
-        if not self._library.kf_drive_all(len(times), _start(times), *given, *map(_start, driven)):
-            raise KinfmuError("these parameters have no solution")
+        values = parameters or [parameter.value for parameter in self.plan.parameters]
+        given = [np.array(numbers, dtype=float) for numbers in (values, constants)]
+        if not self._library.kf_drive_all(len(times), *map(_start, (times, *given, *driven))):
+            raise UnreachedError("these parameters have no solution")
         return driven  # type: ignore[return-value]  # three of them
 
     def sweep(
         self,
-        driven: tuple[FloatArray, FloatArray, FloatArray],
+        driven: Driven,
         tables: Sequence[FloatArray | None],
+        parameters: Sequence[float] = (),
+        tolerance: float = TOLERANCE,
         reuse: LibraryResult | None = None,
     ) -> LibraryResult:
         """Fill tables of values, rates and accelerations; NaN for samples that cannot be reached.
@@ -129,6 +157,8 @@ class Library:
         Args:
             driven: (n, d) driver values, speeds and accelerations.
             tables: Three arrays (n, outputs), by samples or by outputs; None: not wanted.
+            parameters: Values to set by continuation; default: those of the plan.
+            tolerance: Residual relative to the size above which a sample is not ok.
             reuse: Result of an earlier sweep of as many samples, whose arrays are overwritten.
 
         Returns:
@@ -150,20 +180,18 @@ class Library:
             raise KinfmuError(
                 f"the result to reuse has {reuse.watch.shape} samples and watches, not {(count, watches)}"
             )
-        failures = np.zeros(MOST_FAILURES, dtype=np.int64)
-        messages = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
         job = self._job(driven, tables)
-        job.outcomes = result.outcomes.ctypes.data_as(ctypes.c_void_p)
+        job.outcomes = _start(result.outcomes)
         job.residual, job.watches = _start(result.residual), _start(result.watch)
-        job.most_failures, job.failures = MOST_FAILURES, _integer_start(failures)
-        job.messages = ctypes.cast(messages, ctypes.c_char_p)
-        with self._memory(count) as memory:
-            if not self._library.kf_sweep_run(memory, ctypes.byref(job)):
+        job.most_failures = MOST_FAILURES
+        with self._memory(count, tolerance, parameters) as memory:
+            job.failures, job.messages = _start(memory.failures), memory.messages
+            if not self._library.kf_sweep_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(count))
-        failed = []
-        for k, sample in enumerate(failures[: min(job.failure_count, MOST_FAILURES)].tolist()):
-            text = messages.raw[k * MESSAGE : (k + 1) * MESSAGE].split(b"\0", 1)[0]
-            failed.append((sample, text.decode()))
+            failed = [
+                (sample, _text(memory.messages + k * MESSAGE))
+                for k, sample in enumerate(memory.failures[: min(job.failure_count, MOST_FAILURES)].tolist())
+            ]
         more = job.failure_count - MOST_FAILURES
         if more > 0:
             bad = result.outcomes[:, 0] > Status.BRIDGED
@@ -175,31 +203,103 @@ class Library:
 
     def diagnose(
         self,
-        driven: tuple[FloatArray, FloatArray, FloatArray],
+        driven: Driven,
         outcomes: NDArray[np.int32],
+        parameters: Sequence[float] = (),
+        tolerance: float = TOLERANCE,
     ) -> tuple[FloatArray, FloatArray]:
         """Return margins (n,) and estimated errors (n, 3) of swept samples with these outcomes; NaN if not good."""
         margins, errors = np.empty(len(driven[0])), np.empty((len(driven[0]), 3))
         job = self._job(driven, (None, None, None))
-        job.outcomes = outcomes.ctypes.data_as(ctypes.c_void_p)
-        with self._memory(len(margins)) as memory:
-            if not self._library.kf_sweep_diagnose(memory, ctypes.byref(job), _start(margins), _start(errors)):
+        job.outcomes = _start(outcomes)
+        with self._memory(len(margins), tolerance, parameters) as memory:
+            if not self._library.kf_sweep_diagnose(memory.sweep, ctypes.byref(job), _start(margins), _start(errors)):
                 raise KinfmuError(self._refusal(len(margins)))
         return margins, errors
 
+    def require_start(
+        self, parameters: Sequence[float], constants: Sequence[float], start: float, tolerance: float
+    ) -> None:
+        """Raise an UnreachedError unless the laws start at a pose that can be reached with these parameters."""
+        with self._memory(1, tolerance, parameters) as memory:
+            values = (ctypes.c_double * len(constants))(*constants)
+            if not self._library.kf_sweep_starts(memory.sweep, values, start):
+                raise UnreachedError(self._library.kf_sweep_message(memory.sweep).decode())
+
+    def solve_designs(
+        self,
+        parameters: FloatArray,
+        driven: Driven | None,
+        law: LawDriven | None,
+        tables: Sequence[FloatArray | None],
+        status: NDArray[np.int32],
+        tolerance: float = TOLERANCE,
+    ) -> tuple[NDArray[np.int32], dict[int, str]]:
+        """Fill tables of many designs.
+
+        Args:
+            parameters: (m, p) values for all parameters of the plan.
+            driven: (n, d) or (m, n, d) driver values, speeds and accelerations; None: by the laws.
+            law: Times and constants of the laws; None: by driver values.
+            tables: Three arrays (m, n, outputs) of values, rates and accelerations; None: not wanted.
+            status: (m, n), filled with values of Status.
+            tolerance: Residual relative to the size above which a sample is not ok.
+
+        Returns:
+            (m,) how each design was reached, as in designs.h, and reasons by design for those that are not reached, or
+            not at all samples.
+
+        Raises:
+            KinfmuError: Memory runs out.
+
+        """
+        designs, samples = status.shape
+        reached = np.empty(designs, dtype=np.int32)
+        messages = np.zeros((designs, MESSAGE), dtype=np.uint8)
+        outcomes = np.empty((designs, samples, 2), dtype=np.int32)
+        residual = np.empty((designs, samples))
+        watch = np.empty((designs, samples, len(self.plan.watches)))
+        job = _Designs(count=designs, parameters=_start(parameters))
+        if driven is not None:
+            given = [np.ascontiguousarray(table) for table in driven]
+            job.drive_step = samples * len(self.plan.drivers) if given[0].ndim == 3 else 0
+        elif law is not None:
+            given = [np.empty((samples, len(self.plan.drivers))) for _ in range(3)]
+            job.times, job.constants, job.start = _start(law.times), _start(law.constants), law.start
+            job.constant_step = len(self.plan.law_constants) if law.constants.ndim == 2 else 0
+        job.samples.count = samples
+        job.samples.u, job.samples.ud, job.samples.udd = map(_start, given)
+        for k, table in enumerate(tables):
+            if table is not None:
+                step, row, column = (stride // table.itemsize for stride in table.strides)
+                job.samples.tables[k] = _Table(_start(table), row, column)
+                job.table_step[k] = step
+        job.samples.outcomes, job.samples.residual = _start(outcomes), _start(residual)
+        job.samples.watches = _start(watch)
+        job.reached, job.messages = _start(reached), _start(messages)
+        with self._memory(samples, tolerance, ()) as memory:
+            if not self._library.kf_designs_run(memory.sweep, ctypes.byref(job)):
+                raise KinfmuError(self._refusal(designs * samples))
+        status[:] = outcomes[:, :, 0]
+        return reached, {int(k): _text(_start(messages[k])) for k in np.flatnonzero(messages[:, 0])}
+
     @contextmanager
-    def _memory(self, count: int) -> Iterator[int]:
-        """Yield the memory of a sweep, with the parameters bound."""
-        library, parameters = self._library, self._parameters
-        memory = library.kf_sweep_new(self._tolerance)
-        if not memory:
-            raise KinfmuError(self._refusal(count))
+    def _memory(self, count: int, tolerance: float, parameters: Sequence[float]) -> Iterator[_Memory]:
+        """Lend memory for a sweep of `count` samples, with its parameters set."""
         try:
-            if parameters and not library.kf_sweep_bind(memory, (_double * len(parameters))(*parameters)):
-                raise KinfmuError(library.kf_sweep_message(memory).decode())
+            memory = self._idle.pop()
+        except IndexError:
+            memory = _Memory(self._library, self._refusal(count))
+        try:
+            self._library.kf_sweep_start(memory.sweep, tolerance)
+            if len(parameters):
+                values = (ctypes.c_double * len(parameters))(*parameters)
+                if not self._library.kf_sweep_bind(memory.sweep, values):
+                    raise UnreachedError(self._library.kf_sweep_message(memory.sweep).decode())
             yield memory
         finally:
-            library.kf_sweep_free(memory)
+            if count <= MOST_KEPT:
+                self._idle.append(memory)
 
     def _refusal(self, count: int) -> str:
         return (
@@ -214,13 +314,29 @@ class Library:
         for k, table in enumerate(tables):
             if table is not None:
                 row, column = (stride // table.itemsize for stride in table.strides)
-                job.tables[k] = _Table(table.ctypes.data_as(_numbers), row, column)
+                job.tables[k] = _Table(_start(table), row, column)
         return job
 
 
-def _start(array: FloatArray) -> Any:
-    return array.ctypes.data_as(_numbers)
+class _Memory:
+    """Memory for one sweep at a time, and for its failures. refusal: the message if there is none."""
+
+    def __init__(self, library: ctypes.CDLL, refusal: str) -> None:
+        self.sweep = library.kf_sweep_new(TOLERANCE)
+        if not self.sweep:
+            raise KinfmuError(refusal)
+        self.failures = np.zeros(MOST_FAILURES, dtype=np.int64)
+        self._texts = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
+        self.messages = ctypes.addressof(self._texts)
+        weakref.finalize(self, library.kf_sweep_free, self.sweep)
 
 
-def _integer_start(array: IntArray) -> Any:
-    return array.ctypes.data_as(_integers)
+def _start(array: NDArray[Any]) -> int:
+    """Return the place of an array's first number."""
+    place: int = array.__array_interface__["data"][0]
+    return place
+
+
+def _text(place: int) -> str:
+    """Return the message at a place."""
+    return ctypes.string_at(place).decode()

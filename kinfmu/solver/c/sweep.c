@@ -21,9 +21,14 @@ kf_sweep *kf_sweep_new(double tolerance)
     if (sweep == NULL) {
         return NULL;
     }
+    kf_sweep_start(sweep, tolerance);
+    return sweep;
+}
+
+void kf_sweep_start(kf_sweep *sweep, double tolerance)
+{
     kf_solver_start(&sweep->follower.solver);
     sweep->follower.solver.tolerance = tolerance;
-    return sweep;
 }
 
 void kf_sweep_free(kf_sweep *sweep)
@@ -59,7 +64,7 @@ static void put(const kf_table *table, int64_t sample, const double *row)
     }
 }
 
-static void put_gap(kf_job *job, int64_t sample, kf_status status)
+void kf_put_gap(kf_job *job, int64_t sample, kf_status status)
 {
     int k;
     for (k = 0; k < 3; ++k) {
@@ -115,7 +120,7 @@ static bool solve_alone(kf_sweep *sweep, kf_job *job, int64_t sample, double tur
     kf_pose *const pose = turned(sweep, kf_followed(&sweep->follower, turns == 0.0 ? u : &before), u, turns);
     int k;
     if (!KF_GOOD(pose->status)) {
-        put_gap(job, sample, pose->status);
+        kf_put_gap(job, sample, pose->status);
         return false;
     }
     for (k = 0; k < 3; ++k) {
@@ -180,7 +185,7 @@ static void solve_on_one_side(kf_sweep *sweep, kf_job *job, int64_t from, int64_
     for (k = from; k != to; k += side) {
         const int64_t sample = sweep->alone.samples[k].sample;
         if (is_past) {
-            put_gap(job, sample, KF_OUTSIDE);
+            kf_put_gap(job, sample, KF_OUTSIDE);
         } else if (!solve_alone(sweep, job, sample, sweep->alone.samples[k].turns)) {
             is_past = job->outcomes[sample].status == KF_OUTSIDE;
         }

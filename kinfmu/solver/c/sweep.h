@@ -41,6 +41,9 @@ typedef struct kf_sweep kf_sweep;
 kf_sweep *kf_sweep_new(double tolerance);
 void kf_sweep_free(kf_sweep *sweep);
 
+/* Start again with the parameters of the mechanism, as with new memory. */
+void kf_sweep_start(kf_sweep *sweep, double tolerance);
+
 /* Set the parameters, followed from those of the mechanism; false: no solution, kf_sweep_message states why. */
 bool kf_sweep_bind(kf_sweep *sweep, const double *parameters);
 const char *kf_sweep_message(const kf_sweep *sweep);
