@@ -100,6 +100,11 @@ class Mechanism:
         return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
 
     @property
+    def own_parameters(self) -> tuple[str, ...]:
+        """Parameters that are numbers of their own; the others follow from them by expressions."""
+        return tuple(name for name, parameter in self.parameters.items() if parameter.expression is None)
+
+    @property
     def unused_parameters(self) -> tuple[str, ...]:
         """Parameters to which no number of the mechanism refers, directly or through other parameters."""
         open_ones = [name for expression in self.expressions.values() for name in expression.names]

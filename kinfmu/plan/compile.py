@@ -21,15 +21,18 @@ from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
 from kinfmu.units import CoordinateName, Quantity
 
 
-def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> SolvePlan:
+def compile_plan(
+    mechanism: Mechanism, outputs: Sequence[str] | None = None, parameters: Sequence[str] | None = None
+) -> SolvePlan:
     """Return the plan of a mechanism.
 
     Args:
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
+        parameters: Names of the parameters that are settable; default: all that are numbers of their own.
 
     Returns:
-        The plan, with the parameters of the geometry and the constants of the laws settable.
+        The plan, with those parameters of the geometry and the constants of the laws settable.
 
     Raises:
         InconsistentError: Joints contradict each other.
@@ -41,7 +44,7 @@ def compile_plan(mechanism: Mechanism, outputs: Sequence[str] | None = None) -> 
     """
     local, origin = localized(mechanism)
     system = System(local)
-    return plan_from(mechanism, system, origin, find_redundancy(system), outputs)
+    return plan_from(mechanism, system, origin, find_redundancy(system), outputs, parameters)
 
 
 def plan_from(
@@ -50,6 +53,7 @@ def plan_from(
     origin: Point,
     redundancy: Redundancy,
     outputs: Sequence[str] | None = None,
+    parameters: Sequence[str] | None = None,
 ) -> SolvePlan:
     """Return the plan of a mechanism whose redundancy is known.
 
@@ -59,6 +63,7 @@ def plan_from(
         origin: The plan's own origin in the world, as `localized` returns it.
         redundancy: Of the system, with its assembly.
         outputs: As in `compile_plan`.
+        parameters: As in `compile_plan`.
 
     Returns:
         The plan.
@@ -72,7 +77,8 @@ def plan_from(
     refuse_mobility(system, redundancy)
     refuse_negative_distances(system, redundancy.assembly.start)
     anchor = find_anchor(system, redundancy.assembly)
-    tracer = Tracer(local)
+    settable = _parameters(mechanism, parameters)
+    tracer = Tracer(local, [parameter.name for parameter in settable])
     set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy, anchor.q)
     known = structure.fixed
@@ -80,9 +86,8 @@ def plan_from(
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
-    parameters = _parameters(mechanism)
     at_anchor: dict[str, float] = dict(zip(system.coordinates, map(float, anchor.q), strict=True))
-    at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in parameters}
+    at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in settable}
     blocks = _needed(
         [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
         [motion.position for motion in motions],
@@ -99,7 +104,7 @@ def plan_from(
         origin=origin,
         drivers=tuple(DriverInfo(driver.name, driver.inputs(), driver.quantity) for driver in mechanism.drivers),
         law_constants=mechanism.law_constants,
-        parameters=parameters,
+        parameters=settable,
         laws=_laws(mechanism, tracer),
         jumps=_jumps(mechanism, tracer),
         blocks=tuple(blocks),
@@ -168,12 +173,17 @@ def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
     return needed[::-1]
 
 
-def _parameters(mechanism: Mechanism) -> tuple[PlanParameter, ...]:
-    """Return the parameters that are numbers of their own; those with an expression follow from them."""
+def _parameters(mechanism: Mechanism, wanted: Sequence[str] | None) -> tuple[PlanParameter, ...]:
+    """Return the parameters wanted, in file order; default: those that are numbers of their own."""
+    known = list(mechanism.parameters)
+    for name in wanted or ():
+        if name not in known:
+            raise RequestError(f"there is no parameter '{name}'{suggestion(name, known)}; parameters: {listed(known)}")
+    chosen = mechanism.own_parameters if wanted is None else wanted
     return tuple(
         PlanParameter(name, float(parameter.value), parameter.quantity or Quantity("number"), parameter.description)
         for name, parameter in mechanism.parameters.items()
-        if parameter.expression is None
+        if name in chosen
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from kinfmu.drivers import Driver
 from kinfmu.equations.graph import Graph, Node
@@ -31,16 +31,17 @@ def is_parameter(symbol: Node) -> bool:
 class Tracer:
     """Joints, drivers and points as nodes of one graph.
 
-    Every coordinate, every driver value and every parameter is a symbol of it.
+    Every coordinate, every driver value and every settable parameter is a symbol of it: those named, or all that are
+    numbers of their own. Other parameters are computed from them, or are numbers.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, parameters: Iterable[str] | None = None) -> None:
         self.mechanism = mechanism
         self.graph = Graph()
         self.symbols: dict[str, Node] = {name: self.graph.symbol(name) for name in mechanism.coordinate_names}
         self.targets = {driver.name: self.graph.symbol(driver.inputs()[0]) for driver in mechanism.drivers}
-        own = [name for name, parameter in mechanism.parameters.items() if parameter.expression is None]
-        self.members = members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in own})
+        settable = mechanism.own_parameters if parameters is None else parameters
+        self.members = members = mechanism.at({name: self.graph.symbol(parameter_symbol(name)) for name in settable})
         self.joints = members.joints
         self.drivers = members.drivers
         self._points = members.body_points

@@ -94,7 +94,8 @@ class Run:
         watch_names: Names of the w redundant rows.
         watch: (n, w) residuals of the redundant rows, relative to the size.
         length_unit: The mechanism's unit of length.
-        mechanism_source: The mechanism with the parameters set, or its TOML text as a file holds it; empty if unknown.
+        mechanism_source: The mechanism with the parameters set, a function that makes it when it is first read, or its
+            TOML text as a file holds it; empty if unknown.
         model_description: XML of the FMU that was stepped; empty if none.
         info: Name, title, versions, token and parameters, as text.
         events: What happened at a time of the run.
@@ -121,7 +122,7 @@ class Run:
     watch_names: tuple[str, ...]
     watch: FloatArray
     length_unit: str = "m"
-    mechanism_source: Mechanism | str = ""
+    mechanism_source: Mechanism | Callable[[], Mechanism] | str = ""
     model_description: str = ""
     info: Mapping[str, str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
@@ -160,7 +161,7 @@ class Run:
 
         """
         if not isinstance(self.mechanism_source, str):
-            return self.mechanism_source
+            return self.mechanism_source() if callable(self.mechanism_source) else self.mechanism_source
         from kinfmu.mechanism import toml_file  # a run that is only read and converted does not need it
 
         return toml_file.parse(self.mechanism_source, "the run's mechanism") if self.mechanism_source else None
@@ -172,7 +173,7 @@ class Run:
             return self.mechanism_source
         from kinfmu.mechanism import toml_text
 
-        return toml_text.text(self.mechanism_source)
+        return toml_text.text(self.mechanism) if self.mechanism else ""
 
     @property
     def names(self) -> tuple[CoordinateName, ...]:

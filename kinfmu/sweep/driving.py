@@ -16,6 +16,7 @@ from kinfmu.run.unwrap import unwrap
 from kinfmu.sweep.engine import Driven
 
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
+_DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
 
 def run_times(run: RunSettings) -> FloatArray:
@@ -42,17 +43,18 @@ def run_times(run: RunSettings) -> FloatArray:
 
 
 def driven_by_inputs(
-    drivers: Sequence[DriverInfo], inputs: Mapping[str, ArrayLike], *, wrap: bool = False
-) -> tuple[FloatArray, ...]:
-    """Return sample numbers as times, and (n, d) values, speeds and accelerations from inputs by name.
+    drivers: Sequence[DriverInfo], inputs: Mapping[str, ArrayLike], *, wrap: bool = False, rows: int = 1
+) -> Driven:
+    """Return values, speeds and accelerations of the drivers from inputs by name.
 
     Args:
         drivers: The drivers of a plan, which have the inputs.
-        inputs: Arrays (n,) or numbers by name, such as crank_angle [rad].
+        inputs: Arrays (n,) or numbers by name, such as crank_angle [rad]; with designs also (m, n).
         wrap: Unwrap angles.
+        rows: How many designs there are, the m of inputs (m, n).
 
     Returns:
-        Times (n,), values, speeds and accelerations (n, d).
+        Values, speeds and accelerations, (n, d) each; (m, n, d) if an input is (m, n).
 
     Raises:
         RequestError: An input is unknown, missing or invalid, or the lengths differ.
@@ -67,21 +69,24 @@ def driven_by_inputs(
     for driver in drivers:
         if driver.inputs[0] not in inputs:
             raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
-    columns = {name: column_of(name, value) for name, value in inputs.items()}
+    columns = {name: column_of(name, value, rows) for name, value in inputs.items()}
     angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
     if wrap and not angles:
         raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
-    columns |= {name: unwrap(columns[name]) for name in angles if wrap}
-    lengths = {len(column) for column in columns.values() if len(column) > 1}
-    if len(lengths) > 1:
-        sizes = listed(f"{name} ({len(column)})" for name, column in columns.items())
+    columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles if wrap}
+    lengths = {array.shape[-1] for array in columns.values()}
+    if len(lengths - {1}) > 1:
+        sizes = listed(f"{name} ({array.shape[-1]})" for name, array in columns.items())
         raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
-    n = lengths.pop() if lengths else min((len(column) for column in columns.values()), default=1)
-    tables = []
-    for order, default in enumerate((0.0, 1.0, 0.0)):
-        given = [columns.get(driver.inputs[order], np.array([default])) for driver in drivers]
-        tables.append(np.stack([np.broadcast_to(column, (n,)) for column in given], axis=1))
-    return np.arange(n, dtype=float), *tables
+    n = next(iter(lengths - {1}), min(lengths, default=1))
+    is_by_design = any(array.ndim == 2 for array in columns.values())
+    shape = (rows, n) if is_by_design else (n,)
+    tables = tuple(np.empty((*shape, len(drivers))) for _ in range(3))
+    for order, (table, default) in enumerate(zip(tables, _DEFAULTS, strict=True)):
+        for k, driver in enumerate(drivers):
+            table[..., k] = columns.get(driver.inputs[order], default)
+    _refuse_huge(drivers, tables)
+    return tables  # type: ignore[return-value]  # three of them
 
 
 def without_huge_rates(driven: Driven) -> Driven:
@@ -93,13 +98,33 @@ def without_huge_rates(driven: Driven) -> Driven:
     return np.where(has_value, u, np.nan), ud, udd
 
 
-def refuse_huge_rates(drivers: Sequence[DriverInfo], driven: Driven) -> None:
+def column_of(name: str, values: ArrayLike, rows: int = 1) -> FloatArray:
+    """Return finite numbers as an array (n,); with `rows` > 1 also (rows, n).
+
+    Raises:
+        RequestError: They are no finite numbers, or have another shape.
+
+    """
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be numbers") from None
+    if array.ndim > 2 or (array.ndim == 2 and (rows == 1 or len(array) != rows)):
+        rule = f"of shape (n,) or ({rows}, n)" if rows > 1 else "one-dimensional"
+        raise RequestError(f"{name} must be {rule}, not of shape {array.shape}")
+    if not _is_within(array, sys.float_info.max):
+        place = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
+        raise RequestError(f"{name}[{', '.join(map(str, place))}] is not a finite number")
+    return array
+
+
+def _refuse_huge(drivers: Sequence[DriverInfo], driven: tuple[FloatArray, ...]) -> None:
     """Raise a RequestError for a speed or an acceleration of a driver whose square overflows."""
     for order in (1, 2):
         if not _is_within(driven[order], LARGEST_RATE):
-            sample, number = np.argwhere(np.abs(driven[order]) > LARGEST_RATE)[0]
+            *_, sample, number = place = tuple(np.argwhere(np.abs(driven[order]) > LARGEST_RATE)[0])
             raise RequestError(
-                f"{drivers[number].inputs[order]} = {driven[order][sample, number]:.6g} at sample {sample}: "
+                f"{drivers[number].inputs[order]} = {driven[order][place]:.6g} at sample {sample}: "
                 f"the largest value is {LARGEST_RATE:g}"
             )
 
@@ -107,16 +132,3 @@ def refuse_huge_rates(drivers: Sequence[DriverInfo], driven: Driven) -> None:
 def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
     return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
-
-
-def column_of(name: str, values: ArrayLike) -> FloatArray:
-    """Return times or values of an input as numbers (n,); a RequestError for anything else."""
-    try:
-        column = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise RequestError(f"{name} must be numbers") from None
-    if column.ndim != 1:
-        raise RequestError(f"{name} must be one-dimensional, not of shape {column.shape}")
-    if not _is_within(column, sys.float_info.max):
-        raise RequestError(f"{name}[{int(np.argmin(np.isfinite(column)))}] is not a finite number")
-    return column

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
+from kinfmu.errors import KinfmuError
 from kinfmu.run import FloatArray, IntArray
 
 Driven = tuple[FloatArray, FloatArray, FloatArray]  # (n, d) values, speeds and accelerations of the drivers
 Tables = tuple[FloatArray, FloatArray, FloatArray]  # (n, m) values, rates and accelerations of the outputs
+
+
+class UnreachedError(KinfmuError):
+    """Parameters, or the start of the laws with them, that continuation from the anchor does not reach."""
 
 
 class SweepResult(NamedTuple):

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from kinfmu.plan import SolvePlan
 from kinfmu.run import FloatArray
 from kinfmu.sweep.engine import Driven, SweepResult, Tables
 from kinfmu.sweep.library import Library
@@ -18,13 +17,10 @@ class NativeEngine:
     """The engine of a plan's compiled library.
 
     Args:
-        plan: The plan.
+        library: The compiled plan.
         parameters: Values to set by continuation from those of the plan; empty: those of the plan.
         fixed: Coordinates that never move, by name.
         tolerance: Residual relative to the size above which a sample is not ok.
-
-    Raises:
-        CompilerError: There is no compiler, or the library cannot be compiled, cached or loaded.
 
     """
 
@@ -32,14 +28,16 @@ class NativeEngine:
     order: Literal["C", "F"] = "F"
 
     def __init__(
-        self, plan: SolvePlan, parameters: Sequence[float], fixed: Mapping[str, float], tolerance: float
+        self, library: Library, parameters: Sequence[float], fixed: Mapping[str, float], tolerance: float
     ) -> None:
-        self._library = Library(plan, parameters, tolerance)
+        self._library = library
+        self._parameters = parameters
+        self._tolerance = tolerance
         self.fixed = fixed
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Return driver values, speeds and accelerations at times, by the laws."""
-        return self._library.drive(times, constants)
+        return self._library.drive(times, constants, self._parameters)
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
@@ -47,11 +45,13 @@ class NativeEngine:
             table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
         )
         filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
-        result = self._library.sweep(driven, filled)
+        result = self._library.sweep(driven, filled, self._parameters, self._tolerance)
         for table, values in zip(tables, filled, strict=True):
             if table is not values:
                 table[:] = values
-        diagnosed = cache(lambda: self._library.diagnose(driven, result.outcomes))  # both, when either is first read
+        diagnosed = cache(  # both, when either is first read
+            lambda: self._library.diagnose(driven, result.outcomes, self._parameters, self._tolerance)
+        )
         return SweepResult(
             status=result.outcomes[:, 0].astype(np.int64),
             iterations=result.outcomes[:, 1].astype(np.int64),

@@ -250,7 +250,9 @@ def test_other_parameters_are_reached_by_continuation() -> None:
     )
     assert_same_motion(native, python)
     with pytest.raises(KinfmuError, match="leave a gap of"):
-        library.Library(compile_plan(linkage()), [4.0, 1.0, 0.5, 0.5]).sweep(driven(np.zeros(2)), tables(("a",) * 13))
+        library.Library(compile_plan(linkage())).sweep(
+            driven(np.zeros(2)), tables(("a",) * 13), parameters=[4.0, 1.0, 0.5, 0.5]
+        )
 
 
 def test_laws_depend_on_parameters() -> None:

@@ -9,8 +9,7 @@
 
 #define LARGEST_RATE 1e100 /* of drivers; squares of much larger numbers are infinite */
 
-/* Return whether the laws start at a pose that can be reached. */
-static bool starts(kf_sweep *sweep, const double *constants, double time)
+bool kf_sweep_starts(kf_sweep *sweep, const double *constants, double time)
 {
     double u[KF_ROOM(KF_DRIVERS)], ud[KF_ROOM(KF_DRIVERS)], udd[KF_ROOM(KF_DRIVERS)];
     kf_drive(&sweep->follower.solver.model, time, constants, u, ud, udd);
@@ -70,7 +69,7 @@ bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs)
         designs->reached[k] = KF_REACHED;
         if (!kf_sweep_bind(sweep, designs->parameters + k * KF_PARAMETERS)) {
             designs->reached[k] = KF_NO_SOLUTION;
-        } else if (designs->times != NULL && !starts(sweep, constants, designs->start)) {
+        } else if (designs->times != NULL && !kf_sweep_starts(sweep, constants, designs->start)) {
             designs->reached[k] = KF_NO_START;
         }
         if (designs->reached[k] != KF_REACHED) {

@@ -35,6 +35,9 @@ typedef struct {
     char *messages;
 } kf_designs;
 
+/* Return whether the laws start at a pose that can be reached with the parameters set. */
+bool kf_sweep_starts(kf_sweep *sweep, const double *constants, double time);
+
 /* Solve all designs; false if memory ran out. */
 bool kf_designs_run(kf_sweep *sweep, const kf_designs *designs);
 

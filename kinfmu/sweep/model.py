@@ -1,0 +1,389 @@
+"""Model: a mechanism that is planned and compiled once and then solved for many inputs and parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.codegen.python import load_model, load_module
+from kinfmu.equations.graph import evaluate
+from kinfmu.errors import CompilerError, RequestError, listed, suggestion
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.number import read_constant
+from kinfmu.mechanism.parameters import parameter_values
+from kinfmu.mechanism.valid import is_number, quoted
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.trace import parameter_symbol
+from kinfmu.run import Event, FloatArray, Run
+from kinfmu.run.axis import TIME, axis_for
+from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
+from kinfmu.solver.python.pose import Vector
+from kinfmu.solver.python.solver import TOLERANCE
+from kinfmu.sweep.continued import anew
+from kinfmu.sweep.engine import Engine, Tables, UnreachedError
+from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
+from kinfmu.sweep.python_engine import PythonEngine
+
+ENGINES = ("auto", "python", "native")
+WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
+_SOLVERS_KEPT = 8  # of the last parameters
+
+Settings = Mapping[str, float | str]
+
+
+class Setting(NamedTuple):
+    """Parameters and law constants of one call.
+
+    given: As the caller wrote them. values: Of all parameters of the plan; empty: those of the plan, none was given.
+    constants: Of all laws. starts_elsewhere: The laws may start at another pose than the anchor's.
+    """
+
+    given: Settings
+    values: Vector
+    constants: Vector
+    starts_elsewhere: bool
+
+
+def compile(  # noqa: A001  as re.compile
+    mechanism: Mechanism,
+    outputs: Sequence[str] | None = None,
+    *,
+    parameters: Sequence[str] | None = None,
+    engine: str = "auto",
+) -> Model:
+    """Plan a mechanism once, for many calls with other inputs and other parameters.
+
+    Args:
+        mechanism: The mechanism.
+        outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
+        parameters: Names of the parameters that stay arguments; default: all that are numbers of their own. The others
+            are numbers in the generated code, which is faster. A parameter written as an expression can be named too.
+        engine: 'python'; 'native', generated C, which is compiled now, or found in the cache; or 'auto', native where
+            a call has enough samples to pay for compiling and a compiler is found.
+
+    Returns:
+        The model.
+
+    Raises:
+        RequestError: An output, a parameter or the engine is unknown.
+        KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
+        CompilerError: The engine is 'native' and no compiler is found, or it fails.
+
+    """
+    require_mechanism(mechanism, "compile")
+    require_engine(engine)
+    model = Model(compile_plan(mechanism, outputs, parameters), engine)
+    if engine == "native":
+        model.load_library()
+    return model
+
+
+class Model:
+    """A mechanism planned and compiled once; its parameters are arguments of every call.
+
+    A model is safe to use from several threads, and can be sent to other processes, which plan it again and find the
+    compiled library in the cache.
+
+    Attributes:
+        plan: What is solved, in which order.
+        engine: 'auto', 'python' or 'native'.
+        outputs: Names of the outputs.
+        parameters: Names of the parameters that are arguments; law constants, such as 'crank.speed', are too.
+
+    """
+
+    def __init__(self, plan: SolvePlan, engine: str = "auto") -> None:
+        self.plan = plan
+        self.engine = engine
+        self._written = tuple(parameter.value for parameter in plan.parameters)
+        self._constants_written = tuple(constant.value for constant in plan.law_constants)
+        self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
+        self._constant_places = {constant.name: k for k, constant in enumerate(plan.law_constants)}
+        self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
+
+    def __repr__(self) -> str:
+        arguments = f"; parameters: {listed(self.parameters)}" if self.parameters else ""
+        return f"<Model of {self.plan.mechanism.name}: {', '.join(self.outputs)}{arguments}>"
+
+    def __reduce__(self) -> tuple[Callable[..., Model], tuple[Any, ...]]:
+        from kinfmu.mechanism import toml_text
+
+        text = toml_text.text(self.plan.mechanism)
+        return _from_text, (text, self.plan.outputs, tuple(self._places), self.engine)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism with the parameters as written."""
+        return self.plan.mechanism
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return self.plan.outputs
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return tuple(self._places)
+
+    def solve(
+        self,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Settings | None = None,
+        tolerance: float = TOLERANCE,
+        wrap: bool = False,
+        out: Tables | None = None,
+        **inputs: ArrayLike,
+    ) -> Run:
+        """Solve positions, velocities and accelerations at times, or at driver values.
+
+        Samples that cannot be reached are NaN with a status of 3 to 5 and an event with the reason; the run continues
+        from the last good sample.
+
+        Args:
+            t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
+            parameters: Values of parameters and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"}.
+                Other geometry is reached by continuation from the pose of the geometry as written; if that fails, the
+                mechanism is assembled anew, with an event of level "info".
+            tolerance: Residual relative to the size above which a sample is not ok; positive.
+            wrap: Unwrap angles given as inputs: a jump from 2 pi to 0 goes on forwards. Without it such a jump turns
+                back.
+            out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
+            **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and
+                crank_acceleration=, arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per
+                unit of the driver. The run's t then counts the samples, and its axis is the driver's value.
+
+        Returns:
+            The run, with a status for every sample. Margins and errors are computed when they are first read.
+
+        Raises:
+            RequestError: A name is unknown or a value is invalid.
+            MechanismError: A parameter has a value that the mechanism cannot have.
+            KinfmuError: The parameters are not reached, and the mechanism cannot be assembled anew.
+            CompilerError: The engine is 'native' and no compiler is found, or it fails.
+
+        """
+        require_tolerance(tolerance)
+        setting = self.setting(parameters or {})
+        driven = None
+        if inputs:
+            if t is not None:
+                raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+            driven = driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
+            times = np.arange(len(driven[0]), dtype=float)
+            axis = axis_for(driven[0], tuple(driver.inputs[0] for driver in self.plan.drivers))
+        elif wrap:
+            raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
+        else:
+            times, axis = column_of("t", run_times(self.mechanism.run) if t is None else t), TIME
+        try:
+            engine = self._engine(len(times), setting, tolerance, by_law=driven is None)
+            if driven is None:
+                driven = without_huge_rates(engine.drive(times, setting.constants))
+            tables = _tables(out, (len(times), len(self.outputs)), engine.order)
+            result = engine.sweep(driven, tables)
+        except UnreachedError as reason:
+            return self._solve_anew(str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs)
+        plan = self.plan
+        return Run(
+            t=times,
+            outputs=plan.outputs,
+            coordinate_count=plan.coordinate_count,
+            values=tables[0],
+            rates=tables[1],
+            accelerations=tables[2],
+            fixed=dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
+            input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
+            inputs=np.stack(driven, axis=2).reshape(len(times), 3 * len(plan.drivers)),
+            status=result.status,
+            iterations=result.iterations,
+            residual=result.residual,
+            margin=result.margin,
+            error=result.error,
+            watch_names=plan.watch_names,
+            watch=result.watch,
+            length_unit=plan.mechanism.length_unit,
+            mechanism_source=self._mechanism_with(setting),
+            info=self._info(setting, engine.name),
+            events=tuple(Event(float(times[k]), "error", message) for k, message in result.failures),
+            axis=axis,
+        )
+
+    def setting(self, given: Settings) -> Setting:
+        """Return parameters and law constants as numbers.
+
+        Raises:
+            RequestError: A name is unknown.
+            MechanismError: A value is invalid.
+
+        """
+        values, constants = self._written, self._constants_written
+        if not given:
+            return Setting(given, (), constants, starts_elsewhere=False)
+        plan, mechanism = self.plan, self.mechanism
+        own: dict[str, float | str] = {}
+        changed = list(constants)
+        for name, value in given.items():
+            if name in self._places:
+                own[name] = value
+                continue
+            place = self._constant_places.get(name)
+            if place is None:
+                raise self._unknown(name)
+            constant = plan.law_constants[place]
+            changed[place] = read_constant(f"parameter '{name}'", value, constant.quantity, mechanism.length_unit)
+            if constant.is_positive and not changed[place] > 0.0:
+                raise RequestError(f"parameter '{name}' = {value!r} must be positive")
+        if own:
+            values = self._numbers(own)
+        constants = tuple(changed)
+        elsewhere = bool(own) or self._law_starts(constants) != self._law_starts(self._constants_written)
+        return Setting(given, values if own else (), constants, elsewhere)
+
+    def load_library(self) -> Any:
+        """Return the compiled library of the plan, compiled now or found in the cache.
+
+        Raises:
+            CompilerError: There is no compiler, or the library cannot be compiled, cached or loaded.
+
+        """
+        return self._library
+
+    @cached_property
+    def _library(self) -> Any:
+        from kinfmu.sweep.library import Library
+
+        return Library(self.plan)
+
+    def _unknown(self, name: str) -> RequestError:
+        known = [*self._places, *self._constant_places]
+        if name in self.mechanism.parameters:
+            parameter = self.mechanism.parameters[name]
+            how = f"the expression '{parameter.expression.text}'" if parameter.expression else "a number of the model"
+            return RequestError(f"parameter '{name}' is {how}; compile(mechanism, parameters=['{name}']) keeps it open")
+        return RequestError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
+
+    def _numbers(self, given: Settings) -> Vector:
+        """Return the values of all parameters of the plan."""
+        values = list(self._written)
+        for name, value in given.items():
+            if isinstance(value, str) or not is_number(value) or not math.isfinite(value):
+                changed = self.mechanism.with_parameters(given)  # reads units and expressions, or refuses
+                return tuple([float(changed.parameters[name].value) for name in self._places])
+            values[self._places[name]] = float(value)
+        return tuple(values)
+
+    def _law_starts(self, constants: Vector) -> Vector:
+        """Return the driver values at which the laws start, with the parameters as written."""
+        model = load_model(self.plan)
+        u: Vector = model.drive(self.mechanism.run.start, constants)[0]
+        return u
+
+    def _engine(self, count: int, setting: Setting, tolerance: float, *, by_law: bool) -> Engine:
+        """Return an engine with the parameters set; `auto` is the native one if it pays and a compiler is found."""
+        work = count * max(1, len(self.plan.blocks))
+        start = self.mechanism.run.start if by_law and setting.starts_elsewhere else None
+        if self.engine == "native" or (self.engine == "auto" and work >= WORTH_COMPILING):
+            from kinfmu.sweep.native_engine import NativeEngine
+
+            try:
+                library = self._library
+            except CompilerError:
+                if self.engine == "native":
+                    raise
+            else:
+                if start is not None:
+                    library.require_start(setting.values or self._written, setting.constants, start, tolerance)
+                return NativeEngine(library, setting.values, self._fixed(setting), tolerance)
+        return PythonEngine(self._solver(setting.values, setting.constants if start is not None else None, tolerance))
+
+    def _new_solver(self, values: Vector, starting: Vector | None, tolerance: float) -> Solver:
+        """Return a solver with parameters set. starting: constants of laws whose start must be reached; None: none.
+
+        Raises:
+            UnreachedError: Continuation does not reach the parameters, or the start of the laws.
+
+        """
+        if not values and starting is None:
+            return Solver(load_model(self.plan), tolerance)
+        solver = with_parameters(load_module(self.plan), values or self._written, tolerance)
+        if isinstance(solver, UnsolvableModel):
+            raise UnreachedError(solver.message)
+        if starting is not None:
+            pose = solver.solve(solver.anchor, solver.model.drive(self.mechanism.run.start, starting)[0])
+            if not pose.good:
+                raise UnreachedError(pose.message)
+        return solver
+
+    def _fixed(self, setting: Setting) -> Mapping[str, float]:
+        """Return the coordinates that never move."""
+        nodes = self.plan.fixed_nodes
+        if not setting.values or all(node.constant is not None for node in nodes.values()):
+            return self.plan.fixed
+        known = {parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)}
+        return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
+
+    def _mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
+        """Return the mechanism with the parameters set, or a function that makes it when it is first read."""
+        own = {name: value for name, value in setting.given.items() if name in self._places}
+        mechanism = self.mechanism
+        return (lambda: mechanism.with_parameters(own)) if own else mechanism
+
+    def _info(self, setting: Setting, engine: str) -> dict[str, str]:
+        mechanism = self.mechanism
+        own = dict(zip(self._places, setting.values or self._written, strict=True))
+        values = parameter_values(mechanism.parameters, own) if setting.values else own
+        return {
+            "name": mechanism.name,
+            "title": mechanism.title,
+            "engine": engine,
+            **{name: repr(float(values.get(name, p.value))) for name, p in mechanism.parameters.items()},
+            **{name: repr(value) for name, value in zip(self._constant_places, setting.constants, strict=True)},
+        }
+
+    def _solve_anew(self, reason: str, given: Settings, t: ArrayLike | None, **arguments: Any) -> Run:
+        """Solve the mechanism as a file with these parameters would be."""
+        changed = self.mechanism.with_parameters(given)
+        run = Model(compile_plan(changed, self.outputs), self.engine).solve(t, **arguments)
+        note = Event(float(run.t[0]), "info", anew(reason)) if len(run.t) else None
+        return run.replaced(events=(note, *run.events)) if note else run
+
+
+def require_engine(engine: str) -> None:
+    """Raise a RequestError for the name of an unknown engine."""
+    if engine not in ENGINES:
+        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+
+
+def require_tolerance(tolerance: float) -> None:
+    """Raise a RequestError for a tolerance that is not a positive number."""
+    if not (is_number(tolerance) and 0.0 < tolerance < math.inf):
+        raise RequestError(f"tolerance = {quoted(tolerance)} must be a positive number")
+
+
+def _from_text(text: str, outputs: Sequence[str], parameters: Sequence[str], engine: str) -> Model:
+    """Return the model of a mechanism file's text: how models arrive in other processes."""
+    from kinfmu.mechanism import toml_file
+
+    mechanism = toml_file.parse(text, "the model's mechanism")
+    return Model(compile_plan(mechanism, outputs, parameters), engine)
+
+
+def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:
+    if out is None:
+        return tuple(np.empty(shape, order=order) for _ in range(3))  # type: ignore[return-value]  # three of them
+    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
+        _refuse_table(name, array, shape)
+    return out
+
+
+def _refuse_table(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape or array.dtype != np.float64:
+        raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+    if not array.flags.writeable:
+        raise RequestError(f"out: {name} is read-only")
