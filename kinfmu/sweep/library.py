@@ -274,7 +274,8 @@ class Library:
                 step, row, column = (stride // table.itemsize for stride in table.strides)
                 job.samples.tables[k] = _Table(_start(table), row, column)
                 job.table_step[k] = step
-        job.samples.outcomes, job.samples.residual, job.samples.watches = map(_start, (outcomes, residual, watch))
+        job.samples.outcomes, job.samples.residual = _start(outcomes), _start(residual)
+        job.samples.watches = _start(watch)
         job.reached, job.messages = _start(reached), _start(messages)
         with self._memory(samples, tolerance, ()) as memory:
             if not self._library.kf_designs_run(memory.sweep, ctypes.byref(job)):
