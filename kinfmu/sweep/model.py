@@ -26,8 +26,8 @@ from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.continued import anew
-from kinfmu.sweep.engine import Engine, Tables, UnreachedError
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
+from kinfmu.sweep.engine import Engine, Tables, UnreachedError
 from kinfmu.sweep.python_engine import PythonEngine
 
 ENGINES = ("auto", "python", "native")
@@ -325,7 +325,7 @@ class Model:
         nodes = self.plan.fixed_nodes
         if not setting.values or all(node.constant is not None for node in nodes.values()):
             return self.plan.fixed
-        known = {parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)}
+        known: dict[str, float] = {parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)}
         return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
 
     def _mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:

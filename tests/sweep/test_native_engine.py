@@ -183,7 +183,7 @@ def test_intervals_beyond_the_reported_ones_are_counted(monkeypatch: pytest.Monk
 def test_running_out_of_memory_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     compiled = library.Library(plan)
-    for name, nothing in (("kf_sweep_run", False), ("kf_sweep_new", None)):
+    for name, nothing in (("kf_sweep_new", None), ("kf_sweep_run", False)):
         with monkeypatch.context() as patch:
             patch.setattr(compiled._library, name, lambda *_, nothing=nothing: nothing)
             with pytest.raises(
