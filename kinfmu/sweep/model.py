@@ -325,7 +325,9 @@ class Model:
         nodes = self.plan.fixed_nodes
         if not setting.values or all(node.constant is not None for node in nodes.values()):
             return self.plan.fixed
-        known: dict[str, float] = {parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)}
+        known: dict[str, float] = {
+            parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)
+        }
         return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
 
     def _mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:

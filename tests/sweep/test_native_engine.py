@@ -21,7 +21,7 @@ from kinfmu.sweep.engine import Driven
 from tests.fmu.test_parameters import geared, linkage
 from tests.mechanisms import uneven_chain
 
-SOLVE = import_module("kinfmu.sweep.solve")  # the package shows a function of that name
+MODEL = import_module("kinfmu.sweep.model")
 ENGINES = ("native", "python")
 SAMPLES = 1100  # enough for samples to be solved in lanes
 
@@ -265,7 +265,7 @@ def test_laws_depend_on_parameters() -> None:
 def test_auto_takes_python_for_few_samples_and_native_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
     t = np.linspace(0.0, 90.0, 50)
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "python"
-    monkeypatch.setattr(SOLVE, "WORTH_COMPILING", 50)
+    monkeypatch.setattr(MODEL, "WORTH_COMPILING", 50)
     assert kinfmu.solve(kinfmu.load("fourbar"), t).info["engine"] == "native"
 
 
@@ -274,10 +274,11 @@ def test_without_a_compiler_auto_is_python_and_native_raises(monkeypatch: pytest
         raise CompilerError("no C compiler: cc, gcc and clang are not found")
 
     monkeypatch.setattr(compiler, "command", none)
-    monkeypatch.setattr(SOLVE, "WORTH_COMPILING", 0)
-    assert kinfmu.solve(kinfmu.load("fourbar"), [0.0]).info["engine"] == "python"
+    monkeypatch.setattr(MODEL, "WORTH_COMPILING", 0)
+    fourbar = kinfmu.load("fourbar")
+    assert kinfmu.compile(fourbar).solve([0.0]).info["engine"] == "python"
     with pytest.raises(CompilerError, match="no C compiler"):
-        kinfmu.solve(kinfmu.load("fourbar"), [0.0], engine="native")
+        kinfmu.compile(fourbar, engine="native")
 
 
 def test_times_and_tables_may_be_views_of_others() -> None:
