@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from kinfmu.bench.near_singular import Passage, Row, near_singular
+from kinfmu.bench.near_singular import ChartRow, Passage, near_singular
 from kinfmu.bench.work_precision import Curve, Panel, work_precision
 from kinfmu.draw.chart import Look
 from kinfmu.errors import FigureError, MissingPackageError
@@ -24,7 +24,7 @@ PANEL = Panel(
         Curve("quick", 2, [(1e-15, 4.0)]),
     ],
 )
-ROW = Row(
+ROW = ChartRow(
     "a point",
     [1e-1, 1e-2, 1e-3],
     [
