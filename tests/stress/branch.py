@@ -23,6 +23,7 @@ FINE = 1440  # places to the period of an angle, or to the reach of a length
 SHORT = 0.02  # [rad, lengths]; between places of a way of several drivers
 COARSE = 600  # places of a stretch that does not go round
 DEPTHS = np.concatenate([[0.0], 10.0 ** np.arange(-13.0, -1.0, 0.2)])  # from a mark, near which values change quickly
+CLOSE = 10.0 ** np.arange(-13.0, -2.0, 0.5)  # the same, of several drivers
 DIP = 0.05  # what must stay positive is looked at closely where it falls below
 FLAT = 1.001  # places that differ by less have nothing between them
 LIMIT = 1e-10  # [rad, sizes]; limits are promised to this
@@ -48,6 +49,14 @@ class Magnitudes(NamedTuple):
     q: Mapping[str, float]
     qd: Mapping[str, float]
     qdd: Mapping[str, float]
+
+
+def _each(limits: list[Array], count: int) -> Any:
+    """What must stay positive, (limits, count); -1 where there is no number."""
+    if not limits:
+        return np.ones((1, count), dtype=np.longdouble)
+    table = np.array([np.broadcast_to(values, count) for values in limits])
+    return np.where(np.isnan(table), np.longdouble(-1.0), table)
 
 
 def _lowest(limits: list[Array], count: int) -> Any:
@@ -274,9 +283,9 @@ class BranchPath:
         with np.errstate(all="ignore"):
             for k, target in enumerate(u):
                 count = 2 + int(np.abs((target - here) / units).max() / SHORT)
-                way = here + (target - here) * np.linspace(0.0, 1.0, count + 1)[:, None]
-                exact = self.drawn.positions(way)
-                lowest = self._least(here, target, _lowest(exact.closing.limits, len(way)))
+                parts = self._places(here, target, count)
+                exact = self.drawn.positions(here + (target - here) * parts[:, None])
+                lowest = self._least(here, target, parts, _each(exact.closing.limits, len(parts)))
                 tightest[k] = lowest
                 if lowest < -LIMIT or np.isnan(lowest):
                     side[k] = OUTSIDE
@@ -302,19 +311,33 @@ class BranchPath:
                 part = np.linspace(part[bad - 1], part[bad], PIECES)
         return float(part[0])
 
-    def _least(self, here: Floats, target: Floats, lowest: Any) -> float:
-        k = int(np.argmin(lowest))
-        least = lowest[k]
-        if not 0.0 < least < DIP:
-            return float(least)
-        left, right = (np.longdouble(max(min(j, len(lowest) - 1), 0)) / (len(lowest) - 1) for j in (k - 1, k + 1))
-        for _ in range(PASSES):
-            part = left + (right - left) * np.arange(PIECES + 1) / PIECES
-            values = _lowest(self.drawn.positions(here + (target - here) * part[:, None]).closing.limits, len(part))
-            best = int(np.argmin(values))
-            least = min(least, values[best])
-            left, right = part[max(best - 1, 0)], part[min(best + 1, PIECES)]
-        return float(least)
+    def _places(self, here: Floats, target: Floats, count: int) -> Any:
+        """Parts of a way to look at: equal ones, and beside marks of a driver, where angles change quickly."""
+        found = [np.linspace(np.longdouble(0.0), np.longdouble(1.0), count + 1)]
+        for a, b, kind in zip(here, target, self.drawn.sketch.kinds, strict=True):
+            if kind == "angle" and a != b:
+                beside = [mark + side * CLOSE for mark in self.marks for side in (1, -1)]
+                found += [(np.asarray(places, dtype=np.longdouble) - a) / (np.longdouble(b) - a) for places in beside]
+        parts = np.unique(np.concatenate(found))
+        return parts[(parts >= 0.0) & (parts <= 1.0)]
+
+    def _least(self, here: Floats, target: Floats, parts: Any, limits: Any) -> float:
+        """The least on the way: each of what must stay positive is looked at closely where it dips."""
+        least, last = float(limits.min()), len(parts) - 1
+        if least <= 0.0:
+            return least
+        for number, values in enumerate(limits):
+            beside = np.pad(values, 1, constant_values=np.inf)
+            for k in np.flatnonzero((values < DIP) & (values <= beside[:-2]) & (values <= beside[2:])):
+                left, right = parts[max(k - 1, 0)], parts[min(k + 1, last)]
+                for _ in range(PASSES):
+                    part = left + (right - left) * np.arange(PIECES + 1) / PIECES
+                    exact = self.drawn.positions(here + (target - here) * part[:, None])
+                    found = _each(exact.closing.limits, len(part))[number]
+                    best = int(np.argmin(found))
+                    least = min(least, float(found[best]))
+                    left, right = part[max(best - 1, 0)], part[min(best + 1, PIECES)]
+        return least
 
 
 def branch_path(drawn: Drawn) -> BranchPath:
