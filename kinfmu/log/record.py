@@ -140,6 +140,7 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
         axis=about["axis"],
+        info={},
         **blank,
     )
     for place in empty.places(kept=False):

@@ -111,7 +111,7 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
 
     """
     expressions: dict[str, Any] = {name: p.value for name, p in parameters.items() if isinstance(p.value, Expression)}
-    order = _in_order(parameters, expressions)
+    order = in_order(parameters, expressions)
     quantities = {name: parameter.quantity for name, parameter in parameters.items()}
     wanted = {name: set(alone.get(name, ())) for name in parameters}
     for name in reversed(order):
@@ -163,7 +163,7 @@ def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:
     """Return the dimensions of resolved parameters; those of pure numbers are unknown unless computed."""
     found: dict[str, Dimension] = {}
     expressions = {name: p.expression for name, p in parameters.items() if p.expression is not None}
-    for name in _in_order(parameters, expressions):
+    for name in in_order(parameters, expressions):
         quantity = parameters[name].quantity
         if quantity is not None and quantity != NUMBER:
             found[name] = Dimension.of(quantity)
@@ -176,7 +176,7 @@ def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, V
     """Return the values of all parameters, in any arithmetic: those in `values`, and those computed from them."""
     expressions = {name: p.expression for name, p in parameters.items() if p.expression and name not in values}
     found: dict[str, Value] = {}
-    for name in _in_order(parameters, expressions):
+    for name in in_order(parameters, expressions):
         if name in values:
             found[name] = values[name]
         else:
@@ -184,7 +184,7 @@ def parameter_values(parameters: Mapping[str, Parameter], values: Mapping[str, V
     return found
 
 
-def _in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
+def in_order(names: Iterable[str], expressions: Mapping[str, Expression]) -> list[str]:
     """Return the names sorted so that each comes after those in its expression."""
     names = dict.fromkeys(names)
     for name, expression in expressions.items():

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,22 +26,33 @@ IntArray = NDArray[np.int64]
 MOST_SAMPLES = 10_000_000  # a table of them fills the memory of a large machine
 
 
-class LazyTable:
-    """A table of a run that may be given as a function: it is called when the table is first read."""
+T = TypeVar("T")
+
+
+class Lazy(Generic[T]):
+    """A field of a run that may be given as a function: it is called when the field is first read.
+
+    default: Of the field; none if it is not given.
+    """
+
+    def __init__(self, *default: T) -> None:
+        self._default = default
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, run: Run | None, owner: type) -> FloatArray:
+    def __get__(self, run: Run | None, owner: type) -> T:
         if run is None:
+            if self._default:
+                return self._default[0]
             raise AttributeError(self._name)  # so that the field has no default
-        table = run.__dict__[self._name]
-        if callable(table):
-            table = run.__dict__[self._name] = table()
-        return table  # type: ignore[no-any-return]  # whatever was given
+        value = run.__dict__[self._name]
+        if callable(value):
+            value = run.__dict__[self._name] = value()
+        return value  # type: ignore[no-any-return]  # whatever was given
 
-    def __set__(self, run: Run, table: FloatArray | Callable[[], FloatArray]) -> None:
-        run.__dict__[self._name] = table
+    def __set__(self, run: Run, value: T | Callable[[], T]) -> None:
+        run.__dict__[self._name] = value
 
 
 class Column(NamedTuple):
@@ -73,7 +84,9 @@ class Event(NamedTuple):
 class Run:
     """The motion of a mechanism at n samples.
 
-    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields that are seldom
+    read (fixed, inputs, iterations, margin, error, mechanism_source, info, axis) may be given as functions, which are called
+    when the field is first read.
 
     Attributes:
         t: (n,) times [s]; of a run over driver values the numbers of the samples.
@@ -88,14 +101,12 @@ class Run:
         status: (n,) values of Status.
         iterations: (n,) Newton iterations.
         residual: (n,) largest residual of a block, relative to the mechanism's size.
-        margin: (n,) 1 / condition. May be given as a function that is called when the table is first read.
-        error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the size; may be
-            given as a function too.
+        margin: (n,) 1 / condition.
+        error: (n, 3) estimated error of q, qd, qdd, the largest among the outputs, lengths relative to the size.
         watch_names: Names of the w redundant rows.
         watch: (n, w) residuals of the redundant rows, relative to the size.
         length_unit: The mechanism's unit of length.
-        mechanism_source: The mechanism with the parameters set, a function that makes it when it is first read, or its
-            TOML text as a file holds it; empty if unknown.
+        mechanism_source: The mechanism with the parameters set, or its TOML text as a file holds it; empty if unknown.
         model_description: XML of the FMU that was stepped; empty if none.
         info: Name, title, versions, token and parameters, as text.
         events: What happened at a time of the run.
@@ -111,23 +122,23 @@ class Run:
     values: FloatArray
     rates: FloatArray
     accelerations: FloatArray
-    fixed: Mapping[CoordinateName, float]
+    fixed: Lazy[Mapping[CoordinateName, float]] = Lazy()  # a descriptor, not a default
     input_names: tuple[InputName, ...]
-    inputs: FloatArray
+    inputs: Lazy[FloatArray] = Lazy()
     status: IntArray
-    iterations: IntArray
+    iterations: Lazy[IntArray] = Lazy()
     residual: FloatArray
-    margin: LazyTable = LazyTable()  # a descriptor, not a default
-    error: LazyTable = LazyTable()
+    margin: Lazy[FloatArray] = Lazy()
+    error: Lazy[FloatArray] = Lazy()
     watch_names: tuple[str, ...]
     watch: FloatArray
     length_unit: str = "m"
-    mechanism_source: Mechanism | Callable[[], Mechanism] | str = ""
+    mechanism_source: Lazy[Mechanism | str] = Lazy("")
     model_description: str = ""
-    info: Mapping[str, str] = field(default_factory=dict)
+    info: Lazy[Mapping[str, str]] = Lazy()
     events: tuple[Event, ...] = ()
     absent: frozenset[str] = frozenset()
-    axis: str = TIME
+    axis: Lazy[str] = Lazy(TIME)
 
     @classmethod
     def of_texts(
@@ -161,7 +172,7 @@ class Run:
 
         """
         if not isinstance(self.mechanism_source, str):
-            return self.mechanism_source() if callable(self.mechanism_source) else self.mechanism_source
+            return self.mechanism_source
         from kinfmu.mechanism import toml_file  # a run that is only read and converted does not need it
 
         return toml_file.parse(self.mechanism_source, "the run's mechanism") if self.mechanism_source else None
@@ -173,7 +184,7 @@ class Run:
             return self.mechanism_source
         from kinfmu.mechanism import toml_text
 
-        return toml_text.text(self.mechanism) if self.mechanism else ""
+        return toml_text.text(self.mechanism_source)
 
     @property
     def names(self) -> tuple[CoordinateName, ...]:
@@ -202,9 +213,9 @@ class Run:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all tables as numbers and the mechanism as text, for copies and for other processes."""
-        state = {**self.__dict__, "margin": self.margin, "error": self.error, "mechanism_source": self.mechanism_text}
-        state.pop("mechanism", None)  # a mechanism has views of its tables, which cannot be sent
-        return state
+        fields = {name: getattr(self, name) for name in _LAZY} | {"mechanism_source": self.mechanism_text}
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("mechanism", "_index")}
+        return kept | fields  # a mechanism has views of its tables, which cannot be sent
 
     def __repr__(self) -> str:
         name = self.info.get("name", "run")
@@ -218,17 +229,15 @@ class Run:
     def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
         """Return some of the samples, with these events; lazy tables stay lazy."""
 
-        def lazy(name: str) -> Any:
+        def part(name: str) -> Any:
             table = self.__dict__[name]
             return (lambda: getattr(self, name)[rows]) if callable(table) else table[rows]
 
-        tables = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "watch")
-        parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in tables}
-        return replace(self, **parts, margin=lazy("margin"), error=lazy("error"), events=events)
+        return self.replaced(**{name: part(name) for name in _TABLES}, events=events)
 
     def replaced(self, **fields: Any) -> Run:
-        """Return the run with other fields; margins and errors that are not computed yet stay so."""
-        return replace(self, **{name: self.__dict__[name] for name in ("margin", "error")} | fields)
+        """Return the run with other fields; what is not computed yet stays so."""
+        return replace(self, **{name: self.__dict__[name] for name in _LAZY} | fields)
 
     def without(self, names: Iterable[str]) -> Run:
         """Return the run without columns of these names: their places hold NaN (counts: 0), and none is computed."""
@@ -314,18 +323,27 @@ class Run:
         """
         if not isinstance(name, str):
             raise KinfmuError(f"columns of a run have names such as '{self.outputs[0]}', not {name!r}")
-        for fixed, value in self.fixed.items():
-            for order in range(3):
-                if name == fixed.derivative(order):
-                    return np.full(len(self.t), value if order == 0 else 0.0)
-        names = []
-        for place in self.places(kept=False):
-            if place.name == name:
-                if name in self.absent:
-                    raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
-                return self._column(place)
-            names.append(place.name)
-        raise KinfmuError(f"the run has no column '{name}'{suggestion(name, [*names, *self.fixed])}")
+        place = self._index.get(name)
+        if isinstance(place, float):
+            return np.full(len(self.t), place)
+        if place is None:
+            raise KinfmuError(f"the run has no column '{name}'{suggestion(name, self._index)}")
+        if name in self.absent:
+            raise KinfmuError(f"the run does not hold '{name}': it was not among the channels to keep")
+        return self._column(place)
+
+    @cached_property
+    def _index(self) -> dict[str, ColumnPlace | float]:
+        """The place of each column, and the numbers of the coordinates that never move, by name."""
+        index: dict[str, ColumnPlace | float] = {place.name: place for place in self.places(kept=False)}
+        for name, value in self.fixed.items():
+            index |= {name: value, name.derivative(1): 0.0, name.derivative(2): 0.0}
+        return index
+
+
+_LAZY = tuple(name for name, value in vars(Run).items() if isinstance(value, Lazy))
+_TABLES = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "margin", "error",
+           "watch")  # fmt: skip
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:

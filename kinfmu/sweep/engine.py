@@ -17,13 +17,13 @@ class UnreachedError(KinfmuError):
 
 
 class SweepResult(NamedTuple):
-    """Per-sample diagnostics as in Run; margin and error are functions that compute them.
+    """Per-sample diagnostics as in Run; iterations, margin and error are functions that compute them.
 
     failures: the first sample of each interval without numbers, and the reason.
     """
 
     status: IntArray
-    iterations: IntArray
+    iterations: Callable[[], IntArray]
     residual: FloatArray
     watch: FloatArray
     margin: Callable[[], FloatArray]
@@ -36,7 +36,9 @@ class Engine(Protocol):
 
     name: str
     order: Literal["C", "F"]
-    fixed: Mapping[str, float]
+
+    @property
+    def fixed(self) -> Mapping[str, float]: ...
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Return driver values, speeds and accelerations at times, by the laws."""

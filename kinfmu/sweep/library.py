@@ -6,7 +6,6 @@ import ctypes
 import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,8 +91,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {  # of sweep.h and designs.h: types of
 }
 
 
-@dataclass(frozen=True, eq=False)
-class LibraryResult:
+class LibraryResult(NamedTuple):
     """Per-sample diagnostics of a sweep, as in Run.
 
     outcomes: (n, 2), status and iterations; failures: first sample and message of each interval without numbers, and
@@ -199,7 +197,7 @@ class Library:
             failed.append(
                 (first, f"{more} more intervals without numbers begin here or later; {MOST_FAILURES} are reported")
             )
-        return replace(result, failures=tuple(failed), side_by_side=job.side_by_side)
+        return LibraryResult(result.outcomes, result.residual, result.watch, tuple(failed), job.side_by_side)
 
     def diagnose(
         self,

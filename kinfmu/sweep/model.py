@@ -14,9 +14,10 @@ from kinfmu.codegen.python import load_model, load_module
 from kinfmu.equations.graph import evaluate
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.parameters import parameter_values
+from kinfmu.mechanism.parameters import in_order
 from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.trace import parameter_symbol
@@ -101,6 +102,10 @@ class Model:
     def __init__(self, plan: SolvePlan, engine: str = "auto") -> None:
         self.plan = plan
         self.engine = engine
+        self.outputs = plan.outputs
+        self.parameters = tuple(parameter.name for parameter in plan.parameters)
+        self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
+        self._watch_names = plan.watch_names
         self._written = tuple(parameter.value for parameter in plan.parameters)
         self._constants_written = tuple(constant.value for constant in plan.law_constants)
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
@@ -121,14 +126,6 @@ class Model:
     def mechanism(self) -> Mechanism:
         """The mechanism with the parameters as written."""
         return self.plan.mechanism
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        return self.plan.outputs
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        return tuple(self._places)
 
     def solve(
         self,
@@ -176,11 +173,10 @@ class Model:
                 raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
             driven = driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
             times = np.arange(len(driven[0]), dtype=float)
-            axis = axis_for(driven[0], tuple(driver.inputs[0] for driver in self.plan.drivers))
         elif wrap:
             raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
         else:
-            times, axis = column_of("t", run_times(self.mechanism.run) if t is None else t), TIME
+            times = column_of("t", run_times(self.mechanism.run) if t is None else t)
         try:
             engine = self._engine(len(times), setting, tolerance, by_law=driven is None)
             if driven is None:
@@ -189,29 +185,29 @@ class Model:
             result = engine.sweep(driven, tables)
         except UnreachedError as reason:
             return self._solve_anew(str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs)
-        plan = self.plan
+        plan, given = self.plan, driven
         return Run(
             t=times,
-            outputs=plan.outputs,
+            outputs=self.outputs,
             coordinate_count=plan.coordinate_count,
             values=tables[0],
             rates=tables[1],
             accelerations=tables[2],
-            fixed=dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
-            input_names=tuple(name for driver in plan.drivers for name in driver.inputs),
-            inputs=np.stack(driven, axis=2).reshape(len(times), 3 * len(plan.drivers)),
+            fixed=lambda: dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
+            input_names=self._input_names,
+            inputs=lambda: np.stack(given, axis=2).reshape(len(times), len(self._input_names)),
             status=result.status,
             iterations=result.iterations,
             residual=result.residual,
             margin=result.margin,
             error=result.error,
-            watch_names=plan.watch_names,
+            watch_names=self._watch_names,
             watch=result.watch,
             length_unit=plan.mechanism.length_unit,
             mechanism_source=self._mechanism_with(setting),
-            info=self._info(setting, engine.name),
+            info=lambda: self._info(setting, engine.name),
             events=tuple(Event(float(times[k]), "error", message) for k, message in result.failures),
-            axis=axis,
+            axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
 
     def setting(self, given: Settings) -> Setting:
@@ -260,6 +256,15 @@ class Model:
 
         return Library(self.plan)
 
+    @cached_property
+    def _derived(self) -> tuple[tuple[str, Expression], ...]:
+        """Parameters that follow from others by expressions, each after those in its expression."""
+        parameters = self.mechanism.parameters
+        expressions = {
+            name: p.expression for name, p in parameters.items() if p.expression and name not in self._places
+        }
+        return tuple((name, expressions[name]) for name in in_order(parameters, expressions) if name in expressions)
+
     def _unknown(self, name: str) -> RequestError:
         known = [*self._places, *self._constant_places]
         if name in self.mechanism.parameters:
@@ -299,7 +304,7 @@ class Model:
             else:
                 if start is not None:
                     library.require_start(setting.values or self._written, setting.constants, start, tolerance)
-                return NativeEngine(library, setting.values, self._fixed(setting), tolerance)
+                return NativeEngine(library, setting.values, lambda: self._fixed(setting), tolerance)
         return PythonEngine(self._solver(setting.values, setting.constants if start is not None else None, tolerance))
 
     def _new_solver(self, values: Vector, starting: Vector | None, tolerance: float) -> Solver:
@@ -338,8 +343,9 @@ class Model:
 
     def _info(self, setting: Setting, engine: str) -> dict[str, str]:
         mechanism = self.mechanism
-        own = dict(zip(self._places, setting.values or self._written, strict=True))
-        values = parameter_values(mechanism.parameters, own) if setting.values else own
+        values: dict[str, Any] = dict(zip(self._places, setting.values or self._written, strict=True))
+        for name, expression in self._derived if setting.values else ():
+            values[name] = expression.value(values)
         return {
             "name": mechanism.name,
             "title": mechanism.title,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Literal
 
@@ -19,7 +19,7 @@ class NativeEngine:
     Args:
         library: The compiled plan.
         parameters: Values to set by continuation from those of the plan; empty: those of the plan.
-        fixed: Coordinates that never move, by name.
+        fixed: Returns the coordinates that never move, by name.
         tolerance: Residual relative to the size above which a sample is not ok.
 
     """
@@ -28,12 +28,16 @@ class NativeEngine:
     order: Literal["C", "F"] = "F"
 
     def __init__(
-        self, library: Library, parameters: Sequence[float], fixed: Mapping[str, float], tolerance: float
+        self, library: Library, parameters: Sequence[float], fixed: Callable[[], Mapping[str, float]], tolerance: float
     ) -> None:
         self._library = library
         self._parameters = parameters
         self._tolerance = tolerance
-        self.fixed = fixed
+        self._fixed = fixed
+
+    @property
+    def fixed(self) -> Mapping[str, float]:
+        return self._fixed()
 
     def drive(self, times: FloatArray, constants: Sequence[float]) -> Driven:
         """Return driver values, speeds and accelerations at times, by the laws."""
@@ -54,7 +58,7 @@ class NativeEngine:
         )
         return SweepResult(
             status=result.outcomes[:, 0].astype(np.int64),
-            iterations=result.outcomes[:, 1].astype(np.int64),
+            iterations=lambda: result.outcomes[:, 1].astype(np.int64),
             residual=result.residual,
             watch=result.watch,
             margin=lambda: diagnosed()[0],

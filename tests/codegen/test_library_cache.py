@@ -164,7 +164,7 @@ def test_without_a_place_to_write_one_line_names_it(cache: Path, monkeypatch: py
 
 def test_without_a_place_to_write_auto_takes_the_python_engine(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     unusable(cache, monkeypatch)
-    monkeypatch.setattr(import_module("kinfmu.sweep.solve"), "WORTH_COMPILING", 10)
+    monkeypatch.setattr(import_module("kinfmu.sweep.model"), "WORTH_COMPILING", 10)
     run = kinfmu.solve(kinfmu.load("crank_rocker"), np.linspace(0.0, 1.0, 20), engine="auto")
     assert run.info["engine"] == "python"
     assert (run.status == 0).all()

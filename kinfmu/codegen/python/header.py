@@ -147,9 +147,11 @@ def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequ
         *indented(known),
         f"    FIXED = {{{fixed}}}",
         *(f"    {line}" if line else "" for text in functions for line in text.split("\n")),
-        "    constants = {name: value for name, value in globals().items() if name.isupper()}",
-        f"    functions = {{{', '.join(f'{name!r}: {name}' for name in defined)}}}",
-        "    return SimpleNamespace(**constants | functions | {'FIXED': FIXED})",
+        f"    bound = {{'FIXED': FIXED, {', '.join(f'{name!r}: {name}' for name in defined)}}}",
+        "    return SimpleNamespace(**constants | bound)",
+        "",
+        "",
+        "constants = {name: value for name, value in globals().items() if name.isupper()}",
         "",
     ]
 

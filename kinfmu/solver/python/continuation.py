@@ -8,6 +8,7 @@ of the drivers. The rank is not determined again: the watches show whether the r
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import hypot
 from typing import Any, NamedTuple
 
@@ -68,10 +69,9 @@ def with_parameters(module: Any, values: Vector, tolerance: float = TOLERANCE) -
 def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     """Follow the anchor from the parameters of the mechanism to `values`."""
     written = tuple([value for _, value in module.PARAMETERS])
-    u, z = module.ANCHOR
-    model = module.bound(written)
-    pose = Pose(u, evaluated(model, u, z, held=0))
-    slope = at_rest = (0.0,) * len(z)
+    model, pose = _at_anchor(module)
+    u = pose.u
+    slope = at_rest = (0.0,) * len(pose.z)
     s, step, block = 0.0, 1.0, -1
     for _ in range(_MOST_STEPS):
         if s == 1.0 or values == written:
@@ -98,6 +98,14 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
         gap = f"{abs(value) * model.SIZE:.4g} {model.LENGTH_UNIT}"
         return Reached(model, pose, f"{_changed(module, values)}: redundant row {name} does not close: gap about {gap}")
     return Reached(model, pose, "")
+
+
+@lru_cache(maxsize=8)
+def _at_anchor(module: Any) -> tuple[Model, Pose]:
+    """Return the model with the parameters of the mechanism, and its anchor: equal in every call."""
+    u, z = module.ANCHOR
+    model = module.bound(tuple([value for _, value in module.PARAMETERS]))
+    return model, Pose(u, evaluated(model, u, z, held=0))
 
 
 def _is_trusted(pose: Pose, trial: Pose) -> bool:
