@@ -84,9 +84,9 @@ class Event(NamedTuple):
 class Run:
     """The motion of a mechanism at n samples.
 
-    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields that are seldom
-    read (fixed, inputs, iterations, margin, error, mechanism_source, info, axis) may be given as functions, which are called
-    when the field is first read.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields that are
+    seldom read (fixed, inputs, iterations, margin, error, mechanism_source, info, axis) may be given as functions,
+    which are called when the field is first read.
 
     Attributes:
         t: (n,) times [s]; of a run over driver values the numbers of the samples.

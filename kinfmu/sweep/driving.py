@@ -131,6 +131,7 @@ def _refuse_huge(name: str, rates: FloatArray) -> None:
 def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
     flat = values.ravel(order="K")
-    if float(flat.dot(flat)) <= min(largest, _SAFE) ** 2:  # one pass; it decides unless values are huge
-        return True
+    with np.errstate(over="ignore"):
+        if float(flat.dot(flat)) <= min(largest, _SAFE) ** 2:  # one pass; it decides unless values are huge
+            return True
     return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)
