@@ -12,7 +12,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.group import main
-from kinfmu.cli.progress import Progress
+from kinfmu.cli.messages import Progress
 from kinfmu.errors import MissingPackageError, listed, suggestion
 
 TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench, and the mechanisms it measures

@@ -10,7 +10,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main
-from kinfmu.cli.progress import Progress
+from kinfmu.cli.messages import Progress
 from kinfmu.cli.settings import checked_settings, set_option
 from kinfmu.errors import listed
 

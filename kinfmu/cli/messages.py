@@ -1,9 +1,11 @@
-"""Messages: notes, warnings and errors of a run on stderr, one line each; its verdict on stdout."""
+"""What the terminal shows of a run: messages, one line each, and progress on stderr; the verdict on stdout."""
 
 from __future__ import annotations
 
+import sys
 import unicodedata
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +13,9 @@ from kinfmu.errors import KinfmuError
 
 if TYPE_CHECKING:
     from kinfmu.run import Run
+
+
+LONG_RUN = 2000  # samples from which a progress bar is worth a line
 
 
 def printable(text: str) -> str:
@@ -53,3 +58,30 @@ def report(run: Run, *after: str, by_samples: bool = False) -> None:
             has_time = event.text.startswith("at t = ")  # an FMU writes the time itself
             when = f"sample {event.t:.0f}" if by_samples else f"at t = {event.t:g} s"
             raise KinfmuError(event.text if has_time else f"{when}: {event.text}")
+
+
+class Progress:
+    """A progress bar on stderr for at least `least` steps, if stderr is a terminal."""
+
+    def __init__(self, label: str = "simulating", least: int = LONG_RUN) -> None:
+        self.label = label
+        self.least = least
+        self._bar: Any = None
+        self._done = 0
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.render_finish()
+
+    def _show(self, done: int, count: int) -> None:
+        if self._bar is None:
+            if count < self.least or not sys.stderr.isatty():
+                return
+            self._bar = click.progressbar(length=count, label=self.label, file=sys.stderr)
+            self._bar.render_progress()
+        if done - self._done >= count // 200 or done == count:
+            self._bar.update(done - self._done)
+            self._done = done

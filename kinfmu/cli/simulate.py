@@ -12,8 +12,7 @@ import click
 from kinfmu import gallery
 from kinfmu.cli.arguments import InputFile, ModelName, OutputFile
 from kinfmu.cli.group import errors_as, errors_of, main, on_interrupt
-from kinfmu.cli.messages import report
-from kinfmu.cli.progress import Progress
+from kinfmu.cli.messages import Progress, report
 from kinfmu.cli.quantities import Time
 from kinfmu.cli.settings import DRIVEN_BY_TIME, RATES, TOLERANCE, as_values, checked_settings, set_option
 from kinfmu.errors import KinfmuError, RequestError

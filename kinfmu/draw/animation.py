@@ -24,9 +24,8 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.scene import palette
-from kinfmu.scene.completing import remedy
 from kinfmu.scene.instant import Instant
-from kinfmu.scene.placing import poses_of, world
+from kinfmu.scene.placing import poses_of, remedy, world
 from kinfmu.scene.shapes import shapes
 
 if TYPE_CHECKING:

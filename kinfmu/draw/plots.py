@@ -15,10 +15,9 @@ from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import Axis, axis_of
+from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
 from kinfmu.run.channels import coordinates
 from kinfmu.scene import palette
-from kinfmu.scene.shown import ROUND_OFF, shown_range
 from kinfmu.units import CoordinateName, unit_of
 
 if TYPE_CHECKING:

@@ -13,10 +13,9 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
 from kinfmu.scene import palette
-from kinfmu.scene.frames import die_frame, frames
 from kinfmu.scene.placing import poses_of
 from kinfmu.scene.scene import Scene
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.shape import Shape, die_frame, frames
 
 ROOT = "ground"  # the root frame
 _WIDTH, _BLOCK = 0.02, 0.03  # width of links and half length of blocks, as parts of the size

@@ -1,4 +1,4 @@
-"""The axis of a run: time, or a driver's value or the sample number if driver values were given."""
+"""The axes of a plot of a run: time, or a driver's value or the sample number; the range of values that is shown."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ FloatArray = NDArray[np.float64]
 TIME, SAMPLE = "time", "sample"  # axes of runs; the others are names of inputs, such as 'crank_angle'
 DEGREE = ANGLES["deg"]
 _LARGE = 1e9  # [rad]; larger angles stay in radians
+ROUND_OFF = 1e-9  # relative to a usual value of the motion; smaller curves are noise around 0
+OUTLIERS = 1.0  # [percent] of the values on either side that may be outside the plot if they would flatten the others
 
 
 class HasAxis(Protocol):
@@ -151,3 +153,24 @@ def _at_speeds(run: HasAxis) -> str:
     if len(shown) < len(run.input_names) // 3:
         return f"Rates are at the speeds given for {listed(name.driver for name in run.input_names[::3])}."
     return f"Rates are at the speed{'s' if len(shown) > 1 else ''} {listed(shown)}."
+
+
+def shown_range(values: FloatArray, usual: float) -> tuple[float, float] | None:
+    """Return the range of an axis where the default, from least to greatest, would mislead; else None.
+
+    Curves that are only round-off, compared with a `usual` value, are shown as a line at 0. A few samples near a
+    singular point, where speeds grow without bound, do not flatten all others. The data keep all values.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return None
+    if np.abs(known).max() < ROUND_OFF * usual:
+        return -usual, usual
+    low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
+    with np.errstate(over="ignore"):  # the width of the largest numbers is infinite; the default range is used then
+        width = high - low
+    if width == np.inf:
+        return None
+    if width > 0.0 and (known.min() < low - width or known.max() > high + width):
+        return float(low - width / 2), float(high + width / 2)
+    return None

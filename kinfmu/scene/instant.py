@@ -15,8 +15,8 @@ from kinfmu.measures.placement import BodyFrame, Placement, body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
-from kinfmu.scene.frames import frames
 from kinfmu.scene.placing import seen_from, world
+from kinfmu.scene.shape import frames
 
 
 @dataclass(frozen=True, eq=False)

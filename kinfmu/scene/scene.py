@@ -13,12 +13,10 @@ from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
-from kinfmu.scene.completing import remedy
-from kinfmu.scene.frames import frames
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import pins_of
-from kinfmu.scene.placing import poses_of, world
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.placing import poses_of, remedy, world
+from kinfmu.scene.shape import Shape, frames
 from kinfmu.scene.shapes import shapes
 
 MOST_SAMPLES = 2000  # of a run, from which bounds and shapes are computed

@@ -1,7 +1,7 @@
 """What is drawn of a mechanism, once for figures, recordings and robot descriptions: shapes in moving frames.
 
-A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those of
-`kinfmu.scene.frames`.
+A renderer places the frames and paints each kind in its own way. Frames are bodies, 'ground', or those
+of `frames`: bars, cylinders, and the blocks of pins.
 
     link             a body's points: a closed plate or an open bar; rib: from a plate's corner to a point inside
     rod, slot        a line of a body on which another body slides, and the part of it in which a pin runs
@@ -17,10 +17,17 @@ A renderer places the frames and paints each kind in its own way. Frames are bod
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinfmu.drivers import DistanceDriver, Driver
+from kinfmu.joints import Coordinate, Distance, PointOnLine
+from kinfmu.joints.joint import Joint
+from kinfmu.measures.placement import body_of
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
 from kinfmu.scene.placing import world
@@ -72,3 +79,49 @@ class Shape:
             return replace(self, points=points)
         x, y = self.direction
         return replace(self, points=points, direction=world(np.array([[0.0, 0.0, pose[2]]]), (x, y))[0])
+
+
+def bar_frame(joint: str) -> str:
+    """Return the frame of a bar, which begins at its first point and lies along it."""
+    return f"bar.{joint}"  # names of bodies hold no dot
+
+
+def cylinder_frames(driver: str) -> tuple[str, str]:
+    """Return the frames of a cylinder's barrel and rod, each at its own pin and along the cylinder."""
+    return f"cylinder.{driver}.barrel", f"cylinder.{driver}.rod"
+
+
+def die_frame(joint: str) -> str:
+    """Return the frame of the block of a pin, which moves with the pin and does not turn."""
+    return f"die.{joint}"
+
+
+def frames(poses: Mapping[str, FloatArray], mechanism: Mechanism) -> dict[str, FloatArray]:
+    """Return poses (n, 3) of x, y [length], phi [rad] of all frames, from those of bodies, the ground included."""
+    found, points = dict(poses), mechanism.body_points
+
+    def track(point: str) -> FloatArray:
+        return world(poses[body_of(point)], points[point])
+
+    members: list[Joint | Driver] = [*mechanism.joints, *mechanism.drivers]
+    for member in members:
+        if not poses.keys() >= set(member.bodies()):
+            continue
+        if isinstance(member, Distance | DistanceDriver):
+            a, b = map(track, member.between)
+            angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
+            at_a, at_b = np.column_stack([a, angle]), np.column_stack([b, angle])
+            if isinstance(member, Distance):
+                found[bar_frame(member.name)] = at_a
+            else:
+                found |= zip(cylinder_frames(member.name), (at_a, at_b), strict=True)
+        elif isinstance(member, Coordinate):
+            found[die_frame(member.name)] = _upright(track(member.of))
+        elif isinstance(member, PointOnLine) and body_of(member.between[0]) == GROUND_NAME:
+            found[die_frame(member.name)] = _upright(track(member.between[1]))
+    return found
+
+
+def _upright(track: FloatArray) -> FloatArray:
+    """Return poses (n, 3) at points (n, 2) that do not turn, NaN where the points are unknown."""
+    return np.column_stack([track, 0.0 * track[:, 0]])

@@ -15,10 +15,9 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
 from kinfmu.scene.cams import cam_shapes
-from kinfmu.scene.frames import bar_frame, cylinder_frames, die_frame
 from kinfmu.scene.instant import Instant
 from kinfmu.scene.outline import points_of, ribs, rim
-from kinfmu.scene.shape import Shape
+from kinfmu.scene.shape import Shape, bar_frame, cylinder_frames, die_frame
 from kinfmu.scene.slides import Slide, place, racks_of, rods, slides
 from kinfmu.scene.wheels import wheels
 

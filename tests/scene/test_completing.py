@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu.errors import KinfmuError
-from kinfmu.scene.completing import recomputed
+from kinfmu.scene.placing import recomputed
 from kinfmu.sweep.continued import continued
 from tests.test_parameters_by_every_way import LENGTHS, TIMES, drawn, linkage, side
 

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinfmu.run import FloatArray, Run
-from kinfmu.run.axis import axis_of
+from kinfmu.run.axis import axis_of, shown_range
 from kinfmu.scene import palette
-from kinfmu.scene.shown import shown_range
 from kinfmu.units import Quantity, unit_of
 
 ORDERS = ("position", "velocity", "acceleration")
