@@ -46,7 +46,7 @@ def report(run: Run, *after: str, by_samples: bool = False) -> None:
         KinfmuError: The first event of level "error", with its time [s].
 
     """
-    from kinfmu.log.verdict import sentence
+    from kinfmu.run.verdict import sentence
 
     printers = {"info": note, "warning": warn}
     for level, text in dict.fromkeys((event.level, event.text) for event in run.events):

@@ -25,8 +25,8 @@ def recover(run: Path, output: Path | None) -> None:
     """
     from kinfmu.cli.messages import printable
     from kinfmu.log import recover as recovered
-    from kinfmu.log.verdict import sentence
     from kinfmu.run.axis import axis_of
+    from kinfmu.run.verdict import sentence
 
     target = output or run.with_name(f"{run.stem}-recovered.mcap")
     found = recovered(run, target)

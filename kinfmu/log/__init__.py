@@ -9,38 +9,11 @@ The writers and readers load their packages (zstandard, rerun, pyarrow) when fir
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from kinfmu.log.growing import McapLog
-    from kinfmu.log.reading import read, recover
-    from kinfmu.log.table import write_table
-    from kinfmu.log.viewer.rerun_file import write_rrd
-    from kinfmu.log.viewer.reviewing import review
-    from kinfmu.log.writing import write_mcap
+from kinfmu.log.growing import McapLog
+from kinfmu.log.reading import read, recover
+from kinfmu.log.table import write_table
+from kinfmu.log.viewer.rerun_file import write_rrd
+from kinfmu.log.viewer.reviewing import review
+from kinfmu.log.writing import write_mcap
 
 __all__ = ["McapLog", "read", "recover", "review", "write_mcap", "write_rrd", "write_table"]
-
-_HOME = {
-    "McapLog": "growing",
-    "read": "reading",
-    "recover": "reading",
-    "review": "viewer.reviewing",
-    "write_mcap": "writing",
-    "write_rrd": "viewer.rerun_file",
-    "write_table": "table",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Return a public function from the module that defines it."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'kinfmu.log' has no attribute '{name}'")
-    found = getattr(import_module(f"kinfmu.log.{_HOME[name]}"), name)
-    globals()[name] = found  # the next access does not come here
-    return found
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]

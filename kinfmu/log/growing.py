@@ -12,9 +12,9 @@ from shlex import quote
 from kinfmu.files.whole_file import lock_for_writing
 from kinfmu.log.cdr import zero_of
 from kinfmu.log.target import check_writable, replacing, target_of, write_error
-from kinfmu.log.verdict import status_events, unexplained
 from kinfmu.log.writing import Content
 from kinfmu.run import Event, Run
+from kinfmu.run.verdict import status_events, unexplained
 from kinfmu.solver.python.status import Status
 
 

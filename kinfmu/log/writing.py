@@ -30,10 +30,10 @@ from kinfmu.log.mcap_writer import McapWriter
 from kinfmu.log.record import description, ending
 from kinfmu.log.target import replacing
 from kinfmu.log.topics import SOURCE, STATUS_SOURCE, JointTopic, LinkTopic, LogTopic, SampleTopic, joint_topics
-from kinfmu.log.verdict import sentence, status_events, unexplained
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_drawn, select
+from kinfmu.run.verdict import sentence, status_events, unexplained
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that

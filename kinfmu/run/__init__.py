@@ -1,4 +1,4 @@
-"""Runs: named columns over samples, their axis, the columns to keep, and sinks, which receive a run in parts."""
+"""Runs: named columns over samples, their axis, the columns to keep, the verdict, and sinks, which receive parts."""
 
 from __future__ import annotations
 

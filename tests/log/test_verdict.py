@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from kinfmu.log.verdict import notable_events, sentence
 from kinfmu.log.viewer.card import card
 from kinfmu.run import Event, Run
+from kinfmu.run.verdict import notable_events, sentence
 from kinfmu.solver.python.status import Status
 from tests.log.runs import fourbar, with_gap
 

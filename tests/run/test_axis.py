@@ -15,12 +15,12 @@ from kinfmu.draw import animate
 from kinfmu.draw.plots import _sheet
 from kinfmu.errors import LogError, RequestError
 from kinfmu.log import read, write_mcap
-from kinfmu.log.verdict import sentence
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.series import groups
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import coordinates, select
+from kinfmu.run.verdict import sentence
 
 TURN = np.linspace(0.0, math.tau, 361)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kinfmu.log.verdict import notable_events
 from kinfmu.log.viewer.linkage import trail_path, trail_time, view_box
 from kinfmu.log.viewer.series import KINDS, ORDERS, Group
 from kinfmu.log.viewer.timeline import Timeline
 from kinfmu.run import Run
+from kinfmu.run.verdict import notable_events
 from kinfmu.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from kinfmu.log.verdict import MEANINGS, counts, notable_events, worst_residual
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
+from kinfmu.run.verdict import MEANINGS, counts, notable_events, worst_residual
 
 MOST_EVENTS = 12  # listed on the card; the log has all
 _WORDS = {"generation_tool": "FMU made by", "parameters": "parameters set"}

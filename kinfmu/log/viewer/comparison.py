@@ -10,7 +10,6 @@ import numpy as np
 
 from kinfmu.errors import LogError, listed
 from kinfmu.log.cdr import nanoseconds
-from kinfmu.log.verdict import sentence
 from kinfmu.log.viewer.blueprint import compared
 from kinfmu.log.viewer.card import plain
 from kinfmu.log.viewer.decimated import decimated
@@ -20,6 +19,7 @@ from kinfmu.log.viewer.series import Group, groups
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import axis_of
+from kinfmu.run.verdict import sentence
 from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
 from kinfmu.units import CoordinateName

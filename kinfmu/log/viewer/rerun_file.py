@@ -29,7 +29,6 @@ import numpy as np
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
-from kinfmu.log.verdict import changes, label, notable_events, sentence
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
@@ -37,6 +36,7 @@ from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
 from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
+from kinfmu.run.verdict import changes, label, notable_events, sentence
 from kinfmu.scene import palette
 from kinfmu.scene.scene import drawable
 from kinfmu.solver.python.status import Status

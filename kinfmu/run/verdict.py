@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.log.cdr import nanoseconds
 from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.solver.python.status import Status
@@ -82,9 +81,9 @@ def unexplained(changes: Iterable[Event], events: Iterable[Event]) -> list[Event
     return [change for change in changes if change.level != "error" or _moment(change) not in explained]
 
 
-def _moment(event: Event) -> int:
-    """Return the time of an event as logs count it [ns]."""
-    return int(nanoseconds(np.array([event.t]))[0])
+def _moment(event: Event) -> float:
+    """Return the time of an event in whole nanoseconds: records round it to these."""
+    return float(np.rint(event.t * 1e9))
 
 
 def notable_events(run: Run) -> list[Event]:
