@@ -125,11 +125,12 @@ def _pylinkage(u: FloatArray, columns: FloatArray) -> Callable[[], object]:  # n
 
     ground, crank, coupler, rocker = LENGTHS
     step = float(u[1] - u[0])
-    parts = [Ground(0.0, 0.0), Ground(ground, 0.0)]
-    parts.append(Crank(parts[0], crank, step, float(u[0]) - step))
-    parts.append(RRRDyad(parts[2].output, parts[1], coupler, rocker, 30.0, 50.0))  # where the circles meet: above
+    o, c = Ground(0.0, 0.0), Ground(ground, 0.0)
+    p = Crank(o, crank, step, float(u[0]) - step)
+    q = RRRDyad(p.output, c, coupler, rocker, 30.0, 50.0)  # where the circles meet: above
+    parts: list[Any] = [o, c, p, q]
     linkage = Linkage(parts)
-    linkage.set_input_velocity(parts[2], 1.0, 0.0)
+    linkage.set_input_velocity(p, 1.0, 0.0)
     start = [(part.x, part.y) for part in parts]
 
     def way() -> object:

@@ -118,7 +118,7 @@ def _jansen_leg(case: Case, angle: float, step: float) -> tuple[dict[str, Any], 
     x = Crank(axle, _length(case, "crank", "axle", "X"), step, angle)
 
     def dyad(a: Any, b: Any, point: str, first: tuple[str, str], second: tuple[str, str]) -> Any:
-        lengths = (_length(case, body, origin, point) for body, origin in (first, second))
+        lengths = _length(case, *first, point), _length(case, *second, point)
         return RRRDyad(a, b, *lengths, *_start(case, first[0], point))
 
     top = dyad(x.output, pin, "top", ("upper_rod", "X"), ("upper_triangle", "pin"))
