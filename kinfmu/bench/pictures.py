@@ -23,8 +23,8 @@ NOTES = (
     "To the left is exact, below is fast.",
     "",
     "Points of kinfmu's generated Python and of",
-    "the dense reference: 0, 1, 2, 3 corrections",
-    "of Newton; of the peers: tolerances.",
+    "the readable reference: 0 to 3 corrections",
+    "of Newton; of the others: tolerances.",
     "",
     "Curves from light to dark: predicted by the",
     "last pose, with its velocity, with velocity",
@@ -40,12 +40,13 @@ LOOKS = {  # of the engines
     "pylinkage": Look(GROUND, 1.4, "s"),
     "CasADi": Look(BODIES[3]),
     "scipy fsolve": Look(BODIES[2]),
-    "dense reference": Look(BODIES[5]),
+    "numpy Newton": Look(BODIES[1], 1.4, "s"),
+    "readable reference": Look(BODIES[5]),
 }
 
 
 def draw_work_precision(folder: Path, measured: Sequence[Measured]) -> tuple[Path, ...]:
-    """Write the work-precision chart as SVG and PNG: fixed numbers of corrections, or tolerances of the peers."""
+    """Write the work-precision chart as SVG and PNG: fixed numbers of corrections, or tolerances of the others."""
     paths = _paths(folder, WORK_PRECISION)
     panels = []
     for case in dict.fromkeys(one.case for one in measured):

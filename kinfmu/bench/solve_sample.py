@@ -1,4 +1,4 @@
-"""Time a sample: the dense reference beside the Python engine on the four-bar, with the error of both."""
+"""Time a sample: the readable reference beside the Python engine on the four-bar, with the error of both."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from kinfmu.solver.python import Solver
 from kinfmu.sweep import solve
 
 ROUNDS = 9
-DEGREES = np.arange(5.0, 176.0)  # away from the singular points, where the dense reference has no answer
+DEGREES = np.arange(5.0, 176.0)  # away from the singular points, where the readable reference has no answer
 
 
 def run(rounds: int = ROUNDS) -> str:
     """A table: microseconds a sample (median and spread over rounds) and largest error of q, qd, qdd."""
     u = np.radians(DEGREES)
     ways = {
-        "dense numpy Newton, 9 coordinates, warm start": _reference(u),
+        "readable reference, 9 coordinates, warm start": _reference(u),
         "python engine, ready: q, qd, qdd": _engine(u),
         "kinfmu.solve, which writes its code first": _solve(u),
         "the same, error estimates and margin read": _solve(u, read=True),

@@ -74,7 +74,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     \b
     accuracy  run time against error of every engine in every setting, and through
               singular points: the tables and charts of docs/accuracy.md; takes minutes
-    sample    a sample of solve, compared with a dense numpy Newton
+    sample    a sample of solve, compared with the readable reference
     sweep     a sweep by the native engine, compared with closed forms and pylinkage
     step      a step of the FMU, compared with the smallest pythonfmu FMU
     native    a step of the native FMU in a C host, compared with closed forms

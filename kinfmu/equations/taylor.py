@@ -1,4 +1,4 @@
-"""Taylor numbers: a value with its first and second derivative along a line, for the dense reference."""
+"""Taylor numbers: a value with its first and second derivative along a line, for the readable reference."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The arithmetic of joints and laws: `+ - * /` of the operands, and the functions of this module.
 
-One formula serves floats (direct evaluation), complex numbers (derivative tests), Taylor numbers (the dense reference)
-and symbols (generated code): a package with its own kind of number registers it with these functions.
+One formula serves floats (direct evaluation), complex numbers (derivative tests), Taylor numbers (the readable
+reference) and symbols (generated code): a package with its own kind of number registers it with these functions.
 """
 
 from __future__ import annotations

@@ -11,7 +11,18 @@ import pytest
 from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engines import ENGINES, Casadi, Dense, Engine, Fsolve, Generated, Native, Pylinkage, Shipped
+from kinfmu.bench.engines import (
+    ENGINES,
+    Casadi,
+    Dense,
+    Engine,
+    Fsolve,
+    Generated,
+    Native,
+    NumpyNewton,
+    Pylinkage,
+    Shipped,
+)
 from kinfmu.bench.exact_fourbar import exact_fourbar
 from kinfmu.bench.pictures import LOOKS
 from kinfmu.bench.setting import Setting
@@ -29,7 +40,9 @@ def case(request: pytest.FixtureRequest) -> Case:
     return of_gallery(request.param)
 
 
-@pytest.mark.parametrize("engine", [Shipped(), Native(), Generated(), Dense()], ids=lambda engine: engine.name)
+@pytest.mark.parametrize(
+    "engine", [Shipped(), Native(), Generated(), NumpyNewton(), Dense()], ids=lambda engine: engine.name
+)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Case) -> None:
     sampler = engine.sampler(case, engine.usual)
     assert sampler is not None
@@ -85,6 +98,19 @@ def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatc
 
 def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
     assert Pylinkage().sampler(case, Pylinkage().usual) is None
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("name", ["fourbar", "crank_rocker", "slider_crank", "stephenson_six_bar", "excavator"])
+def test_numpy_newton_agrees_on_every_kind_of_row_it_states(name: str, order: int) -> None:
+    stated = of_gallery(name)
+    sampler = NumpyNewton().sampler(stated, NumpyNewton.usual._replace(predictor=order))
+    assert sampler is not None
+    assert max(largest(stated, sampler)) <= 4e-14
+
+
+def test_numpy_newton_is_not_asked_for_what_it_cannot_state() -> None:
+    assert NumpyNewton().sampler(of_gallery("cam_roller"), NumpyNewton.usual) is None
 
 
 def test_better_predictors_need_fewer_corrections_for_the_same_error() -> None:

@@ -21,14 +21,14 @@ from kinfmu.errors import CompilerError
 from tests import oracle
 from tests.cli.conftest import Command
 
-QUICK = ["kinfmu", "kinfmu native", "generated Python", "scipy fsolve"]
+QUICK = ["kinfmu", "kinfmu native", "generated Python", "numpy Newton", "scipy fsolve"]
 PICTURES = [f"accuracy-{name}.{kind}" for name in ("singular", "work-precision") for kind in ("png", "svg")]
 
 
 @pytest.fixture(scope="module")
 def measured() -> tuple[accuracy.Result, tuple[tuple[singular.Near, ...], tuple[str, ...]]]:
     """What is measured on one mechanism in one round by the quick engines."""
-    engines = [engine for engine in ENGINES if engine.name != "dense reference"]
+    engines = [engine for engine in ENGINES if engine.name != "readable reference"]
     with pytest.MonkeyPatch.context() as patch:
         for package in ("casadi", "pylinkage"):
             patch.setitem(sys.modules, package, None)
@@ -80,7 +80,7 @@ def test_tables_and_charts_are_written_in_the_requested_folder(
     for part in ("engines", "singular points", "conditions"):
         (text,) = re.findall(f"<!-- generated: {part} -->\n\n(.*?)\n\n<!-- end: {part} -->", page, re.DOTALL)
         assert text in stdout
-    assert "| dense reference |" in page
+    assert "| readable reference |" in page
 
 
 @pytest.mark.usefixtures("once")
@@ -188,7 +188,7 @@ def test_the_help_has_a_line_for_every_measurement(command: Command) -> None:
 @pytest.mark.parametrize(
     ("what", "lines"),
     [
-        ("sample", ["dense numpy Newton", "python engine", "kinfmu.solve", "the same, error"]),
+        ("sample", ["readable reference", "python engine", "kinfmu.solve", "the same, error"]),
         ("step", ["fourbar", "toy (sin, cos)", "ratio, round by round"]),
         ("native", ["FMI 2.0, instantiate", "FMI 3.0, instantiate"]),
         ("import", ["pass", "import kinfmu", "difference"]),

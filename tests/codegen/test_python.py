@@ -1,4 +1,4 @@
-"""The generated Python against the dense reference, which shares neither trace nor plan with it."""
+"""The generated Python against the readable reference, which shares neither trace nor plan with it."""
 
 from __future__ import annotations
 

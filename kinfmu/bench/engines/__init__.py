@@ -10,10 +10,32 @@ from kinfmu.bench.engines.dense import Dense
 from kinfmu.bench.engines.engine import Engine, Sampler
 from kinfmu.bench.engines.generated import Generated
 from kinfmu.bench.engines.native import Native
+from kinfmu.bench.engines.numpy_newton import NumpyNewton
 from kinfmu.bench.engines.pylinkage_dyads import Pylinkage
 from kinfmu.bench.engines.scipy_fsolve import Fsolve
 from kinfmu.bench.engines.shipped import Shipped
 
-ENGINES: tuple[Engine, ...] = (Shipped(), Native(), Generated(), Dense(), Fsolve(), Casadi(), Pylinkage())
+ENGINES: tuple[Engine, ...] = (
+    Shipped(),
+    Native(),
+    Generated(),
+    NumpyNewton(),
+    Dense(),
+    Fsolve(),
+    Casadi(),
+    Pylinkage(),
+)
 
-__all__ = ["ENGINES", "Casadi", "Dense", "Engine", "Fsolve", "Generated", "Native", "Pylinkage", "Sampler", "Shipped"]
+__all__ = [
+    "ENGINES",
+    "Casadi",
+    "Dense",
+    "Engine",
+    "Fsolve",
+    "Generated",
+    "Native",
+    "NumpyNewton",
+    "Pylinkage",
+    "Sampler",
+    "Shipped",
+]

@@ -1,4 +1,4 @@
-"""The dense reference: the method as the book writes it, over all coordinates, in every setting of Newton."""
+"""The readable reference: the method as the book writes it, over all coordinates, in every setting of Newton."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST = 60  # iterations
 class Dense(Engine):
     """Newton and the two linear solves with numpy on the rows kept, as `equations.reference` does."""
 
-    name = "dense reference"
+    name = "readable reference"
     settings: Sequence[Setting] = newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,))  # the slowest
     usual = Setting()
 
