@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.analysis.held import started
 from kinfmu.analysis.values import degrees, value_text
 from kinfmu.codegen.python import load_model
 from kinfmu.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
@@ -99,7 +100,7 @@ def find_assemblies(mechanism: Mechanism, plan: SolvePlan | None = None) -> Asse
     if plan is not None:
         chosen, planned = plan.anchor.q, plan if plan.mechanism.coordinates == "all" else compile_plan(whole)
     else:
-        planned = compile_plan(_started(whole, _some_pose(whole)))
+        planned = compile_plan(started(whole, _some_pose(whole)))
     poses, is_complete = _poses(planned)
     if chosen is not None and all(_distance(planned, chosen, pose) > _SAME for pose in poses):
         poses.insert(0, chosen)
@@ -300,13 +301,6 @@ def _rounded(named: Mapping[str, float], body: str) -> Start:
     """Return a start pose rounded to a tenth of a degree and four digits of a length."""
     x, y = (float(f"{named[f'{body}.{axis}']:.4g}") for axis in ("x", "y"))
     return Start(x, y, math.radians(round(math.degrees(named[f"{body}.phi"]), 1)))
-
-
-def _started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
-    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
-    poses = iter(pose.reshape(-1, 3).tolist())
-    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
-    return replace(mechanism, bodies=tuple(bodies))
 
 
 def _some_pose(mechanism: Mechanism) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
+from functools import partial
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -24,7 +25,6 @@ TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in 
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
 _LOOKS = 201  # times of the run at which a driver is evaluated
-_HALVINGS = 40
 _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 
@@ -152,9 +152,10 @@ def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop])
     edge = _EDGE * (high - low)
     for named in loops:
         for toggle in _toggles_of(named.loop):
+            sine = partial(_sine, path, toggle)
             for before, after in pairwise(path.poses):
-                if _sine(path, before, toggle) * _sine(path, after, toggle) < 0.0:
-                    at = _within(path, _crossing(path, toggle, before, after), low)
+                if sine(before) * sine(after) < 0.0:
+                    at = _within(path, path.zero(sine, before, after).u[0], low)
                     if low + edge < at < high - edge:
                         value = value_text(at, mechanism.length_unit, path.kind)
                         yield f"the run crosses a toggle position: {toggle.happens} at {path.name} = {value}"
@@ -189,34 +190,11 @@ def _within(path: DriverPath, u: float, low: float) -> float:
     return low + (u - low) % period
 
 
-def _sine(path: DriverPath, pose: Pose, toggle: _Toggle) -> float:
+def _sine(path: DriverPath, toggle: _Toggle, pose: Pose) -> float:
     """Return the sine of the angle between the two links, or between the rod and the normal of its slide."""
     q = path.coordinates(pose)
-    (ax, ay), (bx, by), *third = (_world(place, q) for place in toggle.places)
+    (ax, ay), (bx, by), *third = (place.world(q) for place in toggle.places)
     cx, cy = third[0] if third else (bx + math.cos(toggle.across), by + math.sin(toggle.across))
     return ((bx - ax) * (cy - by) - (by - ay) * (cx - bx)) / (
         math.hypot(bx - ax, by - ay) * math.hypot(cx - bx, cy - by)
     )
-
-
-def _crossing(path: DriverPath, toggle: _Toggle, low: Pose, high: Pose) -> float:
-    """Return the driver value between two poses where a sine vanishes, by bisection."""
-    at_low = _sine(path, low, toggle)
-    for _ in range(_HALVINGS):
-        middle = path.solver.solve(low, (0.5 * (low.u[0] + high.u[0]),))
-        if not middle.good or middle.u[0] in (low.u[0], high.u[0]):
-            break
-        if (_sine(path, middle, toggle) < 0.0) == (at_low < 0.0):
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low.u[0] + high.u[0])
-
-
-def _world(place: Place, q: Mapping[str, float]) -> tuple[float, float]:
-    """Return the world coordinates of a place."""
-    if place.body == GROUND_NAME:
-        return place.x, place.y
-    x, y, phi = (q[f"{place.body}.{axis}"] for axis in ("x", "y", "phi"))
-    c, s = math.cos(phi), math.sin(phi)
-    return x + c * place.x - s * place.y, y + s * place.x + c * place.y

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from kinfmu.analysis.held import alone
@@ -20,6 +21,7 @@ SIZES = 3.0  # reach of a driver of a length, in both directions
 _LARGE = 150  # coordinates; a larger mechanism is followed for one turn only
 _NEAR_LIMIT = 1e-6  # [rad, sizes]; distance from a limit of the poses from which its own is extrapolated
 _REPEATS = 1e-6  # [rad, sizes]; poses closer than this are equal
+_HALVINGS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,23 @@ class DriverPath:
         """Return the rates of all coordinates per unit of the driver, by name."""
         rates: dict[str, float] = dict(zip(self.plan.outputs, self.solver.rates(pose, (1.0,)), strict=True))
         return {**dict.fromkeys(self.plan.fixed, 0.0), **rates}
+
+    def zero(self, value: Callable[[Pose], float], low: Pose, high: Pose) -> Pose:
+        """Return the pose between two where a value changes its sign, by bisection."""
+        at_low = value(low)
+        for _ in range(_HALVINGS):
+            u = 0.5 * (low.u[0] + high.u[0])
+            middle = self.solver.solve(low, (u,))
+            if not middle.good or u in (low.u[0], high.u[0]):
+                break
+            at_middle = value(middle)
+            if at_middle == 0.0:
+                return middle
+            if (at_middle < 0.0) == (at_low < 0.0):
+                low = middle
+            else:
+                high = middle
+        return low
 
     def at_limit(self, limit: Limit) -> dict[str, float]:
         """Return all coordinates by name at one of the limits.

@@ -6,11 +6,13 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from kinfmu.drivers import Driver
+from kinfmu.equations.system import FloatArray
 from kinfmu.joints import Held
 from kinfmu.measures import CoordinateOf, Measure
 from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Start
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.origin import in_world
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def alone(plan: SolvePlan, number: int) -> SolvePlan:
             held.append(HeldDriver(name, driver, float(plan.anchor.u[k])))
     return compile_plan(
         replace(
-            _started(mechanism, plan),
+            started(mechanism, in_world(plan.origin, plan.anchor.q)),
             joints=(*mechanism.joints, *held),
             drivers=(mechanism.drivers[number],),
             coordinates="all",
@@ -68,13 +70,8 @@ def alone(plan: SolvePlan, number: int) -> SolvePlan:
     )
 
 
-def _started(mechanism: Mechanism, plan: SolvePlan) -> Mechanism:
-    """The mechanism with the plan's anchor as its start pose."""
-    poses = iter(plan.anchor.q.reshape(-1, 3).tolist())
-    bodies = []
-    for body in mechanism.bodies:
-        if not body.is_ground:
-            x, y, phi = next(poses)
-            body = replace(body, start=Start(x + plan.origin.x, y + plan.origin.y, phi))
-        bodies.append(body)
+def started(mechanism: Mechanism, pose: FloatArray) -> Mechanism:
+    """Return the mechanism with this pose of all coordinates, in the world, as its start."""
+    poses = iter(pose.reshape(-1, 3).tolist())
+    bodies = [body if body.is_ground else replace(body, start=Start(*next(poses))) for body in mechanism.bodies]
     return replace(mechanism, bodies=tuple(bodies))

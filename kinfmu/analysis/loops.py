@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,6 +22,22 @@ class Place(NamedTuple):
     body: str
     x: float
     y: float
+
+    def world(self, q: Mapping[str, float]) -> tuple[float, float]:
+        """Return the world coordinates of the place; q: coordinates by name."""
+        if self.body == GROUND_NAME:
+            return self.x, self.y
+        x, y, phi = (q[f"{self.body}.{axis}"] for axis in ("x", "y", "phi"))
+        c, s = math.cos(phi), math.sin(phi)
+        return x + c * self.x - s * self.y, y + s * self.x + c * self.y
+
+    def velocity(self, q: Mapping[str, float], qd: Mapping[str, float]) -> tuple[float, float]:
+        """Return the rates of the world coordinates; qd: rates of the coordinates by name."""
+        if self.body == GROUND_NAME:
+            return 0.0, 0.0
+        x, y = self.world(q)
+        vx, vy, omega = (qd[f"{self.body}.{axis}"] for axis in ("x", "y", "phi"))
+        return vx - omega * (y - q[f"{self.body}.y"]), vy + omega * (x - q[f"{self.body}.x"])
 
 
 class Link(NamedTuple):

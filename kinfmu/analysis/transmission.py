@@ -16,7 +16,6 @@ from kinfmu.solver.python import Pose
 POOR = math.radians(40.0)  # [rad]; the usual lower bound
 LOCKED = math.radians(1e-4)  # [rad]; a smaller angle is 0 within rounding, because it is an arc cosine
 _STRAIGHT = 1e-7  # a cosine this close to 1 at a limit is 1, because there the coupler is in line
-_HALVINGS = 60
 
 Coordinates = Mapping[str, float]
 
@@ -127,11 +126,11 @@ def _led_slider_crank(plan: SolvePlan, loop: SliderCrank) -> tuple[str, str, _Co
         n = (-math.sin(loop.direction), math.cos(loop.direction))
 
         def value(q: Coordinates) -> float:
-            (px, py), (sx, sy) = _point(p, q), _point(s, q)
+            (px, py), (sx, sy) = p.world(q), s.world(q)
             return (n[0] * (sx - px) + n[1] * (sy - py)) / loop.rod.length
 
         def slope(q: Coordinates, qd: Coordinates) -> float:
-            vx, vy = _velocity(p, q, qd)
+            vx, vy = p.velocity(q, qd)
             return -(n[0] * vx + n[1] * vy) / loop.rod.length
 
         return loop.rod.name, loop.slider if slider is not None else loop.guide, _Cosine(value, slope), True
@@ -163,35 +162,15 @@ def _opposite(b: float, c: float, p: Place, q: Place) -> _Cosine:
     """Return the cosine of the angle between sides b and c of a triangle whose third side joins p and q."""
 
     def value(at: Coordinates) -> float:
-        (px, py), (qx, qy) = _point(p, at), _point(q, at)
+        (px, py), (qx, qy) = p.world(at), q.world(at)
         return (b * b + c * c - (qx - px) ** 2 - (qy - py) ** 2) / (2.0 * b * c)
 
     def slope(at: Coordinates, rates: Coordinates) -> float:
-        (px, py), (qx, qy) = _point(p, at), _point(q, at)
-        (pu, pv), (qu, qv) = _velocity(p, at, rates), _velocity(q, at, rates)
+        (px, py), (qx, qy) = p.world(at), q.world(at)
+        (pu, pv), (qu, qv) = p.velocity(at, rates), q.velocity(at, rates)
         return -((qx - px) * (qu - pu) + (qy - py) * (qv - pv)) / (b * c)
 
     return _Cosine(value, slope)
-
-
-def _point(place: Place, q: Coordinates) -> tuple[float, float]:
-    """Return the world coordinates of a place."""
-    if place.body == GROUND_NAME:
-        return place.x, place.y
-    c, s = math.cos(q[f"{place.body}.phi"]), math.sin(q[f"{place.body}.phi"])
-    return q[f"{place.body}.x"] + c * place.x - s * place.y, q[f"{place.body}.y"] + s * place.x + c * place.y
-
-
-def _velocity(place: Place, q: Coordinates, qd: Coordinates) -> tuple[float, float]:
-    """Return the rates of a place's world coordinates."""
-    if place.body == GROUND_NAME:
-        return 0.0, 0.0
-    x, y = _point(place, q)
-    omega = qd[f"{place.body}.phi"]
-    return (
-        qd[f"{place.body}.x"] - omega * (y - q[f"{place.body}.y"]),
-        qd[f"{place.body}.y"] + omega * (x - q[f"{place.body}.x"]),
-    )
 
 
 def _extremes(
@@ -211,7 +190,7 @@ def _extremes(
     found = []
     for before, after, a, b in zip(path.poses, path.poses[1:], slopes, slopes[1:], strict=False):
         if a * b < 0.0:
-            pose = _flat(path, slope, before, after, a)
+            pose = path.zero(slope, before, after)
             found.append((cosine.value(path.coordinates(pose)), pose.u[0]))
     found += [(cosine.value(path.coordinates(pose)), pose.u[0]) for pose in path.poses]
     in_line = []
@@ -233,20 +212,3 @@ def _reduced(path: DriverPath, found: tuple[float, float]) -> tuple[float, float
     period = path.turns * math.tau
     value = math.fmod(math.fmod(value, period) + period, period)
     return cosine, 0.0 if period - value < 1e-12 else value
-
-
-def _flat(path: DriverPath, slope: Callable[[Pose], float], low: Pose, high: Pose, at_low: float) -> Pose:
-    """Return the pose between two where a slope vanishes, by bisection."""
-    for _ in range(_HALVINGS):
-        u = 0.5 * (low.u[0] + high.u[0])
-        middle = path.solver.solve(low, (u,))
-        if not middle.good or u in (low.u[0], high.u[0]):
-            break
-        at_middle = slope(middle)
-        if at_middle == 0.0:
-            return middle
-        if (at_middle < 0.0) == (at_low < 0.0):
-            low, at_low = middle, at_middle
-        else:
-            high = middle
-    return low
