@@ -16,7 +16,7 @@ from kinfmu.solver.python.curve import CurveData, Piece
 class Rise(Law):
     """A rise.
 
-        u = start + rise N((x - begin) / duration)
+        u = start + rise N(s),   s = (x - begin) / duration
 
     N: the normalized curve of the class, from 0 to 1 on [0, 1], 0 before and 1 after.
     """
@@ -72,7 +72,8 @@ def _mirrored(piece: Piece) -> Piece:
 class SimpleHarmonic(Rise):
     """A rise along half a cosine; its acceleration jumps at both ends.
 
-        N = (1 - cos pi x) / 2        u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N = (1 - cos pi s) / 2
 
     Peaks: velocity pi / 2, acceleration pi^2 / 2.
     """
@@ -88,7 +89,8 @@ class SimpleHarmonic(Rise):
 class Cycloidal(Rise):
     """A rise whose acceleration is a whole sine.
 
-        N = x - sin(2 pi x) / (2 pi)        u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N = s - sin(2 pi s) / (2 pi)
 
     Peaks: velocity 2, acceleration 2 pi = 6.283.
     """
@@ -105,9 +107,10 @@ _SINE_WAVE = 0.25 / (4.0 + math.pi)
 class ModifiedSine(Rise):
     """A rise whose acceleration is a sine, of higher frequency in the first and last eighth than in between.
 
-        N'' = A sin(4 pi x)                     up to 1/8,   A = 4 pi^2 / (4 + pi)
-        N'' = A sin(4 pi x / 3 + pi / 3)        up to 7/8
-        N'' = A sin(4 pi x)                     up to 1      u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N'' = A sin(4 pi s)                     up to s = 1/8,   A = 4 pi^2 / (4 + pi)
+        N'' = A sin(4 pi s / 3 + pi / 3)        up to s = 7/8
+        N'' = A sin(4 pi s)                     up to s = 1
 
     Peaks: velocity 4 pi / (4 + pi) = 1.760, acceleration A = 5.528.
     """
@@ -131,9 +134,10 @@ _TRAPEZOID_EIGHTH = (math.pi - 2.0) / (4.0 * math.pi * (2.0 + math.pi))  # N at 
 class ModifiedTrapezoid(Rise):
     """A rise whose acceleration is a trapezoid with its edges rounded by quarters of a sine.
 
-        N'' = A sin(4 pi x)             up to 1/8,   A = 8 pi / (2 + pi)
-        N'' = A                         up to 3/8
-        N'' = A cos(4 pi x - 3 pi / 2)  up to 5/8, then mirrored        u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N'' = A sin(4 pi s)             up to s = 1/8,   A = 8 pi / (2 + pi)
+        N'' = A                         up to s = 3/8
+        N'' = A cos(4 pi s - 3 pi / 2)  up to s = 5/8, then mirrored
 
     Peaks: velocity 2, acceleration A = 4.888.
     """
@@ -152,7 +156,8 @@ class ModifiedTrapezoid(Rise):
 class Polynomial345(Rise):
     """A rise along the polynomial of powers 3, 4, 5, at rest with no acceleration at both ends.
 
-        N = 10 x^3 - 15 x^4 + 6 x^5        u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N = 10 s^3 - 15 s^4 + 6 s^5
 
     Peaks: velocity 15/8 = 1.875, acceleration 10 / sqrt 3 = 5.774.
     """
@@ -165,7 +170,8 @@ class Polynomial345(Rise):
 class Polynomial4567(Rise):
     """A rise along the polynomial of powers 4 to 7, at rest with neither acceleration nor jerk at both ends.
 
-        N = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7        u = start + rise N
+        u = start + rise N(s),   s = (x - begin) / duration
+        N = 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
     Peaks: velocity 35/16 = 2.188, acceleration 7.513.
     """
