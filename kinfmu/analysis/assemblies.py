@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.analysis.held import started
-from kinfmu.analysis.values import degrees, value_text
+from kinfmu.analysis.values import degrees, driver_text
 from kinfmu.codegen.python import load_model
 from kinfmu.equations.assembly import SINGULAR, Assembled, find_assembly, start_values
 from kinfmu.equations.closing import CLOSED, close
@@ -345,9 +345,8 @@ def _given(start: Start) -> dict[str, float]:
 
 def _lines(assemblies: Assemblies) -> Iterator[str]:
     mechanism = assemblies.mechanism
-    kinds = {driver.name: driver.quantity.kind for driver in mechanism.drivers}
     at = listed(
-        f"{name} = {value_text(u, mechanism.length_unit, kinds[name])}" for name, u in assemblies.drivers.items()
+        driver_text(driver, assemblies.drivers[driver.name], mechanism.length_unit) for driver in mechanism.drivers
     )
     given = {body.name: body.start for body in mechanism.bodies}
     many = f"{len(assemblies.found)}" if assemblies.is_complete else f"at least {len(assemblies.found)}"

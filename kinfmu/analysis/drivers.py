@@ -65,6 +65,15 @@ class DriverAdvice:
         """Names of the bodies with a loose coordinate."""
         return tuple(dict.fromkeys(name.owner for name in self.loose))
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the advice as plain data."""
+        return {
+            "missing": self.missing,
+            "surplus": [{"name": s.name, "implied_by": list(s.implied_by)} for s in self.surplus],
+            "loose": list(self.loose),
+            "suggestions": [{"name": s.name, "keys": s.keys} for s in self.suggestions],
+        }
+
 
 def driver_advice(system: System, redundancy: Redundancy) -> DriverAdvice | None:
     """Return which drivers are surplus, which coordinates are loose, and which drivers would determine them.

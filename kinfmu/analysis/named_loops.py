@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.grashof import Grashof, four_bar_class, slider_crank_class
@@ -23,6 +24,23 @@ class NamedLoop:
     loop: FourBar | SliderCrank
     grashof: Grashof
     transmission: tuple[TransmissionAngle, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the loop as plain data."""
+        loop, kind = self.loop, self.grashof
+        if isinstance(loop, FourBar):
+            lengths = dict(zip(("ground", *loop.links), loop.lengths, strict=True))
+            sizes: dict[str, Any] = {"kind": "four-bar", "links": list(loop.links), "lengths": lengths}
+        else:
+            lengths = {link.name: link.length for link in (loop.crank, loop.rod)}
+            sizes = {"kind": "slider-crank", "links": list(loop.links), "lengths": lengths, "offset": loop.offset}
+        return {
+            **sizes,
+            "class": kind.name,
+            "shape": kind.shape or None,
+            "sums": [kind.small, kind.large],
+            "transmission": [angle.as_json() for angle in self.transmission],
+        }
 
 
 def find_named_loops(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,15 @@ class LimitPosition:
     coordinates: Mapping[str, float] = field(hash=False)
     bodies: tuple[str, ...]
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the limit as plain data."""
+        return {
+            "value": self.value,
+            "kind": self.kind,
+            "bodies": list(self.bodies),
+            "coordinates": dict(self.coordinates),
+        }
+
 
 @dataclass(frozen=True)
 class DriverRange:
@@ -73,6 +83,24 @@ class DriverRange:
     def high(self) -> float | None:
         """Upper limit of the driver [rad or length], None where none was met."""
         return None if self.highest is None else self.highest.value
+
+    @property
+    def limits(self) -> tuple[LimitPosition, ...]:
+        """The limits that were met, the lower one first."""
+        return tuple(limit for limit in (self.lowest, self.highest) if limit is not None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the range as plain data."""
+        return {
+            "driver": self.driver,
+            "kind": self.kind,
+            "low": self.low,
+            "high": self.high,
+            "turns": self.turns,
+            "reach": list(self.reach),
+            "stopped": self.stopped,
+            "limits": [limit.as_json() for limit in self.limits],
+        }
 
 
 def driver_range(path: DriverPath) -> DriverRange:

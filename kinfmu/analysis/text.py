@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from functools import partial
 
+from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loops import FourBar, SliderCrank
+from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import TransmissionAngle
-from kinfmu.analysis.values import degrees, multiple_of_pi, value_text
+from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
 from kinfmu.errors import listed
-
-if TYPE_CHECKING:
-    from kinfmu.analysis.named_loops import NamedLoop
-    from kinfmu.analysis.report import Report
-    from kinfmu.drivers import Driver
 
 _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
@@ -26,7 +23,7 @@ _SAME = 1e-9  # [rad or length]; values closer than this are equal
 _MOST_NAMES = 24  # in one line; JSON has all
 
 
-def lines(report: Report) -> list[str]:
+def lines(report: Findings) -> list[str]:
     """Return the findings, one per line, each after its subject."""
     found = [f"{report.mechanism.name}: {report.mechanism.title}" if report.mechanism.title else report.mechanism.name]
     for parts in (_count, _rows, _plan, _advice, _loops, _motion):
@@ -47,7 +44,7 @@ def _names(names: Iterable[str]) -> str:
     return listed(names[:_MOST_NAMES]) + more
 
 
-def _count(report: Report) -> Iterator[str]:
+def _count(report: Findings) -> Iterator[str]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
     yield _line("bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}")
@@ -57,7 +54,7 @@ def _count(report: Report) -> Iterator[str]:
         yield _line("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 
 
-def _rows(report: Report) -> Iterator[str]:
+def _rows(report: Findings) -> Iterator[str]:
     for row in report.redundant:
         within = f"{row.tolerance:.3g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
         reason = f"at every pose it follows from {listed(row.implied_by_joints)}, to within {within}"
@@ -71,15 +68,15 @@ def _rows(report: Report) -> Iterator[str]:
         yield _line("contradicts", f"{row.row.owner} (row {row.row.name}) {reason}")
 
 
-def _plan(report: Report) -> Iterator[str]:
+def _plan(report: Findings) -> Iterator[str]:
     plan = report.plan
     if plan is None:
         return
     unit = report.mechanism.length_unit
     drivers, assembled = report.mechanism.drivers, plan.anchor.u.tolist()
-    yield _line("start", _names(_values(drivers, report.starts, unit)))
+    yield _line("start", _names(map(partial(driver_text, unit=unit), drivers, report.starts)))
     if any(abs(u - start) > _SAME for u, start in zip(assembled, report.starts, strict=True)):
-        yield _line("assembled", _names(_values(drivers, assembled, unit)))
+        yield _line("assembled", _names(map(partial(driver_text, unit=unit), drivers, assembled)))
     yield _line("coordinates", _names(plan.coordinates))
     if plan.fixed:
         yield _line("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
@@ -91,13 +88,7 @@ def _plan(report: Report) -> Iterator[str]:
         yield _line("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
 
 
-def _values(drivers: Iterable[Driver], values: Iterable[float], unit: str) -> Iterator[str]:
-    """Yield drivers with their values as text."""
-    for driver, value in zip(drivers, values, strict=True):
-        yield f"{driver.name} = {value_text(value, unit, driver.quantity.kind)}"
-
-
-def _advice(report: Report) -> Iterator[str]:
+def _advice(report: Findings) -> Iterator[str]:
     advice = report.advice
     if advice is None:
         return
@@ -113,7 +104,7 @@ def _advice(report: Report) -> Iterator[str]:
         yield _line("could add", str(suggestion))
 
 
-def _loops(report: Report) -> Iterator[str]:
+def _loops(report: Findings) -> Iterator[str]:
     unit = report.mechanism.length_unit
     for named in report.loops[:_MOST_LOOPS]:
         loop = named.loop
@@ -190,7 +181,7 @@ def _in_line(angle: TransmissionAngle) -> str:
     return f"{angle.coupler} and {angle.output} fall in line"
 
 
-def _motion(report: Report) -> Iterator[str]:
+def _motion(report: Findings) -> Iterator[str]:
     several = len(report.mechanism.drivers) > 1
     for reach in report.ranges:
         yield from _change_points(report, reach, several)
@@ -204,7 +195,7 @@ def _motion(report: Report) -> Iterator[str]:
         yield _line("note", note)
 
 
-def _change_points(report: Report, reach: DriverRange, several: bool) -> Iterator[str]:
+def _change_points(report: Findings, reach: DriverRange, several: bool) -> Iterator[str]:
     ends = (reach.low, reach.high)
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
@@ -219,10 +210,10 @@ def _all_multiples_of_pi(values: list[float]) -> bool:
     return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
 
 
-def _range(report: Report, reach: DriverRange) -> Iterator[str]:
+def _range(report: Findings, reach: DriverRange) -> Iterator[str]:
     unit = report.mechanism.length_unit
     seen = [value_text(end, unit, reach.kind) for end in reach.reach]
-    limits = [limit for limit in (reach.lowest, reach.highest) if limit is not None]
+    limits = reach.limits
     ends = [value_text(limit.value, unit, reach.kind) for limit in limits]
     if reach.stopped is not None:
         yield _line("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
@@ -247,7 +238,7 @@ def _range(report: Report, reach: DriverRange) -> Iterator[str]:
             yield _line("", f"at {end} {_parted(report, reach, limit)}")
 
 
-def _parted(report: Report, reach: DriverRange, limit: LimitPosition) -> str:
+def _parted(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:
     """Return the reason of a limit: two links in line, or bodies that can move."""
     for named in report.loops:
         for angle in named.transmission:

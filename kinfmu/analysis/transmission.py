@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
@@ -51,6 +51,19 @@ class TransmissionAngle:
         if self.worst <= LOCKED:
             return "locks"
         return "poor" if self.worst < POOR else "good"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the extremes as plain data."""
+        return {
+            "driver": self.driver,
+            "coupler": self.coupler,
+            "output": self.output,
+            "smallest": self.smallest,
+            "at_smallest": self.at_smallest,
+            "largest": self.largest,
+            "at_largest": self.at_largest,
+            "verdict": self.verdict,
+        }
 
 
 class _Cosine(NamedTuple):

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 
+from kinfmu.drivers import Driver
+
 
 def value_text(value: float, unit: str, kind: str) -> str:
     """Return a driver value as text: 'pi (180 deg)', '0.7227 rad (41.41 deg)' or '0.35 m'."""
     if kind != "angle":
         return f"{value:.9g} {unit}"
     return f"{multiple_of_pi(value) or f'{value:.9g} rad'} ({round(math.degrees(value), 8) + 0.0:.9g} deg)"
+
+
+def driver_text(driver: Driver, value: float, unit: str) -> str:
+    """Return a driver with its value as text: 'crank = pi (180 deg)'."""
+    return f"{driver.name} = {value_text(value, unit, driver.quantity.kind)}"
 
 
 def multiple_of_pi(value: float) -> str | None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import kinfmu
-from kinfmu.analysis.findings import as_json
 from kinfmu.analysis.matrices import row_reduced
 from kinfmu.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, five_bar, fourbar, reference_fourbar, six_bar, slider_crank
@@ -104,7 +103,7 @@ def test_findings_have_ranges_loops_and_transmission_as_numbers() -> None:
 
 
 def test_findings_have_the_keys_that_their_docstring_names() -> None:
-    described = as_json.__doc__ or ""
+    described = kinfmu.Report.as_json.__doc__ or ""
     for mechanism in (reference_fourbar(), five_bar(), slider_crank(), reference_fourbar(bar=1.01)):
         for key in kinfmu.check(mechanism).as_json():
             assert re.search(rf"\b{key}\b", described)
