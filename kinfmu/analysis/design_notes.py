@@ -12,7 +12,7 @@ from typing import NamedTuple
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.loops import FourBar, Place, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
-from kinfmu.analysis.values import value_text
+from kinfmu.analysis.values import law_values, value_text
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
@@ -24,7 +24,6 @@ from kinfmu.solver.python import Pose
 TOO_SHORT = 1e-3  # of the shortest neighbour; a link that short is probably in another unit
 _STILL = 1e-9  # [rad, sizes]; a body that moves less does not move
 _SAME = 1e-9  # of the size; points closer than this coincide
-_LOOKS = 201  # times of the run at which a driver is evaluated
 _EDGE = 1e-6  # of the run's range; positions closer to its ends are not crossed
 
 
@@ -144,8 +143,7 @@ def _toggles(mechanism: Mechanism, path: DriverPath, loops: Sequence[NamedLoop])
     A run of a full turn moves every crank through them as intended, so there are no lines for it.
     """
     driver = next(one for one in mechanism.drivers if one.name == path.name)
-    run = mechanism.run
-    values = [float(driver.law.at(run.start + (run.stop - run.start) * k / (_LOOKS - 1))) for k in range(_LOOKS)]
+    values = law_values(driver, mechanism.run)
     low, high = min(values), max(values)
     if path.kind == "angle" and high - low >= math.tau * (1.0 - 1e-9):
         return

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.analysis.singular import DriverRange
-from kinfmu.analysis.values import value_text
+from kinfmu.analysis.values import LOOKS, law_values, value_text
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.equations.start_poses import StartValues, start_from_poses
 from kinfmu.equations.system import System
@@ -22,7 +22,6 @@ from kinfmu.sweep import solve
 from kinfmu.units import Quantity, looks_like_degrees
 
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a full turn is plausible
-_LOOKS = 201  # times of a run at which a driver is evaluated
 
 
 def file_notes(mechanism: Mechanism) -> Iterator[str]:
@@ -60,14 +59,12 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
 
 def _cams(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each cam that a driver turns by more than a turn, although its lift is not periodic."""
-    run = mechanism.run
-    times = [run.start + (run.stop - run.start) * k / (_LOOKS - 1) for k in range(_LOOKS)]
     drivers = {driver.of: driver for driver in mechanism.drivers if isinstance(driver, AngleDriver)}
     for joint in mechanism.joints:
         if not isinstance(joint, Cam) or joint.cam not in drivers:
             continue
         why = joint.law.why_not_periodic()
-        angles = [float(drivers[joint.cam].law.at(t)) for t in times] if why else []
+        angles = law_values(drivers[joint.cam], mechanism.run) if why else []
         if why and max(angles) - min(angles) > _TURN:
             yield (
                 f"[joints.{joint.name}] law: {why}; "
@@ -81,10 +78,9 @@ _LARGE = 600  # coordinates; runs of larger mechanisms with several drivers are 
 def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
     """Yield a line if the run exceeds the range of its driver, or if several drivers leave the reachable poses."""
     mechanism = plan.mechanism
-    times = np.linspace(mechanism.run.start, mechanism.run.stop, _LOOKS)
     if len(mechanism.drivers) == 1 and ranges:
         (driver,) = mechanism.drivers
-        values = [float(driver.law.at(t)) for t in times.tolist()]
+        values = law_values(driver, mechanism.run)
         low, high = (
             end if limit is None else limit for end, limit in ((-math.inf, ranges[0].low), (math.inf, ranges[0].high))
         )
@@ -94,6 +90,7 @@ def run_notes(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Iterator[str]:
             asked = " to ".join(value_text(u, mechanism.length_unit, driver.quantity.kind) for u in extent)
             yield f"[run] takes {driver.name} from {asked}: beyond the range"
     elif len(mechanism.drivers) > 1 and len(mechanism.coordinate_names) <= _LARGE:
+        times = np.linspace(mechanism.run.start, mechanism.run.stop, LOOKS)
         for event in solve(plan, times).events[:1]:
             yield f"[run] at t = {event.t:.6g} s: {event.text}"
 

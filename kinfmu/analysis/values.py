@@ -1,10 +1,15 @@
-"""Driver values, lengths and angles as text."""
+"""Driver values: as text, and over a run."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from kinfmu.drivers import Driver
+from kinfmu.mechanism import RunSettings
+
+LOOKS = 201  # times of a run at which a driver is evaluated
 
 
 def value_text(value: float, unit: str, kind: str) -> str:
@@ -17,6 +22,11 @@ def value_text(value: float, unit: str, kind: str) -> str:
 def driver_text(driver: Driver, value: float, unit: str) -> str:
     """Return a driver with its value as text: 'crank = pi (180 deg)'."""
     return f"{driver.name} = {value_text(value, unit, driver.quantity.kind)}"
+
+
+def law_values(driver: Driver, run: RunSettings) -> list[float]:
+    """Return the driver's values at 201 times of a run."""
+    return [float(driver.law.at(t)) for t in np.linspace(run.start, run.stop, LOOKS).tolist()]
 
 
 def multiple_of_pi(value: float) -> str | None:
