@@ -72,7 +72,7 @@ def build(
     for option, value, plain in (("--fmi", fmi, "2"), ("--platforms", platforms, "host")):
         if flavour == "python" and value != plain:
             raise click.UsageError(f"{option} {value} needs --flavour native; the python flavour has {option} {plain}")
-    mech = checked_settings(mechanism, gallery.load(mechanism), settings).mechanism()
+    mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     drive = drive or default_drive(mech)
     chosen = flavour or default_flavour(int(fmi), platforms)
     with errors_of(mechanism), Progress("compiling for all platforms", least=2) as progress:

@@ -45,7 +45,7 @@ def check(
     """
     from kinfmu.analysis import check as checked
 
-    mech = checked_settings(mechanism, gallery.load(mechanism), settings).mechanism()
+    mech = checked_settings(gallery.load(mechanism), settings).mechanism()
     value = _value(mech, mechanism, at, picture)
     with errors_of(mechanism):
         report = checked(mech)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ import click
 
 from kinfmu.cli.arguments import ArgumentType
 from kinfmu.cli.messages import note
-from kinfmu.errors import MechanismError, listed, suggestion
+from kinfmu.errors import MechanismError, RequestError
 from kinfmu.units import Quantity, in_turns, looks_like_degrees
 
 if TYPE_CHECKING:
@@ -21,9 +20,9 @@ TOLERANCE = "solver.tolerance"
 DRIVEN_BY_TIME = "driven_by_time"
 RATES = "rates"
 _ELSEWHERE = {
-    TOLERANCE: "it belongs to a run; use solve or simulate",
-    DRIVEN_BY_TIME: "it belongs to an FMU; use simulate, or set its default with build --drive",
-    RATES: "it belongs to an FMU; use simulate, with auto, estimated or wired",
+    TOLERANCE: "belongs to a run; use solve or simulate",
+    DRIVEN_BY_TIME: "belongs to an FMU; use simulate, or set its default with build --drive",
+    RATES: "belongs to an FMU; use simulate, with auto, estimated or wired",
 }
 
 
@@ -73,13 +72,10 @@ class Settings:
         return followed.mechanism
 
 
-def checked_settings(
-    name: str, mechanism: Mechanism, settings: Sequence[tuple[str, str]], of_run: Sequence[str] = ()
-) -> Settings:
+def checked_settings(mechanism: Mechanism, settings: Sequence[tuple[str, str]], of_run: Sequence[str] = ()) -> Settings:
     """Return the settings of the command line after checking them.
 
     Args:
-        name: Name or file of the mechanism, as the user gave it.
         mechanism: The mechanism as in its file.
         settings: Name and text of each --set.
         of_run: Names of settings of a run that this command takes.
@@ -91,34 +87,31 @@ def checked_settings(
         click.UsageError: For an unknown name, an invalid value, or a value that follows from an expression.
 
     """
-    constants = {constant.name: constant for constant in mechanism.law_constants}
-    known = [*mechanism.parameters, *constants, *of_run]
-    for parameter, text in settings:
-        where = f"--set {parameter}={text}"
-        driver, _, key = parameter.rpartition(".")
-        expression = mechanism.expressions.get(("drivers", driver, "law", key))
-        if expression is not None:
-            raise click.UsageError(f"{where}: it follows from '{expression.text}'; set the parameters in it")
-        if parameter not in known:
-            elsewhere = _ELSEWHERE.get(parameter)
-            hint = f"; {elsewhere}" if elsewhere else suggestion(parameter, known)
-            raise click.UsageError(f"{where}: {name} has no parameter '{parameter}'{hint}; parameters: {listed(known)}")
-        if parameter in constants and constants[parameter].quantity == Quantity("angle"):
-            _note_degrees(parameter, text)
-        if parameter == TOLERANCE:
-            value = _value(text)
-            if not isinstance(value, float) or not 0.0 < value < math.inf:
-                raise click.UsageError(f"{where}: it must be a positive number")
-    values = {parameter: _value(text) for parameter, text in settings if parameter not in of_run}
+    from kinfmu.mechanism.settings import read_tolerance
+
+    settable, known = mechanism.settable, (*mechanism.settable.names, *of_run)
+    for setting, text in settings:
+        if setting in _ELSEWHERE and setting not in known:
+            raise click.UsageError(f"--set: {setting} {_ELSEWHERE[setting]}")
+        constant = settable.constants.get(setting)
+        if constant is not None and constant.quantity == Quantity("angle"):
+            _note_degrees(setting, text)
+    values = {setting: _value(text) for setting, text in settings if setting not in of_run}
+    run = as_values([(setting, text) for setting, text in settings if setting in of_run])
     try:
+        for setting in values:
+            if setting not in known:
+                raise settable.unknown(setting, known)
+        if TOLERANCE in run:
+            read_tolerance(TOLERANCE, run[TOLERANCE])
         mechanism.with_parameters(values)
-    except MechanismError as error:
+    except (MechanismError, RequestError) as error:
         raise click.UsageError(f"--set: {error}") from None
     return Settings(
         mechanism,
-        {parameter: value for parameter, value in values.items() if parameter in mechanism.parameters},
-        {parameter: value for parameter, value in values.items() if parameter in constants},
-        as_values([(parameter, text) for parameter, text in settings if parameter in of_run]),
+        {setting: value for setting, value in values.items() if setting in mechanism.parameters},
+        {setting: value for setting, value in values.items() if setting in settable.constants},
+        run,
     )
 
 

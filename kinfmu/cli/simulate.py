@@ -115,7 +115,7 @@ def _fmu(
     if suffix_of(model) == ".fmu":
         return Path(model), as_values(settings)
     mech = gallery.load(model)
-    given = checked_settings(model, mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
+    given = checked_settings(mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
     with errors_of(model):
         mech = given.mechanism()
         drive = "inputs" if has_inputs else default_drive(mech)

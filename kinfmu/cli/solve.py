@@ -85,7 +85,7 @@ def solve(
     if wrap and not angle:
         raise click.UsageError("--wrap needs --angle")
     mech = gallery.load(mechanism)
-    given = checked_settings(mechanism, mech, settings, (TOLERANCE,))
+    given = checked_settings(mech, settings, (TOLERANCE,))
     t, samples = None, {}
     if angle:
         _check_one_driver(mechanism, given)

@@ -6,6 +6,7 @@ loop sets at t_k, gets, records, then steps.
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.errors import FmuError, MechanismError, RequestError
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
@@ -26,12 +27,12 @@ from kinfmu.fmu.samples import DISCARD, ERROR, Samples
 from kinfmu.fmu.slaves import Slave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file
-from kinfmu.mechanism.number import read_constant
+from kinfmu.mechanism.settings import Settable, read_tolerance
+from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES, Run
 from kinfmu.run.channels import kept_samples
 from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
-from kinfmu.units import quantity_in
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -106,8 +107,12 @@ def simulate(
             t = _times(table or experiment, start, stop, experiment.step if step is None else step)
             rows = np.empty((len(t), 0)) if table is None else table.at(t)
             kept = kept_samples(t, rate)
-            settings = _parameters(interface, parameters or {}, has_inputs=table is not None, where=str(path))
-            mechanism = _as_set(text_in(path, folder, MECHANISM), settings, f"{path}: {MECHANISM}")
+            mechanism = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
+            try:
+                settings = _settings(interface, mechanism.settable, parameters or {}, has_inputs=table is not None)
+            except RequestError as error:
+                raise RequestError(f"{path}: {error}") from None
+            mechanism = _as_set(mechanism, settings)
             samples = Samples(about, len(kept), settings=settings, mechanism=mechanism, model_description=xml)
             if not _time_drives(interface, settings):
                 samples.extend(undriven(interface, table, float(t[0])))
@@ -132,11 +137,10 @@ def simulate(
         interrupted.deliver()
 
 
-def _as_set(mechanism_text: str, settings: Mapping[str, float | bool | str], where: str) -> Mechanism:
-    """Return the mechanism with the parameters that are set in the FMU, if they are valid."""
-    mechanism = toml_file.parse(mechanism_text, where)
-    own = {*mechanism.parameters, *(constant.name for constant in mechanism.law_constants)}
-    values = {name: value for name, value in settings.items() if name in own}
+def _as_set(mechanism: Mechanism, settings: Mapping[str, float | bool | str]) -> Mechanism:
+    """Return the mechanism with the parameters that are set in the FMU, if it can have them."""
+    own = mechanism.settable.names
+    values: dict[str, float | str] = {name: value for name, value in settings.items() if name in own}
     try:
         return mechanism.with_parameters(values) if values else mechanism
     except MechanismError:
@@ -163,52 +167,46 @@ def _times(span: RunSettings | InputTable, start: float | None, stop: float | No
     return t
 
 
-def _parameters(
-    interface: Interface, parameters: Mapping[str, float | str | bool], *, has_inputs: bool, where: str
+def _settings(
+    interface: Interface, settable: Settable, parameters: Mapping[str, float | str | bool], *, has_inputs: bool
 ) -> dict[str, float | bool | str]:
-    """Return the checked parameters to set; with inputs, `driven_by_time` is false by default."""
+    """Return the checked parameters to set in the FMU; with inputs, `driven_by_time` is false by default."""
     known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
     chosen: dict[str, float | bool | str] = {}
     for name, value in parameters.items():
         if name not in known:
-            raise RequestError(
-                f"{where}: '{name}' is no parameter of this FMU{suggestion(name, known)}; parameters: {listed(known)}"
-            )
-        if known[name].type == "Boolean":
+            raise settable.unknown(name, list(known))
+        if name in settable.names:
+            chosen[name] = settable.number(name, value)
+        elif known[name].type == "Boolean":
             if value not in (False, True):
-                raise RequestError(f"{where}: {name} = {value!r} must be true or false")
+                raise RequestError(f"{name} = {quoted(value)} must be true or false")
             chosen[name] = bool(value)
         elif known[name].type == "Enumeration":
-            chosen[name] = _rates(value, where)
+            chosen[name] = _rates(value)
         else:
-            quantity = quantity_in(known[name].unit or "1", interface.length_unit)
-            try:
-                number = read_constant(f"{where}: {name}", value, quantity, interface.length_unit)
-            except MechanismError as error:
-                raise RequestError(str(error)) from None
-            _check_range(known[name], number, where)
-            chosen[name] = number
+            chosen[name] = _tolerance(known[name], value)
     if has_inputs:
         chosen.setdefault("driven_by_time", False)
     return chosen
 
 
-def _rates(value: float | str | bool, where: str) -> str:
+def _rates(value: float | str | bool) -> str:
     """Return the name of a value of the parameter `rates`, given as name or number."""
     names = {mode.name.lower(): mode for mode in Rates}
     for name, mode in names.items():
         if str(value).lower() == name or (not isinstance(value, str) and value == mode):
             return name
-    raise RequestError(f"{where}: rates = {value!r} must be auto, estimated or wired")
+    raise RequestError(f"rates = {quoted(value)} must be auto, estimated or wired")
 
 
-def _check_range(variable: Variable, value: float, where: str) -> None:
-    """Raise a RequestError for a value outside the range that the variable declares."""
-    low, high = variable.minimum, variable.maximum
-    if (low is not None and value < low) or (high is not None and value > high):
-        ends = {"at least": low, "at most": high}
-        valid = listed(f"{word} {end:g}" for word, end in ends.items() if end is not None)
-        raise RequestError(f"{where}: {variable.name} = {value:g} must be {valid}")
+def _tolerance(variable: Variable, value: float | str | bool) -> float:
+    """Return the tolerance if it is in the range that its variable declares."""
+    tolerance = read_tolerance(variable.name, value)
+    least, most = variable.minimum or 0.0, math.inf if variable.maximum is None else variable.maximum
+    if not least <= tolerance <= most:
+        raise RequestError(f"{variable.name} = {tolerance:g} must be at least {least:g}, at most {most:g}")
+    return tolerance
 
 
 def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | str]) -> bool:

@@ -203,8 +203,8 @@ def _initial_names(
     """Return the dependencies at initialization, when parameters, such as the law's constants, count as inputs too."""
     if not drivers:
         return ()
-    prefixes = tuple(f"{plan.drivers[k].name}." for k in drivers)
-    constants = tuple(name for name, *_ in plan.law_constants if name.startswith(prefixes))
+    behind = {plan.drivers[k].name for k in drivers}
+    constants = tuple(constant.name for constant in plan.law_constants if constant.driver in behind)
     extra = (_TOLERANCE.name,) if tolerance else ()
     rates = (_RATES.name,) if order else ()
     return (*_input_names(plan, drivers, order, linear_in), *constants, *extra, "driven_by_time", *rates)
@@ -266,18 +266,17 @@ def _driven(plan: SolvePlan) -> Iterator[Variable]:
 
 
 def _law_constants(plan: SolvePlan) -> Iterator[Variable]:
-    for name, value, quantity, is_positive in plan.law_constants:
-        driver, _, key = name.rpartition(".")
+    for constant in plan.law_constants:
         yield Variable(
-            name,
+            constant.name,
             "Real",
             "parameter",
             "tunable",
-            f"Driver {driver}: {key} of its law",
+            f"Driver {constant.driver}: {constant.key} of its law",
             initial="exact",
-            unit=unit_of(quantity, plan.mechanism.length_unit),
-            start=value,
-            minimum=0.0 if is_positive else None,
+            unit=unit_of(constant.quantity, plan.mechanism.length_unit),
+            start=constant.value,
+            minimum=0.0 if constant.is_positive else None,
         )
 
 

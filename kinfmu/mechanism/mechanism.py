@@ -9,17 +9,16 @@ from types import MappingProxyType
 from typing import Any
 
 from kinfmu.drivers import Driver
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import GROUND_NAME, Body, RunSettings
 from kinfmu.mechanism.checks import check_members, check_names_and_unit
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath
-from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.parameters import LawConstant, Parameter, law_constants, parameter_values, with_law_constants
+from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.resolve import resolve
-from kinfmu.mechanism.valid import quoted
+from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
 from kinfmu.units import CoordinateName, Quantity
 
 COORDINATES = ("x", "y", "phi")
@@ -147,6 +146,11 @@ class Mechanism:
         """Settable constants of the drivers' laws; constants given by expressions follow from parameters instead."""
         return tuple(law_constants(self.drivers, self.expressions))
 
+    @property
+    def settable(self) -> Settable:
+        """What can be set by name, with the checks of names and values."""
+        return Settable(self.parameters, self.law_constants, self.expressions, self.length_unit)
+
     def with_parameters(self, values: Mapping[str, float | str]) -> Mechanism:
         """Return the mechanism with other values of some parameters.
 
@@ -155,26 +159,20 @@ class Mechanism:
                 "crank.speed", as numbers or text with a unit.
 
         Raises:
-            RequestError: A name is neither a parameter nor a constant of a law.
-            MechanismError: A value is invalid.
+            RequestError: A name is neither a parameter nor a constant of a law, or a value is invalid.
+            MechanismError: The mechanism cannot have these values.
 
         """
-        parameters = dict(self.parameters)
-        settable = {constant.name: constant for constant in self.law_constants}
+        settable, parameters = self.settable, dict(self.parameters)
         constants: dict[str, float] = {}
         for name, value in values.items():
-            if name in settable:
-                constants[name] = read_constant(name, value, settable[name].quantity, self.length_unit)
-                continue
-            if name not in parameters:
-                known = [*parameters, *settable]
-                raise RequestError(
-                    f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
-                )
-            old = parameters[name]
-            quantity = None if old.kind == "number" else old.quantity  # without a unit the new value decides
-            parameters[name] = Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved
-        return replace(self, parameters=parameters, drivers=with_law_constants(self.drivers, constants))
+            settable.check_name(name)
+            if name in settable.constants:
+                constants[name] = settable.number(name, value)
+            else:
+                parameters[name] = settable.parameter(name, value)
+        drivers = with_law_constants(self.drivers, settable.constants.values(), constants)
+        return replace(self, parameters=parameters, drivers=drivers)
 
 
 def require_mechanism(value: object, purpose: str) -> None:

@@ -1,18 +1,16 @@
-"""Parameters of a mechanism: the numbers that geometry refers to by name, and the constants of laws."""
+"""Parameters of a mechanism: the numbers that geometry refers to by name."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
-from typing import Any, NamedTuple
+from typing import Any
 
-from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
-from kinfmu.mechanism.members import NumberPath
 from kinfmu.mechanism.number import read_number
 from kinfmu.mechanism.valid import check_line, check_name, check_number, quoted
 from kinfmu.units import Quantity, every_unit
@@ -46,37 +44,6 @@ class Parameter:
     def expression(self) -> Expression | None:
         """The expression that computes it; None if it is independent."""
         return self.value.expression if isinstance(self.value, Computed) else None
-
-
-class LawConstant(NamedTuple):
-    """A constant of a law of motion, settable under its name `<driver>.<key>`."""
-
-    name: str
-    value: float
-    quantity: Quantity
-    is_positive: bool = False  # other values are refused
-
-
-def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
-    """Yield the constants of all drivers' laws in file order, without those given by an expression (`computed`)."""
-    for driver in drivers:
-        for key, (value, said) in driver.law.constants().items():
-            if ("drivers", driver.name, "law", key) not in computed:
-                quantity = said.quantity(*driver.law_kinds)
-                yield LawConstant(f"{driver.name}.{key}", float(value), quantity, said.is_positive)
-
-
-def with_law_constants(drivers: Sequence[Driver], values: Mapping[str, float]) -> tuple[Driver, ...]:
-    """Return the drivers with other values of some of those constants."""
-
-    def changed(driver: Driver) -> Driver:
-        named = {key: f"{driver.name}.{key}" for key in driver.law.constants()}
-        new: dict[tuple[str | int, ...], float] = {
-            (key,): values[name] for key, name in named.items() if name in values
-        }
-        return replace(driver, law=driver.law.with_numbers(new)) if new else driver  # type: ignore[type-var]
-
-    return tuple(map(changed, drivers))
 
 
 def read_parameter(name: str, parameter: Parameter | float | str, length_unit: str) -> Parameter:

@@ -178,7 +178,7 @@ def _parameters(mechanism: Mechanism, wanted: Sequence[str] | None) -> tuple[Pla
     known = list(mechanism.parameters)
     for name in wanted or ():
         if name not in known:
-            raise RequestError(f"there is no parameter '{name}'{suggestion(name, known)}; parameters: {listed(known)}")
+            raise mechanism.settable.unknown(name, known)
     chosen = mechanism.own_parameters if wanted is None else wanted
     return tuple(
         PlanParameter(name, float(parameter.value), parameter.quantity or Quantity("number"), parameter.description)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple
@@ -16,9 +15,9 @@ from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.mechanism import require_mechanism
-from kinfmu.mechanism.number import read_constant
-from kinfmu.mechanism.parameters import in_order
-from kinfmu.mechanism.valid import is_number, quoted
+from kinfmu.mechanism.parameters import in_order, parameter_values
+from kinfmu.mechanism.settings import read_tolerance
+from kinfmu.mechanism.valid import LARGEST_NUMBER, is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import Event, FloatArray, Run
@@ -110,6 +109,8 @@ class Model:
         self._constants_written = tuple(constant.value for constant in plan.law_constants)
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
         self._constant_places = {constant.name: k for k, constant in enumerate(plan.law_constants)}
+        self._opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
+        self._positive = {k for k, constant in enumerate(plan.law_constants) if constant.is_positive}
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
 
     def __repr__(self) -> str:
@@ -165,7 +166,7 @@ class Model:
             CompilerError: The engine is 'native' and no compiler is found, or it fails.
 
         """
-        require_tolerance(tolerance)
+        tolerance = read_tolerance("tolerance", tolerance)
         setting = self.setting(parameters or {})
         driven = None
         if inputs:
@@ -214,32 +215,34 @@ class Model:
         """Return parameters and law constants as numbers.
 
         Raises:
-            RequestError: A name is unknown.
-            MechanismError: A value is invalid.
+            RequestError: A name is unknown or a value is invalid.
+            MechanismError: The mechanism cannot have these values.
 
         """
-        values, constants = self._written, self._constants_written
         if not given:
-            return Setting(given, (), constants, starts_elsewhere=False)
-        plan, mechanism = self.plan, self.mechanism
-        own: dict[str, float | str] = {}
-        changed = list(constants)
+            return Setting(given, (), self._constants_written, starts_elsewhere=False)
+        values, constants = list(self._written), list(self._constants_written)
+        own = False
         for name, value in given.items():
-            if name in self._places:
-                own[name] = value
+            if not (type(value) is float or is_number(value)) or not abs(value) <= LARGEST_NUMBER:  # type: ignore[arg-type]
+                return self.setting(self._read(given))._replace(given=given)
+            place = self._places.get(name)
+            if place is not None:
+                values[place] = float(value)
+                own = True
                 continue
             place = self._constant_places.get(name)
             if place is None:
                 raise self._unknown(name)
-            constant = plan.law_constants[place]
-            changed[place] = read_constant(f"parameter '{name}'", value, constant.quantity, mechanism.length_unit)
-            if constant.is_positive and not changed[place] > 0.0:
-                raise RequestError(f"parameter '{name}' = {value!r} must be positive")
-        if own:
-            values = self._numbers(own)
-        constants = tuple(changed)
-        elsewhere = bool(own) or self._law_starts(constants) != self._law_starts(self._constants_written)
-        return Setting(given, values if own else (), constants, elsewhere)
+            constants[place] = float(value)
+            if place in self._positive and not constants[place] > 0.0:
+                self.mechanism.settable.number(name, value)  # refuses it
+        if own and self._opens_expressions:  # those that are not given follow from the others
+            known = {name: float(value) for name, value in given.items() if name in self._places}
+            found = parameter_values(self.mechanism.parameters, known)
+            values = [float(found[name]) for name in self._places]
+        elsewhere = own or self._law_starts(tuple(constants)) != self._law_starts(self._constants_written)
+        return Setting(given, tuple(values) if own else (), tuple(constants), elsewhere)
 
     def load_library(self) -> Any:
         """Return the compiled library of the plan, compiled now or found in the cache.
@@ -265,23 +268,25 @@ class Model:
         }
         return tuple((name, expressions[name]) for name in in_order(parameters, expressions) if name in expressions)
 
-    def _unknown(self, name: str) -> RequestError:
-        known = [*self._places, *self._constant_places]
-        if name in self.mechanism.parameters:
-            parameter = self.mechanism.parameters[name]
-            how = f"the expression '{parameter.expression.text}'" if parameter.expression else "a number of the model"
-            return RequestError(f"parameter '{name}' is {how}; compile(mechanism, parameters=['{name}']) keeps it open")
-        return RequestError(f"parameter '{name}' is not known{suggestion(name, known)}; parameters: {listed(known)}")
+    def _read(self, given: Settings) -> dict[str, float]:
+        """Return the numbers of settings of which some are text, or refuse them."""
+        for name in given:
+            if name not in self._places and name not in self._constant_places:
+                raise self._unknown(name)
+        changed = self.mechanism.with_parameters(given)
+        constants = changed.settable.constants
+        return {
+            name: float(changed.parameters[name].value) if name in self._places else constants[name].value
+            for name in given
+        }
 
-    def _numbers(self, given: Settings) -> Vector:
-        """Return the values of all parameters of the plan."""
-        values = list(self._written)
-        for name, value in given.items():
-            if isinstance(value, str) or not is_number(value) or not math.isfinite(value):
-                changed = self.mechanism.with_parameters(given)  # reads units and expressions, or refuses
-                return tuple([float(changed.parameters[name].value) for name in self._places])
-            values[self._places[name]] = float(value)
-        return tuple(values)
+    def _unknown(self, name: str) -> RequestError:
+        parameter = self.mechanism.parameters.get(name)
+        if parameter is not None:
+            expression = parameter.expression
+            how = f"follows from {quoted(expression.text)}" if expression else "is a number of the model"
+            return RequestError(f"{name} {how}; compile(mechanism, parameters=['{name}']) makes it an argument")
+        return self.mechanism.settable.unknown(name, [*self._places, *self._constant_places])
 
     def _law_starts(self, constants: Vector) -> Vector:
         """Return the driver values at which the laws start, with the parameters as written."""
@@ -366,12 +371,6 @@ def require_engine(engine: str) -> None:
     """Raise a RequestError for the name of an unknown engine."""
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
-
-
-def require_tolerance(tolerance: float) -> None:
-    """Raise a RequestError for a tolerance that is not a positive number."""
-    if not (is_number(tolerance) and 0.0 < tolerance < math.inf):
-        raise RequestError(f"tolerance = {quoted(tolerance)} must be a positive number")
 
 
 def _from_text(text: str, outputs: Sequence[str], parameters: Sequence[str], engine: str) -> Model:

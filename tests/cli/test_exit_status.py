@@ -38,7 +38,7 @@ WRONG_USAGE = [
     ("check fourbar_chain:0", "the count must be a whole number from 1 to"),
     ("check fourbar --figure four.gif", "four.gif: its name must end in one of .svg, .png"),
     ("check fourbar --figure none/four.svg", "none/four.svg: there is no folder 'none'"),
-    ("check fourbar --set a=1", "fourbar has no parameter 'a'"),
+    ("check fourbar --set a=1", "there is no parameter 'a'"),
     ("check fourbar --set crank.speed=1mm", "unit 'mm' must be one of rad/s"),
     ("new forbar mine.toml", "did you mean 'fourbar'?"),
     ("new fourbar mine.txt", "mine.txt: its name must end in .toml"),

@@ -125,7 +125,7 @@ def test_a_run_over_driver_values_reports_the_sample_and_its_value_and_no_time(
     [
         (
             ("--set", "crank.sped=1"),
-            "--set crank.sped=1: fourbar has no parameter 'crank.sped'; did you mean 'crank.speed'?; parameters: "
+            "--set: there is no parameter 'crank.sped'; did you mean 'crank.speed'?; parameters: "
             "crank.start, crank.speed, solver.tolerance",
         ),
         (("--set", "crank.speed=true"), "--set: crank.speed = 'true' must be a number, alone or with a unit: "),

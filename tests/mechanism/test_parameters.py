@@ -378,7 +378,7 @@ def test_set_values_that_are_invalid_are_refused() -> None:
         "there is no parameter 'crnk'; did you mean 'crank'?; parameters: tip, crank, ground, rod, ratio, tilt, turn"
     )
     assert changed(crank="30 deg") == (
-        "[parameters] crank = '30 deg': unit 'deg' must be one of m, mm, cm, um, km, in, ft"
+        "crank = '30 deg': unit 'deg' must be one of m, mm, cm, um, km, in, ft"
     )
     assert changed(crank="tip") == "[parameters] tip needs itself: tip -> crank -> tip"
     assert changed(rod=-1.0) == (
@@ -395,9 +395,9 @@ def test_constants_of_laws_are_set_by_name_unless_computed() -> None:
     assert driver.law.start == math.pi / 4  # type: ignore[attr-defined]
     assert driver.law.speed == mechanism.drivers[0].law.speed  # type: ignore[attr-defined]
     assert mechanism.with_parameters({"crank.start": 0.25}) == mechanism
-    with pytest.raises(RequestError, match=r"there is no parameter 'crank\.speed'; .*, turn, crank\.start$"):
+    with pytest.raises(RequestError, match=r"^crank\.speed follows from 'turn'; set the parameters in it$"):
         mechanism.with_parameters({"crank.speed": 1.0})
-    with pytest.raises(MechanismError, match=r"^crank\.start = '2 mm': unit 'mm' must be one of rad, deg, rev"):
+    with pytest.raises(RequestError, match=r"^crank\.start = '2 mm': unit 'mm' must be one of rad, deg, rev"):
         mechanism.with_parameters({"crank.start": "2 mm"})
 
 

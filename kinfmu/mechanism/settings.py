@@ -1,0 +1,142 @@
+"""Settings: values of parameters, law constants and the tolerance, checked the same way wherever they are set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import NamedTuple
+
+from kinfmu.drivers import Driver
+from kinfmu.errors import MechanismError, RequestError, listed, suggestion
+from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.members import NumberPath
+from kinfmu.mechanism.number import read_constant, read_number
+from kinfmu.mechanism.parameters import NUMBER, Parameter
+from kinfmu.mechanism.valid import is_number, quoted
+from kinfmu.units import Quantity
+
+
+class LawConstant(NamedTuple):
+    """A constant of a driver's law of motion, settable under its name `<driver>.<key>`."""
+
+    driver: str
+    key: str
+    value: float
+    quantity: Quantity
+    is_positive: bool = False  # other values are refused
+
+    @property
+    def name(self) -> str:
+        return f"{self.driver}.{self.key}"
+
+
+def law_constants(drivers: Sequence[Driver], computed: Collection[NumberPath]) -> Iterator[LawConstant]:
+    """Yield the constants of all drivers' laws in file order, without those given by an expression (`computed`)."""
+    for driver in drivers:
+        for key, (value, said) in driver.law.constants().items():
+            if ("drivers", driver.name, "law", key) not in computed:
+                yield LawConstant(driver.name, key, float(value), said.quantity(*driver.law_kinds), said.is_positive)
+
+
+def with_law_constants(
+    drivers: Sequence[Driver], constants: Iterable[LawConstant], values: Mapping[str, float]
+) -> tuple[Driver, ...]:
+    """Return the drivers with other values, by name, of some of their law constants."""
+    numbers: dict[str, dict[tuple[str | int, ...], float]] = {}
+    for constant in constants:
+        if constant.name in values:
+            numbers.setdefault(constant.driver, {})[constant.key,] = values[constant.name]
+    return tuple(
+        replace(driver, law=driver.law.with_numbers(numbers[driver.name])) if driver.name in numbers else driver  # type: ignore[type-var]
+        for driver in drivers
+    )
+
+
+class Settable:
+    """The parameters and law constants of a mechanism by name, with the checks of their names and values.
+
+    Attributes:
+        parameters: All parameters.
+        constants: The law constants that are numbers of their own.
+        names: Names of both.
+
+    """
+
+    def __init__(
+        self,
+        parameters: Mapping[str, Parameter],
+        constants: Sequence[LawConstant],
+        expressions: Mapping[NumberPath, Expression],
+        length_unit: str,
+    ) -> None:
+        self.parameters = parameters
+        self.constants = {constant.name: constant for constant in constants}
+        self.names = (*parameters, *self.constants)
+        self._expressions = expressions
+        self._length_unit = length_unit
+
+    def check_name(self, name: str) -> None:
+        """Raise a RequestError for a name that is neither a parameter nor a law constant."""
+        if name not in self.parameters and name not in self.constants:
+            raise self.unknown(name, self.names)
+
+    def unknown(self, name: str, known: Sequence[str]) -> RequestError:
+        """Return the error for a name that cannot be set; known: the names that can."""
+        expression = self._expression(name)
+        if expression is not None:
+            return RequestError(f"{name} follows from {quoted(expression.text)}; set the parameters in it")
+        return RequestError(
+            f"there is no parameter {quoted(name)}{suggestion(name, known)}; parameters: {listed(known)}"
+        )
+
+    def parameter(self, name: str, value: object) -> Parameter:
+        """Return a parameter with another value: a number, text with a unit, or an expression of other parameters.
+
+        Raises:
+            RequestError: The value is no number, is too large or has a wrong unit.
+
+        """
+        old = self.parameters[name]
+        quantity = None if old.kind == "number" else old.quantity  # without a unit the new value decides
+        with _as_request():
+            read_number(name, value, quantity, self._length_unit)
+        return Parameter(value, quantity, old.description)  # type: ignore[arg-type]  # text is resolved later
+
+    def number(self, name: str, value: object) -> float:
+        """Return the value of a parameter or a law constant, a number or text with a unit, in the units used inside.
+
+        Raises:
+            RequestError: The value is no number, is too large, has a wrong unit, or is not positive and must be.
+
+        """
+        setting = self.constants.get(name) or self.parameters[name]
+        with _as_request():
+            number = read_constant(name, value, setting.quantity or NUMBER, self._length_unit)
+        if isinstance(setting, LawConstant) and setting.is_positive and not number > 0.0:
+            raise RequestError(f"{name} = {quoted(value)} must be positive")
+        return number
+
+    def _expression(self, name: str) -> Expression | None:
+        """Return the expression of a parameter or a law constant, if it has one."""
+        if name in self.parameters:
+            return self.parameters[name].expression
+        paths = {f"{path[1]}.{path[3]}": path for path in self._expressions if path[0] == "drivers" and len(path) == 4}
+        return self._expressions[paths[name]] if name in paths else None
+
+
+@contextmanager
+def _as_request() -> Iterator[None]:
+    """Turn a MechanismError about a value into a RequestError: the value is not one of a file."""
+    try:
+        yield
+    except MechanismError as error:
+        raise RequestError(str(error)) from None
+
+
+def read_tolerance(name: str, value: object) -> float:
+    """Return a tolerance of the solver, or raise a RequestError unless it is a positive number."""
+    if not (is_number(value) and 0.0 < value < math.inf):  # type: ignore[operator]  # it is a number
+        raise RequestError(f"{name} = {quoted(value)} must be a positive number")
+    return float(value)  # type: ignore[arg-type]
