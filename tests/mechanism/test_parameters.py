@@ -377,9 +377,7 @@ def test_set_values_that_are_invalid_are_refused() -> None:
     assert changed(crnk=1.0) == (
         "there is no parameter 'crnk'; did you mean 'crank'?; parameters: tip, crank, ground, rod, ratio, tilt, turn"
     )
-    assert changed(crank="30 deg") == (
-        "crank = '30 deg': unit 'deg' must be one of m, mm, cm, um, km, in, ft"
-    )
+    assert changed(crank="30 deg") == ("crank = '30 deg': unit 'deg' must be one of m, mm, cm, um, km, in, ft")
     assert changed(crank="tip") == "[parameters] tip needs itself: tip -> crank -> tip"
     assert changed(rod=-1.0) == (
         "[joints.rod] length = -1.0 must be a positive number, 1e-30 or more (length = 'rod', rod = -1.0)"
