@@ -9,9 +9,9 @@ from functools import partial
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engines import ENGINES, Engine, Sampler
+from kinfmu.bench.engine import Engine, Sampler, Setting
+from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.rounds import Spread, samples_in_turn, spread
-from kinfmu.bench.setting import Setting
 from kinfmu.errors import MissingPackageError
 
 MECHANISMS = ("crank_rocker", "slider_crank", "stephenson_six_bar", "jansen_leg", "excavator")

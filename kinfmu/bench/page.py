@@ -10,8 +10,8 @@ from pathlib import Path
 
 from kinfmu import gallery
 from kinfmu.bench.accuracy import Measured
+from kinfmu.bench.engine import PREDICTORS, Setting
 from kinfmu.bench.engines import ENGINES
-from kinfmu.bench.setting import PREDICTORS, Setting
 from kinfmu.bench.singular import DISTANCES, Near
 from kinfmu.errors import KinfmuError
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from kinfmu.bench.accuracy import Tell, per_lap, prepared, quietly
 from kinfmu.bench.case import Case, along_driver
-from kinfmu.bench.engines import ENGINES, Engine, Sampler
+from kinfmu.bench.engine import Engine, Sampler
+from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.rounds import Spread, samples_in_turn
 from kinfmu.bench.singular_points import POINTS, SingularCase
 from kinfmu.errors import MissingPackageError

@@ -19,7 +19,7 @@ import ast
 from types import ModuleType
 from typing import Any
 
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import Setting
 from kinfmu.codegen.python import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan

@@ -11,21 +11,20 @@ import pytest
 from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
+from kinfmu.bench.engine import Engine, Setting
 from kinfmu.bench.engines import (
+    CASADI,
     ENGINES,
-    Casadi,
-    Dense,
-    Engine,
-    Fsolve,
-    Generated,
-    Native,
-    NumpyNewton,
-    Pylinkage,
-    Shipped,
+    FSOLVE,
+    GENERATED,
+    NATIVE,
+    NUMPY_NEWTON,
+    PYLINKAGE,
+    READABLE,
+    SHIPPED,
 )
 from kinfmu.bench.exact_fourbar import exact_fourbar
 from kinfmu.bench.pictures import LOOKS
-from kinfmu.bench.setting import Setting
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.equations.reference import solve_reference
 from kinfmu.errors import CompilerError, MissingPackageError
@@ -40,9 +39,7 @@ def case(request: pytest.FixtureRequest) -> Case:
     return of_gallery(request.param)
 
 
-@pytest.mark.parametrize(
-    "engine", [Shipped(), Native(), Generated(), NumpyNewton(), Dense()], ids=lambda engine: engine.name
-)
+@pytest.mark.parametrize("engine", [SHIPPED, NATIVE, GENERATED, NUMPY_NEWTON, READABLE], ids=lambda engine: engine.name)
 def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Case) -> None:
     sampler = engine.sampler(case, engine.usual)
     assert sampler is not None
@@ -50,12 +47,12 @@ def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Cas
 
 
 def test_fsolve_is_as_good_as_its_tolerance(case: Case) -> None:
-    rough, fine = (largest(case, Fsolve().sampler(case, Setting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
+    rough, fine = (largest(case, FSOLVE.sampler(case, Setting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
     assert fine <= ROUND_OFF
     assert fine <= rough <= 1e-2
 
 
-PEERS = [(Casadi(), "casadi"), (Pylinkage(), "pylinkage")]
+PEERS = [(CASADI, "casadi"), (PYLINKAGE, "pylinkage")]
 
 
 @pytest.mark.parametrize(("engine", "package"), PEERS, ids=["casadi", "pylinkage"])
@@ -70,7 +67,7 @@ def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> N
 
 
 @pytest.mark.parametrize(
-    ("engine", "package", "name"), [(Casadi(), "casadi", "CasADi"), (Pylinkage(), "pylinkage", "pylinkage")]
+    ("engine", "package", "name"), [(CASADI, "casadi", "CasADi"), (PYLINKAGE, "pylinkage", "pylinkage")]
 )
 def test_a_peer_that_is_not_installed_is_reported_in_one_line(
     engine: Engine, package: str, name: str, monkeypatch: pytest.MonkeyPatch
@@ -92,40 +89,40 @@ def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatc
 
     monkeypatch.setattr("kinfmu.bench.engines.native.Library", none_found)
     absent: dict[str, None] = {}
-    assert prepared(Native(), of_gallery("slider_crank"), Setting(), absent) is None
+    assert prepared(NATIVE, of_gallery("slider_crank"), Setting(), absent) is None
     assert list(absent) == ["kinfmu native: no C compiler is found"]
 
 
 def test_pylinkage_is_not_asked_for_what_it_cannot_state(case: Case) -> None:
-    assert Pylinkage().sampler(case, Pylinkage().usual) is None
+    assert PYLINKAGE.sampler(case, PYLINKAGE.usual) is None
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("name", ["fourbar", "crank_rocker", "slider_crank", "stephenson_six_bar", "excavator"])
 def test_numpy_newton_agrees_on_every_kind_of_row_it_states(name: str, order: int) -> None:
     stated = of_gallery(name)
-    sampler = NumpyNewton().sampler(stated, NumpyNewton.usual._replace(predictor=order))
+    sampler = NUMPY_NEWTON.sampler(stated, NUMPY_NEWTON.usual._replace(predictor=order))
     assert sampler is not None
     assert max(largest(stated, sampler)) <= 4e-14
 
 
 def test_numpy_newton_is_not_asked_for_what_it_cannot_state() -> None:
-    assert NumpyNewton().sampler(of_gallery("cam_roller"), NumpyNewton.usual) is None
+    assert NUMPY_NEWTON.sampler(of_gallery("cam_roller"), NUMPY_NEWTON.usual) is None
 
 
 def test_better_predictors_need_fewer_corrections_for_the_same_error() -> None:
     crank_rocker = of_gallery("crank_rocker")
-    for engine in (Generated(), Dense()):
+    for engine in (GENERATED, READABLE):
         errors = [largest(crank_rocker, engine.sampler(crank_rocker, Setting(k, corrections=1)))[0] for k in range(3)]
         assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
 
 
-def test_the_dense_engine_to_round_off_is_the_reference_to_the_bit(case: Case) -> None:
+def test_the_engine_of_the_readable_reference_equals_it_to_the_bit(case: Case) -> None:
     system = case.system
     u, ud, udd = (np.array(table[0]) for table in (case.u, case.ud, case.udd))
     solution = solve_reference(system, case.rows, case.start_coordinates, u, ud, udd)
     chosen = [system.coordinates.index(name) for name in case.columns]
-    sampler = Dense().sampler(case, Setting(0))
+    sampler = READABLE.sampler(case, Setting(0))
     assert sampler(1)[0] == [*solution.q[chosen], *solution.qd[chosen], *solution.qdd[chosen]]
 
 
@@ -186,12 +183,12 @@ def test_closed_forms_in_doubles_are_those_of_50_digits(u: float) -> None:
 
 def test_without_mpmath_it_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpmath", None)
-    near, absent = singular.measure(1, engines=[Shipped()])
+    near, absent = singular.measure(1, engines=[SHIPPED])
     assert absent == ("four-bar 4-1-3-2 at 180 deg: mpmath is not installed: pip install 'kinfmu[bench]'",)
     assert [one.point for one in near] == [point.title for point in POINTS[1:]]
 
 
-@pytest.mark.parametrize("engine", [Shipped(), Native()], ids=lambda engine: engine.name)
+@pytest.mark.parametrize("engine", [SHIPPED, NATIVE], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.title)
 def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
     point: singular.Point, engine: Engine
@@ -206,7 +203,7 @@ def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
 
 
 def test_plain_newton_loses_them_and_the_table_shows_it() -> None:
-    near, _ = singular.measure(1, engines=[Shipped(), Generated()])
+    near, _ = singular.measure(1, engines=[SHIPPED, GENERATED])
     change_point = [one for one in near if one.point == POINTS[0].title]
     shipped, plain = change_point
     assert plain.before[-1][2] > 1e3  # the acceleration, 1e-8 rad before the point

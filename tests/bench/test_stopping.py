@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from kinfmu.bench import stopping
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import Setting
 from kinfmu.bench.stopping import model_with
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import KinfmuError

@@ -12,7 +12,7 @@ import pytest
 
 from kinfmu import gallery
 from kinfmu.bench import accuracy, case, chains, log_files, logged_step, native_sweep, singular
-from kinfmu.bench.engines import ENGINES, Shipped
+from kinfmu.bench.engines import ENGINES, SHIPPED
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.cli.bench import ALL, MEASUREMENTS, default_folder
@@ -248,7 +248,7 @@ def test_the_engine_that_is_shipped_comes_first(command: Command, tmp_path: Path
     quick(command)
     table = (tmp_path / SETTINGS_PAGE).read_text(encoding="utf-8")
     first = next(line for line in table.splitlines() if line.startswith("| **"))
-    assert first.startswith(f"| **{Shipped().name}** | velocity and acceleration | full | round-off |")
+    assert first.startswith(f"| **{SHIPPED.name}** | velocity and acceleration | full | round-off |")
 
 
 def test_logs_are_compared_with_the_package_mcap(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,37 +5,25 @@ A new one is a file, a line here and a look in bench/pictures.py; tables and cha
 
 from __future__ import annotations
 
-from kinfmu.bench.engines.casadi_newton import Casadi
-from kinfmu.bench.engines.dense import Dense
-from kinfmu.bench.engines.engine import Engine, Sampler
-from kinfmu.bench.engines.generated import Generated
-from kinfmu.bench.engines.native import Native
-from kinfmu.bench.engines.numpy_newton import NumpyNewton
-from kinfmu.bench.engines.pylinkage_dyads import Pylinkage
-from kinfmu.bench.engines.scipy_fsolve import Fsolve
-from kinfmu.bench.engines.shipped import Shipped
+from kinfmu.bench.engines.casadi_newton import CASADI
+from kinfmu.bench.engines.generated import GENERATED
+from kinfmu.bench.engines.native import NATIVE
+from kinfmu.bench.engines.numpy_newton import NUMPY_NEWTON
+from kinfmu.bench.engines.pylinkage_dyads import PYLINKAGE
+from kinfmu.bench.engines.readable import READABLE
+from kinfmu.bench.engines.scipy_fsolve import FSOLVE
+from kinfmu.bench.engines.shipped import SHIPPED
 
-ENGINES: tuple[Engine, ...] = (
-    Shipped(),
-    Native(),
-    Generated(),
-    NumpyNewton(),
-    Dense(),
-    Fsolve(),
-    Casadi(),
-    Pylinkage(),
-)
+ENGINES = (SHIPPED, NATIVE, GENERATED, NUMPY_NEWTON, READABLE, FSOLVE, CASADI, PYLINKAGE)
 
 __all__ = [
+    "CASADI",
     "ENGINES",
-    "Casadi",
-    "Dense",
-    "Engine",
-    "Fsolve",
-    "Generated",
-    "Native",
-    "NumpyNewton",
-    "Pylinkage",
-    "Sampler",
-    "Shipped",
+    "FSOLVE",
+    "GENERATED",
+    "NATIVE",
+    "NUMPY_NEWTON",
+    "PYLINKAGE",
+    "READABLE",
+    "SHIPPED",
 ]

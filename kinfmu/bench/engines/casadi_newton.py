@@ -2,49 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import Engine, Sampler, Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.measures import arithmetic
 
 FINEST = 1e-13
 
 
-class Casadi(Engine):
+def _sampler(case: Case, setting: Setting) -> Sampler:
     """`fast_newton` from the last pose, rates by linear solves; the tolerance is `abstol` of the relative residual."""
+    try:
+        import casadi
+    except ImportError:
+        raise MissingPackageError("CasADi is not installed: pip install 'kinfmu[bench]'") from None
+    for function in ("sin", "cos", "sqrt"):
+        getattr(arithmetic, function).register(casadi.SX, getattr(casadi, function))
+    system = case.system
+    step = _step(casadi, case, setting.tolerance)
+    start = casadi.DM(case.start_coordinates)
+    chosen = [system.coordinates.index(name) for name in case.columns]
+    wanted = [k * len(system.coordinates) + c for k in range(3) for c in chosen]
+    driven = [casadi.DM(np.array(table).T) for table in (case.u, case.ud, case.udd)]
+    swept = cache(lambda n: step.mapaccum(n))
 
-    name = "CasADi"
-    settings: Sequence[Setting] = tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST))
-    usual = Setting(0, FINEST)
+    def take(n: int) -> Motion:
+        _, rows = swept(n)(start, *(table[:, :n] for table in driven))
+        found: Any = np.array(rows)
+        return list(found[wanted].T)
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler:
-        try:
-            import casadi
-        except ImportError:
-            raise MissingPackageError("CasADi is not installed: pip install 'kinfmu[bench]'") from None
-        for function in ("sin", "cos", "sqrt"):
-            getattr(arithmetic, function).register(casadi.SX, getattr(casadi, function))
-        system = case.system
-        step = _step(casadi, case, setting.tolerance)
-        start = casadi.DM(case.start_coordinates)
-        chosen = [system.coordinates.index(name) for name in case.columns]
-        wanted = [k * len(system.coordinates) + c for k in range(3) for c in chosen]
-        driven = [casadi.DM(np.array(table).T) for table in (case.u, case.ud, case.udd)]
-        swept = cache(lambda n: step.mapaccum(n))
-
-        def take(n: int) -> Motion:
-            _, rows = swept(n)(start, *(table[:, :n] for table in driven))
-            found: Any = np.array(rows)
-            return list(found[wanted].T)
-
-        return take
+    return take
 
 
 def _step(casadi: Any, case: Case, tolerance: float) -> Any:
@@ -68,3 +60,11 @@ def _step(casadi: Any, case: Case, tolerance: float) -> Any:
     moving = velocity(here, at, speed)
     everything = casadi.vertcat(here, moving, acceleration(here, at, speed, more, moving))
     return casadi.Function("step", [last, at, speed, more], [here, everything])
+
+
+CASADI = Engine(
+    "CasADi",
+    _sampler,
+    settings=tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST)),
+    usual=Setting(0, FINEST),
+)

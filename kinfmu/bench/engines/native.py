@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import Engine, Sampler, Setting
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.sweep.library import Library
 
+LAPS = 50  # how often a call takes the samples
 
-class Native(Engine):
+
+def _sampler(case: Case, _setting: Setting) -> Sampler:
     """What `kinfmu.solve(engine="native")` runs on: a call takes the samples there and back, again and again.
 
     What a call costs once, such as the path from the anchor to the first sample, counts as little as in a long sweep.
     """
+    try:
+        library = Library(case.plan)
+    except CompilerError as error:
+        raise MissingPackageError(f"kinfmu native: {error}") from None
+    u, ud, udd = (np.array(table) for table in (case.u, case.ud, case.udd))  # (n, d) each
 
-    name = "kinfmu native"
-    settings: Sequence[Setting] = (Setting(),)
-    usual = Setting()
-    laps = 50
+    def take(n: int) -> Motion:
+        there = np.arange(n)
+        order = np.tile(np.concatenate([there, there[::-1]]), -(-LAPS // 2))[: LAPS * n]
+        tables = [np.empty((len(order), len(case.columns)), order="F") for _ in range(3)]
+        library.sweep((u[order], ud[order], udd[order]), tables)
+        return list(np.hstack([table[:n] for table in tables]))
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler:  # noqa: ARG002  there is one
-        try:
-            library = Library(case.plan)
-        except CompilerError as error:
-            raise MissingPackageError(f"{self.name}: {error}") from None
-        u, ud, udd = (np.array(table) for table in (case.u, case.ud, case.udd))  # (n, d) each
+    return take
 
-        def take(n: int) -> Motion:
-            there = np.arange(n)
-            order = np.tile(np.concatenate([there, there[::-1]]), -(-self.laps // 2))[: self.laps * n]
-            tables = [np.empty((len(order), len(case.columns)), order="F") for _ in range(3)]
-            library.sweep((u[order], ud[order], udd[order]), tables)
-            return list(np.hstack([table[:n] for table in tables]))
 
-        return take
+NATIVE = Engine("kinfmu native", _sampler, laps=LAPS)

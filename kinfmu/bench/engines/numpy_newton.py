@@ -16,8 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.joints import Distance, Revolute, Translational
 from kinfmu.measures.placement import body_of
@@ -30,53 +29,47 @@ MOST = 25  # iterations
 PointOf = tuple[int, float, float]  # number of the body, s_x, s_y
 
 
-class NumpyNewton(Engine):
+def _sampler(case: Case, setting: Setting) -> Sampler | None:
     """Newton with an analytic Jacobian and `numpy.linalg.solve`, over all coordinates; rates by two more solves."""
+    try:
+        equations = _Equations(case)
+    except NotImplementedError:
+        return None
+    bound = setting.tolerance * case.system.size
+    chosen = np.array([case.system.coordinates.index(name) for name in case.columns])
+    gap = (GAP,) * (3 * len(chosen))
+    samples = list(zip(case.t, case.u, case.ud, case.udd, strict=True))
+    solve: Callable[..., FloatArray] = np.linalg.solve
+    jacobian = equations.jacobian
 
-    name = "numpy Newton"
-    settings: Sequence[Setting] = tuple(Setting(order, closed) for order in range(3) for closed in (1e-3, 1e-9, CLOSED))
-    usual = Setting(2, CLOSED)
+    def take(count: int) -> Motion:
+        last, last_t = case.start_coordinates, case.t[0]
+        qd = qdd = np.zeros_like(last)
+        motion: list[Sequence[float]] = []
+        for t, u, ud, udd in samples[:count]:
+            q, h = last, t - last_t
+            if setting.predictor == 1:
+                q = q + h * qd
+            elif setting.predictor == 2:
+                q = q + h * (qd + 0.5 * h * qdd)
+            try:
+                for _ in range(MOST):
+                    residual = equations.position(q.tolist(), u)
+                    if max(map(abs, residual)) <= bound:
+                        break
+                    q = q - solve(jacobian, residual)
+                else:
+                    raise ArithmeticError
+                speeds = solve(jacobian, equations.velocity(ud))
+                accelerations = solve(jacobian, equations.acceleration(speeds.tolist(), udd))
+            except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # go on from the last pose
+                motion.append(gap)
+                continue
+            last, last_t, qd, qdd = q, t, speeds, accelerations
+            motion.append([*q[chosen], *qd[chosen], *qdd[chosen]])
+        return motion
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler | None:
-        try:
-            equations = _Equations(case)
-        except NotImplementedError:
-            return None
-        bound = setting.tolerance * case.system.size
-        chosen = np.array([case.system.coordinates.index(name) for name in case.columns])
-        gap = (GAP,) * (3 * len(chosen))
-        samples = list(zip(case.t, case.u, case.ud, case.udd, strict=True))
-        solve: Callable[..., FloatArray] = np.linalg.solve
-        jacobian = equations.jacobian
-
-        def take(count: int) -> Motion:
-            last, last_t = case.start_coordinates, case.t[0]
-            qd = qdd = np.zeros_like(last)
-            motion: list[Sequence[float]] = []
-            for t, u, ud, udd in samples[:count]:
-                q, h = last, t - last_t
-                if setting.predictor == 1:
-                    q = q + h * qd
-                elif setting.predictor == 2:
-                    q = q + h * (qd + 0.5 * h * qdd)
-                try:
-                    for _ in range(MOST):
-                        residual = equations.position(q.tolist(), u)
-                        if max(map(abs, residual)) <= bound:
-                            break
-                        q = q - solve(jacobian, residual)
-                    else:
-                        raise ArithmeticError
-                    speeds = solve(jacobian, equations.velocity(ud))
-                    accelerations = solve(jacobian, equations.acceleration(speeds.tolist(), udd))
-                except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # go on from the last pose
-                    motion.append(gap)
-                    continue
-                last, last_t, qd, qdd = q, t, speeds, accelerations
-                motion.append([*q[chosen], *qd[chosen], *qdd[chosen]])
-            return motion
-
-        return take
+    return take
 
 
 class _Equations:
@@ -235,3 +228,11 @@ class _Equations:
         vx_j, vy_j, w_j = qd[3 * b[0] : 3 * b[0] + 3]
         rate = vx_j - w_j * a_j[1] - vx_i + w_i * a_i[1], vy_j + w_j * a_j[0] - vy_i - w_i * a_i[0]
         return rate, (w_j * w_j * a_j[0] - w_i * w_i * a_i[0], w_j * w_j * a_j[1] - w_i * w_i * a_i[1])
+
+
+NUMPY_NEWTON = Engine(
+    "numpy Newton",
+    _sampler,
+    settings=tuple(Setting(order, tolerance) for order in range(3) for tolerance in (1e-3, 1e-9, CLOSED)),
+    usual=Setting(2, CLOSED),
+)

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import Engine, Sampler, Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
 from kinfmu.units import CoordinateName
@@ -21,37 +20,31 @@ from kinfmu.units import CoordinateName
 Bodies = Mapping[str, tuple[str, str]]  # two points of each moving body, its frame's origin and one on its x-axis
 
 
-class Pylinkage(Engine):
+def _sampler(case: Case, _setting: Setting) -> Sampler | None:
     """`step_fast_with_kinematics`; it has no tolerance, and takes crank-driven chains of dyads only."""
+    if case.name not in _LINKAGES:
+        return None
+    try:
+        import pylinkage  # noqa: F401  the solver needs it; a missing package is reported first
+    except ImportError:
+        raise MissingPackageError("pylinkage is not installed: pip install 'kinfmu[bench]'") from None
+    u = np.array(case.u)[:, 0]
+    step = float(u[1] - u[0])
+    if not np.allclose(np.diff(u), step, rtol=1e-9):
+        return None
+    named, bodies = _LINKAGES[case.name](case, float(u[0]) - step, step)
+    linkage = _ready(named, case.ud[0][0], case.udd[0][0])
+    parts = list(named.values())
+    start = [(part.x, part.y) for part in parts]
+    place = {name: k for k, name in enumerate(named)}
 
-    name = "pylinkage"
-    settings: Sequence[Setting] = (Setting(0),)
-    usual = Setting(0)
+    def take(n: int) -> Motion:
+        for part, (x, y) in zip(parts, start, strict=True):
+            part.x, part.y = x, y
+        moved = linkage.step_fast_with_kinematics(n)
+        return _rows(case.columns, {name: [table[:, k] for table in moved] for name, k in place.items()}, bodies)
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler | None:  # noqa: ARG002  there is one
-        if case.name not in _LINKAGES:
-            return None
-        try:
-            import pylinkage  # noqa: F401  the solver needs it; a missing package is reported first
-        except ImportError:
-            raise MissingPackageError("pylinkage is not installed: pip install 'kinfmu[bench]'") from None
-        u = np.array(case.u)[:, 0]
-        step = float(u[1] - u[0])
-        if not np.allclose(np.diff(u), step, rtol=1e-9):
-            return None
-        named, bodies = _LINKAGES[case.name](case, float(u[0]) - step, step)
-        linkage = _ready(named, case.ud[0][0], case.udd[0][0])
-        parts = list(named.values())
-        start = [(part.x, part.y) for part in parts]
-        place = {name: k for k, name in enumerate(named)}
-
-        def take(n: int) -> Motion:
-            for part, (x, y) in zip(parts, start, strict=True):
-                part.x, part.y = x, y
-            moved = linkage.step_fast_with_kinematics(n)
-            return _rows(case.columns, {name: [table[:, k] for table in moved] for name, k in place.items()}, bodies)
-
-        return take
+    return take
 
 
 def _ready(named: Mapping[str, Any], speed: float, acceleration: float) -> Any:
@@ -143,3 +136,6 @@ _LINKAGES: dict[str, Callable[[Case, float, float], tuple[dict[str, Any], Bodies
     "crank_rocker": _crank_rocker,
     "jansen_leg": _jansen_leg,
 }
+
+
+PYLINKAGE = Engine("pylinkage", _sampler, settings=(Setting(0),), usual=Setting(0))

@@ -12,8 +12,7 @@ from itertools import chain
 from typing import Any
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
@@ -32,38 +31,40 @@ def _distinct(case: Case) -> Any:
     return load_model(compile_plan(distinct, case.columns))
 
 
-class Fsolve(Engine):
+def _sampler(case: Case, setting: Setting) -> Sampler:
     """MINPACK's hybrid method with its own difference quotients; the tolerance is `xtol`."""
+    from scipy.optimize import fsolve
 
-    name = "scipy fsolve"
-    settings: Sequence[Setting] = tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST))
-    usual = Setting(0, DEFAULT)
+    model = _distinct(case)
+    alone = len(case.u[0]) == 1
+    gap = (GAP,) * (3 * len(case.columns))
+    samples = list(zip(case.u, case.ud, case.udd, strict=True))
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler:
-        from scipy.optimize import fsolve
+    def closure(z: Sequence[float], u: tuple[float, ...]) -> list[float]:
+        return list(chain.from_iterable(model.residuals(evaluated(model, u, tuple(z))[-1])))
 
-        model = _distinct(case)
-        alone = len(case.u[0]) == 1
-        gap = (GAP,) * (3 * len(case.columns))
-        samples = list(zip(case.u, case.ud, case.udd, strict=True))
+    def take(n: int) -> Motion:
+        z, rows = case.start.z, []
+        for u, ud, udd in samples[:n]:
+            found, *_ = fsolve(closure, z, (u,), xtol=setting.tolerance, full_output=True)
+            z = tuple(found.tolist())
+            try:
+                values = evaluated(model, u, z)[-1]
+                if alone:
+                    rows.append(model.first_motion(values, ud, udd)[1])
+                else:
+                    first = model.velocity(values, ud)
+                    rows.append(model.motion(values, ud, udd, first, model.acceleration(values, ud, udd, first)))
+            except ArithmeticError:  # exactly singular: there are no rates
+                rows.append(gap)
+        return rows
 
-        def closure(z: Sequence[float], u: tuple[float, ...]) -> list[float]:
-            return list(chain.from_iterable(model.residuals(evaluated(model, u, tuple(z))[-1])))
+    return take
 
-        def take(n: int) -> Motion:
-            z, rows = case.start.z, []
-            for u, ud, udd in samples[:n]:
-                found, *_ = fsolve(closure, z, (u,), xtol=setting.tolerance, full_output=True)
-                z = tuple(found.tolist())
-                try:
-                    values = evaluated(model, u, z)[-1]
-                    if alone:
-                        rows.append(model.first_motion(values, ud, udd)[1])
-                    else:
-                        first = model.velocity(values, ud)
-                        rows.append(model.motion(values, ud, udd, first, model.acceleration(values, ud, udd, first)))
-                except ArithmeticError:  # exactly singular: there are no rates
-                    rows.append(gap)
-            return rows
 
-        return take
+FSOLVE = Engine(
+    "scipy fsolve",
+    _sampler,
+    settings=tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST)),
+    usual=Setting(0, DEFAULT),
+)

@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Sampler
-from kinfmu.bench.setting import Setting
+from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.solver.python import Solver
 
 
-class Shipped(Engine):
+def _sampler(case: Case, _setting: Setting) -> Sampler:
     """What `kinfmu.solve` and the FMU run on: second order prediction, Newton to round-off, every step judged."""
+    solver = Solver(load_model(case.plan))
+    start = solver.solve(solver.anchor, case.u[0])
+    gap = (GAP,) * (3 * len(case.columns))
+    samples = list(zip(case.u, case.ud, case.udd, strict=True))
 
-    name = "kinfmu"
-    settings: Sequence[Setting] = (Setting(),)
-    usual = Setting()
+    def take(n: int) -> Motion:
+        pose, rows = start, []
+        for u, ud, udd in samples[:n]:
+            found = solver.solve(pose, u)
+            if found.good:
+                pose = found
+                rows.append(solver.motion(pose, ud, udd))
+            else:
+                rows.append(gap)
+        return rows
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler:  # noqa: ARG002  there is one
-        solver = Solver(load_model(case.plan))
-        start = solver.solve(solver.anchor, case.u[0])
-        gap = (GAP,) * (3 * len(case.columns))
-        samples = list(zip(case.u, case.ud, case.udd, strict=True))
+    return take
 
-        def take(n: int) -> Motion:
-            pose, rows = start, []
-            for u, ud, udd in samples[:n]:
-                found = solver.solve(pose, u)
-                if found.good:
-                    pose = found
-                    rows.append(solver.motion(pose, ud, udd))
-                else:
-                    rows.append(gap)
-            return rows
 
-        return take
+SHIPPED = Engine("kinfmu", _sampler)

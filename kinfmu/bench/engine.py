@@ -1,10 +1,15 @@
-"""Settings of a Newton solver: how a sample is predicted, and when correcting it ends."""
+"""Engines, and settings of a Newton solver: how a sample is predicted, and when correcting it ends."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
+from kinfmu.bench.case import Case, Motion
+
+Sampler = Callable[[int], Motion]  # takes the first n samples of a case, and gives a row of q, qd, qdd for each
+GAP = float("nan")  # in place of numbers that were not found
 ROUND_OFF = 0.0  # tolerance: as far as rounding lets it
 PREDICTORS = ("last pose", "velocity", "velocity and acceleration")
 
@@ -28,6 +33,7 @@ class Setting(NamedTuple):
         return f"{self.tolerance:.0e}" if self.tolerance else "round-off"
 
 
+USUAL = Setting()
 CORRECTIONS = (0, 1, 2, 3)
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12, ROUND_OFF)
 CHORD = (2, 3)  # corrections; one is the same with and without
@@ -49,3 +55,20 @@ def newton(
             Setting(order, chord=True),
         )
     )
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Something that solves the samples of a case, in one or more settings.
+
+    name: in tables and charts; sampler: makes a function that takes samples, ready to be timed, or None if the engine
+    cannot state the mechanism, and raises MissingPackageError if a package is not installed; settings: those worth a
+    measurement; usual: the one of them for round-off; laps: how often a call of a sampler takes the samples, more than
+    once for engines made for long arrays.
+    """
+
+    name: str
+    sampler: Callable[[Case, Setting], Sampler | None]
+    settings: Sequence[Setting] = (USUAL,)
+    usual: Setting = USUAL
+    laps: int = 1

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engines.engine import GAP, Engine, Sampler
-from kinfmu.bench.setting import ROUND_OFF, Setting, newton
+from kinfmu.bench.engine import GAP, ROUND_OFF, Engine, Sampler, Setting, newton
 from kinfmu.equations.reference import Solution
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import PoseError
@@ -17,34 +16,28 @@ FLOOR = 1e-14  # residual relative to the size at which kinfmu.equations.referen
 MOST = 60  # iterations
 
 
-class Dense(Engine):
+def _sampler(case: Case, setting: Setting) -> Sampler:
     """Newton and the two linear solves with numpy on the rows kept, as `equations.reference` does."""
+    system, rows, q0 = case.system, case.rows, case.start_coordinates
+    chosen = [system.coordinates.index(name) for name in case.columns]
+    gap = (GAP,) * (3 * len(chosen))
+    u, ud, udd = (np.array(table) for table in (case.u, case.ud, case.udd))  # (n, d) each
 
-    name = "readable reference"
-    settings: Sequence[Setting] = newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,))  # the slowest
-    usual = Setting()
+    def take(n: int) -> Motion:
+        last, last_t = Solution(q0, 0.0 * q0, 0.0 * q0, 0), case.t[0]
+        motion: list[Sequence[float]] = []
+        for k, t in enumerate(case.t[:n]):
+            q = _predicted(last, t - last_t, setting.predictor)
+            try:
+                last = solved(system, rows, q, u[k], ud[k], udd[k], setting)
+            except (PoseError, np.linalg.LinAlgError):  # go on from the last pose
+                motion.append(gap)
+                continue
+            last_t = t
+            motion.append([*last.q[chosen], *last.qd[chosen], *last.qdd[chosen]])
+        return motion
 
-    def sampler(self, case: Case, setting: Setting) -> Sampler:
-        system, rows, q0 = case.system, case.rows, case.start_coordinates
-        chosen = [system.coordinates.index(name) for name in case.columns]
-        gap = (GAP,) * (3 * len(chosen))
-        u, ud, udd = (np.array(table) for table in (case.u, case.ud, case.udd))  # (n, d) each
-
-        def take(n: int) -> Motion:
-            last, last_t = Solution(q0, 0.0 * q0, 0.0 * q0, 0), case.t[0]
-            motion: list[Sequence[float]] = []
-            for k, t in enumerate(case.t[:n]):
-                q = _predicted(last, t - last_t, setting.predictor)
-                try:
-                    last = solved(system, rows, q, u[k], ud[k], udd[k], setting)
-                except (PoseError, np.linalg.LinAlgError):  # go on from the last pose
-                    motion.append(gap)
-                    continue
-                last_t = t
-                motion.append([*last.q[chosen], *last.qd[chosen], *last.qdd[chosen]])
-            return motion
-
-        return take
+    return take
 
 
 def solved(
@@ -79,3 +72,10 @@ def _predicted(last: Solution, h: float, order: int) -> FloatArray:
     """q + h qd + h^2 qdd / 2, as many terms as the order says."""
     terms = (last.q, h * last.qd, 0.5 * h * h * last.qdd)
     return np.asarray(sum(terms[1 : order + 1], start=terms[0]))
+
+
+READABLE = Engine(
+    "readable reference",
+    _sampler,
+    settings=newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,)),  # the slowest
+)
