@@ -1,8 +1,7 @@
 """Units: what a number in a mechanism file may carry, and what every variable declares. Names of variables.
 
-Lengths keep the mechanism's unit everywhere; angles are radians inside, and files may use degrees.
-Variables are named `<body>.x .y .phi`, their rates `.vx .vy .omega`, accelerations `.ax .ay
-.alpha`; points likewise.
+Lengths keep the mechanism's unit everywhere; angles are radians inside, and files may use degrees. Variables are named
+`<body>.x .y .phi`, their rates `.vx .vy .omega`, their accelerations `.ax .ay .alpha`; points likewise.
 """
 
 from __future__ import annotations

@@ -55,7 +55,9 @@ def _between(run: Run, start: str | None, stop: str | None) -> Run:
         return on_axis(option, text, axis.label, axis.unit, f", {axis.range()}") / axis.factor
 
     first, last = end("--start", start, -math.inf), end("--stop", stop, math.inf)
-    edge = 0.0 if axis.is_time else 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1])) if len(run) else 0.0
+    edge = 0.0
+    if len(run) and not axis.is_time:  # driver values are rounded: 30 deg in radians, and back
+        edge = 1e-9 * max(abs(axis.values[0]), abs(axis.values[-1]))
     rows = (axis.values >= first - edge) & (axis.values <= last + edge)
     if not rows.any():
         unit = f" {axis.unit}".rstrip()

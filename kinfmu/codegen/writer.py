@@ -10,7 +10,7 @@ from functools import lru_cache
 from kinfmu.equations.graph import FUNCTIONS, Node
 from kinfmu.solver.python.curve import CurveData
 
-_LEVEL = {"+": 1, "-": 1, "neg": 2, "*": 3, "/": 3}
+_LEVEL = {"+": 1, "-": 1, "neg": 2, "*": 3, "/": 3}  # how strongly operators bind: a weaker operand gets parentheses
 _ATOM = 4
 _LONGEST_INLINE = 72  # characters; longer expressions get a name
 
@@ -41,6 +41,7 @@ class Names:
         self._count = 0
 
     def of(self, node: Node) -> str:
+        """Return the name of a node, a new one at the first call."""
         if node.op == "symbol":
             return identifier(node.name)
         if node not in self._numbered:
@@ -138,6 +139,7 @@ class Writer:
         return [found[number] for number in sorted(found)]
 
     def _reference(self, node: Node, text: Mapping[Node, tuple[str, int]]) -> tuple[str, int]:
+        """Return a node as a number, name or expression, and its level in _LEVEL; text: those of inline nodes."""
         if node.constant is not None:
             return repr(node.constant), _ATOM if node.constant >= 0.0 else _LEVEL["neg"]
         if node in self._known_at_start or node.op == "symbol":
@@ -148,6 +150,7 @@ class Writer:
         return text[node]
 
     def _operation(self, node: Node, text: Mapping[Node, tuple[str, int]]) -> tuple[str, int]:
+        """Return the expression of an operation, and its level."""
         parts = [self._reference(arg, text) for arg in node.args]
         if node.op == "curve":
             data, order = node.curve
@@ -158,7 +161,7 @@ class Writer:
         level = _LEVEL[node.op]
         if node.op == "neg":
             return f"-{_wrapped(parts[0], level + 1)}", level
-        # left to right: the order in which the formula was written is the order of rounding
+        # Operations of one level stay in the order of the formula, which is the order of rounding.
         return f"{_wrapped(parts[0], level)} {node.op} {_wrapped(parts[1], level + 1)}", level
 
 

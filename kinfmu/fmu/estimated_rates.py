@@ -41,9 +41,8 @@ def estimated_rates(
 
     """
     count = len(samples)
-    if (
-        count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1
-    ):  # the most frequent case: t is at the last sample
+    # The most frequent case, kept short because it occurs in every step: one driver, and t is at the last sample.
+    if count == KEPT and samples[2][0] < t <= samples[3][0] and len(u) == 1:
         (first, (a,)), (second, (b,)) = samples[1], samples[2]
         step = t - second
         slope = (u[0] - b) / step

@@ -6,7 +6,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import c_bool, c_double, c_int
+from ctypes import byref, c_bool, c_double, c_int
 from pathlib import Path
 from typing import Any
 
@@ -113,18 +113,16 @@ class Slave2(Slave):
         super().__init__(FMU2Slave, about, folder)
         self._instantiate(folder, fmi2_callbacks(log))
         self._do_step = StepCall(self.fmpy, "fmi2DoStep", c_int(1))  # the state before is not needed
-        found = np.zeros((1, 2), np.int32)
+        row = np.zeros((1, 2), np.int32)
         counts = [self.references[name] for name in ("solver.status", "solver.iterations")]
-        self._read_counts = self._row_call("GetInteger", counts, found)
-        self._found = found[0].data
+        self._read_counts = self._row_call("GetInteger", counts, row)
+        self._counts = row[0].data
 
     def _instantiate(self, folder: Path, callbacks: Any) -> None:
         """Do what fmpy's `instantiate` does, but leave the URI of the resources unquoted.
 
         pythonfmu's binary unquotes blanks only, and crashes the process if the folder does not exist.
         """
-        from ctypes import byref
-
         from fmpy.fmi2 import fmi2CoSimulation
 
         path = (folder / "resources").absolute().as_posix()
@@ -144,7 +142,7 @@ class Slave2(Slave):
 
     def counts(self) -> tuple[int, int]:
         self._read_counts(0)
-        return self._found[0], self._found[1]
+        return self._counts[0], self._counts[1]
 
 
 class Slave3(Slave):
@@ -161,10 +159,10 @@ class Slave3(Slave):
             log(status, (message or b"").decode("utf-8", errors="replace"))
 
         self.fmpy.instantiate(loggingOn=True, logMessage=logger)
-        found = *((c_bool * 1)() for _ in range(3)), (c_double * 1)()  # flags and the time reached
-        self._do_step = StepCall(self.fmpy, "fmi3DoStep", c_bool(True), *found)
+        results = *((c_bool * 1)() for _ in range(3)), (c_double * 1)()  # flags and the time reached
+        self._do_step = StepCall(self.fmpy, "fmi3DoStep", c_bool(True), *results)
         status, iterations = np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int32)
-        self._found = status[0].data, iterations[0].data
+        self._counts = status[0].data, iterations[0].data
         self._read_status = self._row_call("GetInt64", [self.references["solver.status"]], status)
         self._read_iterations = self._row_call("GetInt32", [self.references["solver.iterations"]], iterations)
 
@@ -175,7 +173,7 @@ class Slave3(Slave):
     def counts(self) -> tuple[int, int]:
         self._read_status(0)
         self._read_iterations(0)
-        status, iterations = self._found
+        status, iterations = self._counts
         return status[0], iterations[0]
 
 
@@ -211,14 +209,14 @@ def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
         log(status, text)
 
     try:
-        one = _SLAVES[about.version](about, folder, logged)
+        started = _SLAVES[about.version](about, folder, logged)
     except Exception as error:  # fmpy raises bare exceptions
         sys.path[:] = path_before
         raise FmuError(f"FMU '{about.interface.name}' does not load: {' '.join([*messages, str(error)])}") from None
     try:
-        yield one
+        yield started
     finally:
-        one.free()
+        started.free()
         sys.path[:] = path_before  # pythonfmu adds the FMU's resources and does not remove them
 
 

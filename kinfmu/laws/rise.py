@@ -60,7 +60,7 @@ def normalized(half: Sequence[tuple[float, Piece]]) -> CurveData:
 
 
 def _mirrored(piece: Piece) -> Piece:
-    """1 - f(1 - x): about o = 1 - o each s^k turns into -(-1)^k s^k, and a sin(w s + p) into a sin(w s - p)."""
+    """Return 1 - f(1 - x): its origin is 1 - o, s^k becomes -(-1)^k s^k, and a sin(w s + p) becomes a sin(w s - p)."""
     o, coefficients, a, w, p = piece
     degree = len(coefficients) - 1
     turned = [c if (degree - k) % 2 else 0.0 - c for k, c in enumerate(coefficients)]

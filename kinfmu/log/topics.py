@@ -109,7 +109,7 @@ class LinkTopic:
         """Write the next samples; stamps (n,) [ns]."""
         if self._template is None:
             self._describe(run, stamps)
-        if self._template is None:
+        if self._template is None:  # no link can be drawn
             return
         metres, numbers = self._metres, []
         for pose in urdf.link_poses(run, self._mechanism).values():
@@ -167,7 +167,7 @@ def _entries(source: str, level: str, text: str, places: NDArray[np.int64], stam
 def event_in(message: bytes, t: float) -> Event | None:
     """Return the event in a log message at time t [s]; None if the message follows from the samples."""
     level = next((name for name, number in cdr.LOG_LEVELS.items() if number == message[12]), "info")
-    at, texts = 16, []
+    at, texts = 16, []  # a string: its length with the closing NUL, its bytes, and padding to a multiple of 4
     for _ in range(2):
         (count,) = struct.unpack_from("<I", message, at)
         texts.append(message[at + 4 : at + 3 + count].decode())

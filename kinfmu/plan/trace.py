@@ -31,8 +31,13 @@ def is_parameter(symbol: Node) -> bool:
 class Tracer:
     """Joints, drivers and points as nodes of one graph.
 
-    Every coordinate, every driver value and every settable parameter is a symbol of it: those named, or all that are
-    numbers of their own. Other parameters are computed from them, or are numbers.
+    Coordinates, driver values and settable parameters are symbols of the graph; other parameters are numbers, or are
+    computed from the settable ones.
+
+    Args:
+        mechanism: The mechanism.
+        parameters: Names of the settable parameters. Default: all that are given as numbers.
+
     """
 
     def __init__(self, mechanism: Mechanism, parameters: Iterable[str] | None = None) -> None:
@@ -47,16 +52,16 @@ class Tracer:
         self._points = members.body_points
 
     def joint(self, joint: Joint, known: Mapping[str, Node]) -> tuple[Node, ...]:
-        """Rows of a joint, with `known` in place of the symbols of some coordinates."""
+        """Return the rows of a joint, with `known` in place of the symbols of some coordinates."""
         return tuple(self.graph.lift(row) for row in joint.residual(self._placement(joint.bodies(), known)))
 
     def driver(self, driver: Driver, known: Mapping[str, Node]) -> Node:
-        """Row of a driver."""
+        """Return the row of a driver, with `known` in place of the symbols of some coordinates."""
         placement = self._placement(driver.bodies(), known)
         return self.graph.lift(driver.residual(placement, self.targets[driver.name]))
 
     def point(self, name: str, known: Mapping[str, Node]) -> tuple[Node, Node]:
-        """World coordinates of a point 'body.point'."""
+        """Return the world coordinates of a point 'body.point'."""
         x, y = self._placement((body_of(name),), known).point(name)
         return self.graph.lift(x), self.graph.lift(y)
 

@@ -98,7 +98,8 @@ static bool take_node(kf_segments *segments, kf_follower *follower, int64_t numb
 /* The polynomial of degree 8 through value, slope and curvature at x = -1, 0, 1; past a change point the motion is as smooth
  * as elsewhere. half: of the width.
  *
- * rest, slope, curve: what the terms from the third on are to give at either end, in odd and in even powers.
+ * before, after and so on: value, slope and curvature at either end that the terms from the third on must add; odd, even:
+ * the parts of them that odd and even powers give.
  */
 static void join(const kf_node *a, const kf_node *middle, const kf_node *b, double centre, double half, kf_segment *segment)
 {
@@ -133,7 +134,8 @@ static void join(const kf_node *a, const kf_node *middle, const kf_node *b, doub
     }
 }
 
-/* Follow nodes from the anchor in one direction, up to segment `last` or as far as poses can be reached: true if all can.
+/* Follow nodes from the anchor in one direction, up to segment `last` or as far as poses can be reached; return
+ * whether all can.
  * nodes: an array of four; afterwards its first and last items are the first and last nodes.
  */
 static bool lay(kf_segments *segments, kf_follower *follower, int64_t last, kf_node nodes[4])
@@ -168,7 +170,7 @@ static bool allocate(kf_segments *segments, int64_t first, int64_t last)
     return segments->segments != NULL;
 }
 
-/* True if the mechanism is after a turn of the driver as before, but for whole turns of its angles. */
+/* Return whether the mechanism repeats after a turn of the driver, apart from whole turns of its angles. */
 static bool is_repeated(kf_segments *segments, const kf_node *a, const kf_node *b)
 {
     int k;
@@ -187,7 +189,7 @@ static bool is_repeated(kf_segments *segments, const kf_node *a, const kf_node *
     return true;
 }
 
-/* Smallest and largest of the anchor and of driver values, those that are numbers. */
+/* Find the smallest and the largest of the anchor and of the driver values; NaN is left out. */
 static void range(int64_t count, const double *u, double *low, double *high)
 {
     double lows[KF_VECTOR], highs[KF_VECTOR];

@@ -89,7 +89,7 @@ def _program(variant: Variant, folder: Path) -> Path:
         version = f"{variant.fmi}.0"
         files = sources(plan, variables, version, TOKEN) | headers(version) | {DRIVER.name: DRIVER.read_text("utf-8")}
         flags = ("-std=c99", "-g", "-O0", "-ffp-contract=off", "-pthread")
-        compiler.compiled(
+        compiler.compile_files(
             compiler.command(), files, (*flags, f"-DFMI={variant.fmi}", *SANITIZERS[variant.sanitizer]), path
         )
     return path

@@ -119,13 +119,13 @@ class _Build:
         try:
             with tempfile.TemporaryDirectory() as scratch:
                 made = Path(scratch) / f"{self.key}{self.suffix}"
-                compiled(self._compiler, self._files, self._flags, made)
+                compile_files(self._compiler, self._files, self._flags, made)
                 return made.read_bytes()
         except OSError as error:
             raise CompilerError(f"{self._compiler[0]} cannot compile the generated C: {error}") from None
 
 
-def compiled(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
+def compile_files(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
     """Run a compiler on C files.
 
     Raises:
@@ -210,12 +210,14 @@ def zig(target: str) -> tuple[str, ...]:
 
 
 def _suffix(target: str | None) -> str:
+    """Return the suffix of shared libraries on a platform, as zig names it; default: this platform."""
     system = target or {"win32": "windows", "darwin": "macos"}.get(sys.platform, "")
     return ".dll" if "windows" in system else ".dylib" if "macos" in system else ".so"
 
 
 @cache
 def _version(compiler: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the command of a compiler and the version that it states."""
     with tempfile.TemporaryDirectory() as scratch:  # for some platforms zig leaves a file behind
         done = subprocess.run(  # noqa: S603  a compiler that we looked up
             [*compiler, "--version"], cwd=scratch, capture_output=True, text=True, check=False

@@ -117,8 +117,8 @@ static kf_pose *with_map(kf_solver *solver, const kf_pose *pose, int map, kf_pos
     return place;
 }
 
-/* Go on at the far side of a bridge ahead, or end on it; return false where there is none and a step is needed. */
-static bool goes_over_a_bridge(kf_solver *solver, const kf_pose *start, kf_path *path)
+/* Go on at the far side of a bridge ahead, or end on it; return false where there is none: a step is needed. */
+static bool cross_bridge(kf_solver *solver, const kf_pose *start, kf_path *path)
 {
     kf_pose *const pose = path->pose, *const place = kf_path_spare(path);
     const double target = path->target[KF_ALONG(solver)];
@@ -155,11 +155,11 @@ static bool goes_over_a_bridge(kf_solver *solver, const kf_pose *start, kf_path 
 /* Go one step along the path, or over a bridge; or try a shorter step, or find a singular point. */
 static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
 {
-    const bool one = KF_IS_FOLLOWED;
+    const bool has_one_driver = KF_IS_FOLLOWED;
     kf_pose *pose, *trial;
     const double *u;
     double s;
-    if (one && goes_over_a_bridge(solver, start, path)) {
+    if (has_one_driver && cross_bridge(solver, start, path)) {
         return;
     }
     pose = path->pose;
@@ -167,9 +167,9 @@ static void step(kf_solver *solver, const kf_pose *start, kf_path *path)
     u = kf_path_ahead(path, &s);
     if (kf_trusted_step(solver, pose, path->direction, s, u, trial)) {
         path->iterations += trial->found.iterations;
-        if (trial->found.margin >= (one ? KF_CLOSE : KF_REGULAR)
+        if (trial->found.margin >= (has_one_driver ? KF_CLOSE : KF_REGULAR)
             || kf_keeps_branch(solver, pose, trial, path->direction, s)) {
-            if (one && trial->found.margin < KF_REGULAR) {
+            if (has_one_driver && trial->found.margin < KF_REGULAR) {
                 const int map = kf_surveyed(solver, pose, trial);
                 if (map != trial->map) {
                     path->pose = with_map(solver, pose, map, trial);

@@ -2,7 +2,7 @@
 #include "kinfmu.h"
 #include "sincos.h"
 
-/* n! / (n - order)!: the factor of the derivative of s^n. */
+/* Return n! / (n - order)!, the factor of the derivative of s^n. */
 static double falling(int n, int order)
 {
     double factor = 1.0;
@@ -13,7 +13,7 @@ static double falling(int n, int order)
     return factor;
 }
 
-/* The derivative of the given order (0: the value) at x. */
+/* Return the derivative of the given order (0: the value) at x. */
 double kf_curve_at(const kf_curve *curve, int order, double x)
 {
     int low = 0, high = curve->count - 1, k;

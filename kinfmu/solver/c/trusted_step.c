@@ -74,8 +74,8 @@ inline bool kf_trusted_step(kf_solver *solver, kf_pose *pose, const double *dire
 /* Return false if the tangent of a path jumps in a step along it, as it does from one branch to a crossing one.
  *
  * Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
- * their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either
- * that both branches are the same in doubles, no step leads on.
+ * their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
+ * a pose is so close to either that doubles cannot tell the branches apart, no step is accepted.
  */
 bool kf_keeps_branch(kf_solver *solver, kf_pose *pose, kf_pose *trial, const double *direction, double s)
 {

@@ -3,7 +3,7 @@
  */
 #include "internal.h"
 
-/* The largest of `most` and the sizes of values over their scales. */
+/* Return the largest of `most` and of |value| / scale. */
 double kf_larger(double most, int count, const double *values, const double *scales)
 {
     int k;
@@ -13,14 +13,14 @@ double kf_larger(double most, int count, const double *values, const double *sca
     return most;
 }
 
-/* The first unknown of a block. */
+/* Return the first unknown of a block. */
 int kf_first_of(int block)
 {
     return block > 0 ? kf_block_ends[block - 1] : 0;
 }
 
-/* Form J^-1 (s R) of a block with those signs s that move the unknown that can move farthest as far as possible; false if J
- * is singular. rows: R, the scales of its rows.
+/* Form J^-1 (s R) of a block with the signs s that move the most sensitive unknown as far as possible; return false if J is
+ * singular. rows: R, the scales of its rows.
  */
 bool kf_worst_case_step(const kf_model *model, const kf_found *found, int block, const double *rows, double *step)
 {

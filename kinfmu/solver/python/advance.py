@@ -13,10 +13,10 @@ from .status import Status
 from .survey import surveyed
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
-SHORTEST_STEP = 5e-9  # of the longest; where steps get shorter, a limit is near and its place is extrapolated
+SHORTEST_STEP = 5e-9  # of the longest; where shorter ones are needed, a limit is near and is extrapolated
 NEAR_SINGULAR = 0.0125  # determinant below which qdd keeps less than nine digits
-CLOSE = 0.1  # determinant below which branches may lie as close as a correction
-GIVE_UP = 5e-15  # of the longest; nothing lies between such steps
+CLOSE = 0.1  # determinant below which another branch may be as near as a correction is long
+GIVE_UP = 5e-15  # of the longest; shorter steps are lost in rounding
 
 
 class Path:
@@ -64,7 +64,7 @@ class Path:
         if -self.length <= self.distance <= self.length:
             return self.distance, self.target
         s = self.length if self.distance > 0.0 else -self.length
-        return s, tuple([a + s * d for a, d in zip(self.pose.u, self.direction)])  # noqa: B905  one a driver, both
+        return s, tuple([a + s * d for a, d in zip(self.pose.u, self.direction)])  # noqa: B905  one item per driver
 
     def accept(self, trial: Pose, s: float, margin: float) -> None:
         """Go on from a trusted pose with longer steps, or end there if it is at the target."""
@@ -89,7 +89,7 @@ class Path:
     def terminate(self) -> Pose | Limit:
         """Return the pose at the target, with the iterations of the whole path, or the limit before it.
 
-        A dead centre has no tangent that the next path could start with: that starts from the last regular pose.
+        A dead centre has no tangent, so a path that goes on from there starts at the last regular pose.
         """
         end = Limit(self.pose.u, TOO_FAR) if self.end is None else self.end
         if isinstance(end, Pose) and end.bridge is None:
@@ -129,16 +129,16 @@ def advance(model: Model, start: Pose, target: Vector, singularities: Singularit
 
 def _step(model: Model, path: Path) -> None:
     """Go one step along the path, or over a bridge; or try a shorter step, or find a singular point."""
-    one = len(path.target) == 1
-    if one and _goes_over_a_bridge(path):
+    has_one_driver = len(path.target) == 1
+    if has_one_driver and _cross_bridge(path):
         return
     pose, direction = path.pose, path.direction
     s, u = path.ahead()
     trial = trusted_step(model, pose, direction, s, u)
     if trial is not None:
         path.iterations += trial.iterations
-        if trial.margin >= (CLOSE if one else REGULAR) or keeps_branch(model, pose, trial, direction, s):
-            if one and trial.margin < REGULAR:
+        if trial.margin >= (CLOSE if has_one_driver else REGULAR) or keeps_branch(model, pose, trial, direction, s):
+            if has_one_driver and trial.margin < REGULAR:
                 singularities = surveyed(model, pose, trial)
                 if singularities is not trial.singularities:
                     path.pose = with_map(pose, singularities)
@@ -148,8 +148,8 @@ def _step(model: Model, path: Path) -> None:
     path.shorten(s, lambda: limit_beyond(model, path.before, pose, direction))
 
 
-def _goes_over_a_bridge(path: Path) -> bool:
-    """Go on at the far side of a bridge ahead, or end on it; return False where there is none and a step is needed."""
+def _cross_bridge(path: Path) -> bool:
+    """Go on at the far side of a bridge ahead, or end on it; return False where there is none: a step is needed."""
     pose, target = path.pose, path.target
     singularities = pose.singularities
     if singularities is not None and not singularities.low <= target[0] <= singularities.high:

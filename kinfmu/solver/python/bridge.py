@@ -20,7 +20,7 @@ from .trusted_step import follow_path
 CLOSED = 1e-12  # residual relative to the size up to which an interpolated pose counts as closed
 AGREED = 1e-9  # [rad, sizes]; largest difference of two widths, and of a pose and a node whole turns away
 DAMPING = 1e-3  # of J dz = -r at a change point: its singular value is 0, the others are far above
-NOISE = 8.0  # roundings of the residual at the centre; a smaller residual is no miss
+NOISE = 8.0  # rounding errors; a residual at the centre that is no larger is no miss
 TURN = 6.283185307179586  # [rad]; for counting
 _HIGH = 6.2831853069365025  # [rad]; 2 pi to 32 bits, so that its multiples by up to 2^21 turns are exact
 _LOW = 2.430840202602477e-10  # [rad]; the rest
@@ -137,14 +137,15 @@ class Bridge:
         return self._miss
 
     def missed(self, pose: Pose, slope: float) -> tuple[float, float, float]:
-        """Return what the miss may do to unknowns and their derivatives over the driver, in radians and sizes.
+        """Return the errors that the miss may cause in unknowns and their derivatives, in radians and sizes.
 
-        Where lengths miss a change point by m, crossing branches separate: by sqrt(m) at the crossing, by m / x at
-        the distance x from it. Their determinant is linear in x, so it gives x more exactly than the window's centre.
+        Where lengths miss a change point by m, the branches no longer cross: they are sqrt(m) apart at the former
+        crossing, and m / x apart at the distance x from it. Their determinant is linear in x, so it gives x more
+        exactly than the window's centre.
 
         Args:
             pose: Interpolated by the bridge.
-            slope: Of the steepest unknown over the driver.
+            slope: Largest derivative of an unknown by the driver.
 
         """
         e = 2.0 * sqrt(self.miss())

@@ -158,7 +158,7 @@ def with_driver_errors(
     """Return the errors plus those caused by errors `off` >= 0 of the drivers' speeds and accelerations."""
     of_q, of_qd, of_qdd = errors
     here = _motion(model, pose, ud, udd)
-    for k, (speed, acceleration) in enumerate(zip(*off)):  # noqa: B905  one a driver, both
+    for k, (speed, acceleration) in enumerate(zip(*off)):  # noqa: B905  one item per driver
         if speed == inf:
             return of_q, inf, inf
         _, by_speed, by_speed_too = _differences(model, _motion(model, pose, _shifted(ud, k, speed), udd), here)
@@ -193,7 +193,7 @@ def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, floa
 def _largest(model: Model, there: Vector, here: Vector) -> float:
     """Return the largest difference of two rows of outputs, in radians and sizes."""
     largest = 0.0
-    for name, a, b in zip(model.OUTPUTS, there, here):  # noqa: B905  one an output, all
+    for name, a, b in zip(model.OUTPUTS, there, here):  # noqa: B905  one item per output
         gap = abs(a - b) if name[-4:] == ".phi" else abs(a - b) / model.SIZE
         if gap != gap:
             return inf
@@ -212,9 +212,9 @@ def _rates(model: Model, pose: Pose, driven: DriverMotion) -> UnknownRates:
         first, second = tangent_of(model, pose)
     else:
         first, second = rates_in_time(model, pose, driven.ud, driven.udd)
-    for rate, bend, scale in zip(first, second, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, all
+    for rate, bend, scale in zip(first, second, model.UNKNOWN_SCALES):  # noqa: B905  one item per unknown
         speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
-    for rate, bend, scale in zip(driven.ud, driven.udd, model.REACH):  # noqa: B905  one a driver, all
+    for rate, bend, scale in zip(driven.ud, driven.udd, model.REACH):  # noqa: B905  one item per driver
         speed, curve = max(speed, abs(rate) / scale), max(curve, abs(bend) / scale)
     return UnknownRates(first, second, speed, max(curve, speed * speed))
 
@@ -232,7 +232,7 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
         scales = model.UNKNOWN_SCALES[low:high]
         step = worst_case_step(matrix, model.ROW_SCALES[block], scales)
         own = farthest = 0.0
-        for z, a, scale in zip(pose.z[low:high], step, scales):  # noqa: B905  one an unknown, all
+        for z, a, scale in zip(pose.z[low:high], step, scales):  # noqa: B905  one item per unknown
             own, farthest = max(own, abs(z) / scale), max(farthest, abs(a) / scale)
         c = rounding + EPS * own
         found.append((c * farthest, block, step, c))
@@ -263,7 +263,7 @@ def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRat
     """Return the source of a bridge: the difference of its two widths, and the errors of its nearest nodes."""
     half = pose.bridge.half
     nodes = [_of_node(model, node, half) for node in pose.bridge.span.nodes[2:4]]
-    rounding = [max(pair) for pair in zip(*nodes)]  # noqa: B905  one an unknown, both
+    rounding = [max(pair) for pair in zip(*nodes)]  # noqa: B905  one item per unknown
     z, zd, zdd = pose.bridge.difference(pose.u[0])
     given = [
         tuple([a + (c * e if a >= 0.0 else -c * e) for a, e in zip(gap, rounding)])  # noqa: B905
@@ -284,7 +284,7 @@ def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverM
     off = _of_bridge(track, own, alone, along)
     v, a = driven.ud[track.driver], driven.udd[track.driver]
     still = (0.0,) * len(rates.first)
-    one = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one an unknown, all
+    one = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one item per unknown
     two = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
     first = track.put([v * x for x in one], still)
     second = track.put([v * v * y + a * x for x, y in zip(one, two)], still)  # noqa: B905
@@ -327,7 +327,7 @@ def _moved(
 def _added(there: Vector, here: Vector, more: Vector) -> Vector:
     """Return `there` moved by `more` away from `here`, so that two errors cannot cancel by chance."""
     along = 0.0
-    for a, b, c in zip(there, here, more):  # noqa: B905  one an unknown, all
+    for a, b, c in zip(there, here, more):  # noqa: B905  one item per unknown
         along += (a - b) * c
     sign = copysign(1.0, along)
     return tuple([a + sign * c for a, c in zip(there, more)])  # noqa: B905

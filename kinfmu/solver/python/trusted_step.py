@@ -30,13 +30,13 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     needed = TRUST * trial.moved
     if needed > trial.margin or needed > pose.margin or trial.margin == 0.0:
         return None
-    for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one a block, both
+    for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one item per block
         if after < FALL * before if before > 0.0 else after > FALL * before:
             return None
     if model.TALL and _turns_over(model, pose, trial):
         return None
     if trial.moved > UNDOUBTED:
-        for second, scale in zip(zdd, model.UNKNOWN_SCALES):  # noqa: B905  one an unknown, both
+        for second, scale in zip(zdd, model.UNKNOWN_SCALES):  # noqa: B905  one item per unknown
             if abs(second) * s * s > 2.0 * BENT * scale:
                 return None
     return trial
@@ -55,15 +55,15 @@ def keeps_branch(model: Model, pose: Pose, trial: Pose, direction: Vector, s: fl
     """Return False if the tangent of a path jumps in a step along it, as it does from one branch to a crossing one.
 
     Near a crossing the branches lie as close as corrections are small, and one of them keeps the determinant's sign;
-    their tangents stay apart. Toward a dead centre tangents grow, by at most this much in a step. So close to either
-    that both branches are the same in doubles, no step leads on.
+    their tangents stay apart. Towards a dead centre the tangent grows, but in a step by at most SMOOTH of itself. Where
+    a pose is so close to either that doubles cannot tell the branches apart, no step is accepted.
     """
     if pose.margin < UNDECIDED and trial.margin > pose.margin:
         return False
     zd, zdd = directed(model, pose, direction)
     there = directed(model, trial, direction)[0]
     scales = model.UNKNOWN_SCALES
-    largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one an unknown, all
+    largest = max([abs(b) / c for b, c in zip(there, scales)])  # noqa: B905  one item per unknown
     jump = max([abs(b - (a + s * aa)) / c for a, aa, b, c in zip(zd, zdd, there, scales)])  # noqa: B905
     return bool(jump <= SMOOTH * largest)
 

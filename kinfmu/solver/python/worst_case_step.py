@@ -10,7 +10,7 @@ from .pose import Vector
 
 
 def worst_case_step(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[float]:
-    """Return J^-1 (s R) (k,) with those signs s that move the unknown that can move farthest as far as possible.
+    """Return J^-1 (s R), (k,), with the signs s that move the most sensitive unknown as far as possible.
 
     Args:
         matrix: J (m, k) of a block, m >= k.
@@ -29,18 +29,18 @@ def worst_case_step(matrix: Matrix, rows: Vector, scales: Vector) -> Sequence[fl
     total = [0.0] * k
     for column in columns:
         sign = 1.0 if column[worst] >= 0.0 else -1.0
-        total = [a + sign * b for a, b in zip(total, column)]  # noqa: B905  one an unknown, both
+        total = [a + sign * b for a, b in zip(total, column)]  # noqa: B905  one item per unknown
     return total
 
 
 def _worst_case_step_of_two(matrix: Matrix, rows: Vector, scales: Vector) -> Vector:
-    """Return the same for 2 x 2, with the inverse written out: its columns (d p, -c p) and (-b q, a q)."""
+    """Return `worst_case_step` of a 2 x 2 matrix: the columns of J^-1 R are (d p, -c p) and (-b q, a q)."""
     (a, b), (c, d) = matrix
     det = a * d - b * c
     p, q = rows[0] / det, rows[1] / det
     dp, cp, bq, aq = d * p, -c * p, -b * q, a * q
     gain = (abs(dp) + abs(bq)) / scales[0] - (abs(cp) + abs(aq)) / scales[1]
-    first = copysign(1.0, choose(gain, dp, cp) + 0.0)  # -0.0 + 0.0 = 0.0
+    first = copysign(1.0, choose(gain, dp, cp) + 0.0)  # + 0.0 makes -0.0 positive
     second = copysign(1.0, choose(gain, bq, aq) + 0.0)
     return first * dp + second * bq, first * cp + second * aq
 

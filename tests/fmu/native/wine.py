@@ -70,7 +70,7 @@ def _walked(folder: Path, fmi: int, platform: Platform, by: Sequence[str]) -> ND
     outputs = [v.name for part in ("values", "rates", "accelerations") for v in about.interface.part(part)]
     suffix = ".exe" if platform.suffix == ".dll" else ""
     host = folder / f"walk{suffix}"
-    compiler.compiled(compiler.zig(platform.target), {HOST.name: HOST.read_text("utf-8")}, (f"-DFMI={fmi}",), host)
+    compiler.compile_files(compiler.zig(platform.target), {HOST.name: HOST.read_text("utf-8")}, (f"-DFMI={fmi}",), host)
     library = folder / "binaries" / platform.folder(f"{fmi}.0") / f"{about.model_identifier}{platform.suffix}"
     command = [*by, str(host), str(library), about.token, str(references[outputs[0]]), str(len(outputs))]
     quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(folder.parent / "wine")}

@@ -35,7 +35,7 @@ def walker(name: str, folder: Path, cc: Sequence[str], *flags: str) -> Path:
     """A program that walks a mechanism about."""
     files = emit(compile_plan(MECHANISMS[name]())) | compiler.sources(compiler.SOLVER) | {"walk.c": WALK}
     program = folder / "walk"
-    compiler.compiled(cc, files, (*C99, *flags), program)
+    compiler.compile_files(cc, files, (*C99, *flags), program)
     return program
 
 
