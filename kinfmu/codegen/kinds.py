@@ -217,6 +217,3 @@ def _renamed(block: Block, names: dict[CoordinateName, CoordinateName], new: dic
         determinant_scale=block.determinant_scale,
         usual=block.usual,
     )
-
-
-__all__ = ["Kind", "UnitMember", "UnitRun", "positions", "runs_of"]

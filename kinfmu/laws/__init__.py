@@ -6,7 +6,7 @@ To add one, write a file and add a line here.
 from __future__ import annotations
 
 from kinfmu.laws.formulas import ConstantSpeed, External, Harmonic, Polynomial
-from kinfmu.laws.law import Constant, Law, LawQuantity
+from kinfmu.laws.law import Law, LawQuantity
 from kinfmu.laws.rise import (
     RISES,
     Cycloidal,
@@ -33,7 +33,6 @@ LAWS: tuple[type[Law], ...] = (
 __all__ = [
     "LAWS",
     "RISES",
-    "Constant",
     "ConstantSpeed",
     "Cycloidal",
     "External",

@@ -6,12 +6,11 @@ from kinfmu.plan.block import Block
 from kinfmu.plan.compile import compile_plan, plan_from
 from kinfmu.plan.determinant import determinant_formula
 from kinfmu.plan.origin import localized
-from kinfmu.plan.plan import DriverInfo, Motion, SolvePlan
+from kinfmu.plan.plan import DriverInfo, SolvePlan
 
 __all__ = [
     "Block",
     "DriverInfo",
-    "Motion",
     "SolvePlan",
     "compile_plan",
     "determinant_formula",

@@ -10,9 +10,9 @@ import pytest
 
 from kinfmu import Body, Mechanism, load
 from kinfmu.codegen.python import emit, load_model
-from kinfmu.equations import System
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.reference import solve_reference
+from kinfmu.equations.system import System
 from kinfmu.gallery import chains
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver, estimate

@@ -7,8 +7,8 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, Body, Distance, Mechanism, Point, Revolute
-from kinfmu.equations import System
 from kinfmu.equations.redundancy import find_redundancy
+from kinfmu.equations.system import System
 from kinfmu.errors import InconsistentError
 from kinfmu.gallery.chains import fourbar_chain
 from tests.mechanisms import bar_as_body, fourbar, reference_fourbar, six_bar

@@ -11,8 +11,8 @@ import pytest
 import kinfmu
 from kinfmu import gallery
 from kinfmu.codegen.python import emit
-from kinfmu.equations import System
 from kinfmu.equations.redundancy import find_redundancy
+from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, RequestError
 from kinfmu.gallery.chains import fourbar_chain, open_chain
 from kinfmu.joints import Distance
