@@ -98,9 +98,8 @@ class MechanismSlave(SlaveSettings):
             if not self._touched or current_time != self._time:
                 self._shown = self._motion = None  # the time of the rates changes: inputs are held, or clocks differ
             history = self._history
-            if len(history) == KEPT and history[-1][0] < current_time - SAME_TIME * step_size - ROUNDING * abs(
-                current_time
-            ):  # the frequent case of _commit
+            repeated_from = current_time - SAME_TIME * step_size - ROUNDING * abs(current_time)
+            if len(history) == KEPT and history[-1][0] < repeated_from:  # the frequent case of _commit
                 self._history = (history[1], history[2], history[3], (current_time, pose.u))
                 self._committed = pose
                 self._touched = False
@@ -167,9 +166,10 @@ class MechanismSlave(SlaveSettings):
         return self._solver.solve(self._committed, self._law(current_time))
 
     def _commit(self, pose: Pose, t: float, step_size: float) -> None:
+        """Make a pose the committed one, and append its time and driver values to the history."""
         history = self._history
-        same = t - SAME_TIME * step_size - ROUNDING * abs(t)
-        while history and history[-1][0] >= same:  # the host repeats a step, or goes back
+        repeated_from = t - SAME_TIME * step_size - ROUNDING * abs(t)
+        while history and history[-1][0] >= repeated_from:  # the host repeats a step, or goes back
             history = history[:-1]
         self._history = (*history[1 - KEPT :], (t, pose.u))
         self._committed = pose

@@ -1,4 +1,4 @@
-"""Laws that are one formula: a uniform and a harmonic motion, a polynomial, and no motion but that of inputs."""
+"""Laws that are one formula: uniform motion, polynomial, harmonic motion; and External, for drivers moved by inputs."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def compile_plan(
     Args:
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
-        parameters: Names of the parameters that are settable; default: all that are numbers of their own.
+        parameters: Names of the parameters that are settable; default: all that are given as numbers.
 
     Returns:
         The plan, with those parameters of the geometry and the constants of the laws settable.
@@ -79,10 +79,9 @@ def plan_from(
     anchor = find_anchor(system, redundancy.assembly)
     settable = _parameters(mechanism, parameters)
     tracer = Tracer(local, [parameter.name for parameter in settable])
-    set_aside = [row.index for row in redundancy.redundant]
     structure = find_structure(system, tracer, redundancy, anchor.q)
     known = structure.fixed
-    rates, row = TimeDerivatives(tracer, structure.fixed), RowTracer(system, tracer)
+    rates, row = TimeDerivatives(tracer, known), RowTracer(system, tracer)
     motions, coordinate_count, fixed = _outputs(mechanism, origin, tracer, rates, known)
     if outputs is not None:
         motions, coordinate_count = _chosen(motions, coordinate_count, outputs)
@@ -94,7 +93,7 @@ def plan_from(
     )
     solved = {name for block in blocks for name in block.coordinates}
     watches = []
-    for index in set_aside:
+    for index in (redundant.index for redundant in redundancy.redundant):
         node = row(index, known)
         if all(symbol.name in solved for symbol in symbols([node]) if not is_parameter(symbol)):
             watches.append((system.rows[index].name, node / (system.rows[index].scale * system.size)))
@@ -152,6 +151,7 @@ def _outputs(
 def _chosen(
     motions: Sequence[Motion[CoordinateName]], coordinate_count: int, outputs: Sequence[str]
 ) -> tuple[list[Motion[CoordinateName]], int]:
+    """Return the motions of the outputs requested, and how many of these are coordinates."""
     known = [motion.name for motion in motions]
     if isinstance(outputs, str):
         raise RequestError(f"outputs: '{outputs}' must be a list of names, such as ['{known[0]}']")
@@ -163,7 +163,7 @@ def _chosen(
 
 
 def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
-    """The blocks on which the outputs depend, in order."""
+    """Return the blocks on which the outputs depend, in order."""
     wanted = {symbol.name for symbol in symbols(positions)}
     needed = []
     for block in reversed(blocks):
@@ -174,7 +174,7 @@ def _needed(blocks: Sequence[Block], positions: Sequence[Node]) -> list[Block]:
 
 
 def _parameters(mechanism: Mechanism, wanted: Sequence[str] | None) -> tuple[PlanParameter, ...]:
-    """Return the parameters wanted, in file order; default: those that are numbers of their own."""
+    """Return the parameters wanted, in file order; default: those that are given as numbers."""
     known = list(mechanism.parameters)
     for name in wanted or ():
         if name not in known:
@@ -211,6 +211,7 @@ def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...
 
 
 def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion[str], ...]:
+    """Return the law of each driver over time, with its rate and acceleration."""
     graph = tracer.graph
     time, one = graph.symbol("time"), graph.constant(1.0)
     laws = []

@@ -210,5 +210,5 @@ def test_a_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     files = {"a.c": "int f(void);\nint f(void) { return 7; }\n"}
     library = compiler.shared_library(files)
     assert ctypes.CDLL(str(library)).f() == 7
-    monkeypatch.setattr(compiler, "compiled", None)
+    monkeypatch.setattr(compiler, "compile_files", None)
     assert compiler.shared_library(files) == library

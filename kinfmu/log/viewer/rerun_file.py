@@ -10,8 +10,9 @@
     /log                changes of status and events
     /card               mechanism, run and verdict
 
-Recordings of one application share a blueprint in the viewer, whatever their own says: so runs that need the same one,
-of the same mechanism and time, are of one application, and what a person arranges for them stays; others are not.
+The viewer keeps one blueprint per application and ignores the blueprint of a second recording. So runs of the same
+mechanism and time, which need the same blueprint, belong to one application: what a person arranges for one stays for
+the next. Other runs belong to another application.
 """
 
 from __future__ import annotations
