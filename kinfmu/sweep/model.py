@@ -25,7 +25,8 @@ from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
-from kinfmu.sweep.continued import anew
+from kinfmu.sweep.continued import anew as anew_note
+from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
 from kinfmu.sweep.engine import Engine, Tables, UnreachedError
 from kinfmu.sweep.python_engine import PythonEngine
@@ -135,6 +136,7 @@ class Model:
         parameters: Settings | None = None,
         tolerance: float = TOLERANCE,
         wrap: bool = False,
+        anew: bool = True,
         out: Tables | None = None,
         **inputs: ArrayLike,
     ) -> Run:
@@ -146,11 +148,12 @@ class Model:
         Args:
             t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
             parameters: Values of parameters and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"}.
-                Other geometry is reached by continuation from the pose of the geometry as written; if that fails, the
-                mechanism is assembled anew, with an event of level "info".
+                Other geometry is reached by continuation from the pose of the geometry as written.
             tolerance: Residual relative to the size above which a sample is not ok; positive.
             wrap: Unwrap angles given as inputs: a jump from 2 pi to 0 goes on forwards. Without it such a jump turns
                 back.
+            anew: If continuation does not reach the parameters, assemble the mechanism anew from its start poses, as a
+                file with these parameters is, with an event of level "info". False: that is an error.
             out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
             **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and
                 crank_acceleration=, arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per
@@ -185,6 +188,8 @@ class Model:
             tables = _tables(out, (len(times), len(self.outputs)), engine.order)
             result = engine.sweep(driven, tables)
         except UnreachedError as reason:
+            if not anew:
+                raise
             return self._solve_anew(str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs)
         plan, given = self.plan, driven
         return Run(
@@ -210,6 +215,72 @@ class Model:
             events=tuple(Event(float(times[k]), "error", message) for k, message in result.failures),
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
+
+    def solve_designs(
+        self,
+        parameters: Mapping[str, ArrayLike | str],
+        t: ArrayLike | None = None,
+        *,
+        derivatives: int = 2,
+        tolerance: float = TOLERANCE,
+        anew: bool = True,
+        workers: int = 1,
+        **inputs: ArrayLike,
+    ) -> Designs:
+        """Solve the motions of many designs: sets of parameters, at the same times or driver values.
+
+        Every design is solved as `solve` does it, sample by sample; with the native engine in one call of compiled
+        code. What cannot be assembled or reached is NaN, with a status and a reason; it never ends the batch.
+
+        Args:
+            parameters: Arrays (m,) of parameters and law constants by name, one value for each design; numbers, and
+                texts such as "30 rpm", hold for all.
+            t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
+            derivatives: Highest derivative wanted: 2 with accelerations, 1 with rates, 0 positions alone.
+            tolerance: Residual relative to the size above which a sample is not ok; positive.
+            anew: Assemble designs anew that continuation from the design as written does not reach, one after another:
+                that takes milliseconds each, and longer for designs that do not close. False: they have no numbers.
+            workers: Threads of the native engine; the Python engine has one.
+            **inputs: Driver values in place of t, as in `solve`, the same for all designs (n,) or one row for each
+                (m, n).
+
+        Returns:
+            The designs.
+
+        Raises:
+            RequestError: A name is unknown, or arrays have other lengths.
+            CompilerError: The engine is 'native' and no compiler is found, or it fails.
+
+        """
+        require_tolerance(tolerance)
+        if derivatives not in (0, 1, 2):
+            raise RequestError(f"derivatives = {derivatives!r} must be 0, 1 or 2")
+        if not (isinstance(workers, int) and workers > 0):
+            raise RequestError(f"workers = {workers!r} must be a positive whole number")
+        if inputs and t is not None:
+            raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+        batch = Batch(self, parameters)
+        driven = driven_by_inputs(self.plan.drivers, inputs, rows=batch.count) if inputs else None
+        if driven is None:
+            times = column_of("t", run_times(self.mechanism.run) if t is None else t)
+        else:
+            times = np.arange(driven[0].shape[-2], dtype=float)
+        driving = Driving(times, driven, {name: np.asarray(value, dtype=float) for name, value in inputs.items()})
+        native = workers if self._is_native(batch.count * len(times)) else 0
+        return solve_batch(batch, driving, highest=derivatives, tolerance=tolerance, anew=anew, threads=native)
+
+    def read_parameter(self, name: str, value: float | str) -> float:
+        """Return the value of a parameter or law constant as a number.
+
+        Raises:
+            RequestError: The name is unknown.
+            MechanismError: The value is invalid.
+
+        """
+        setting = self.setting({name: value})
+        if name in self._places:
+            return setting.values[self._places[name]]
+        return setting.constants[self._constant_places[name]]
 
     def setting(self, given: Settings) -> Setting:
         """Return parameters and law constants as numbers.
@@ -294,22 +365,29 @@ class Model:
         u: Vector = model.drive(self.mechanism.run.start, constants)[0]
         return u
 
-    def _engine(self, count: int, setting: Setting, tolerance: float, *, by_law: bool) -> Engine:
-        """Return an engine with the parameters set; `auto` is the native one if it pays and a compiler is found."""
+    def _is_native(self, count: int) -> bool:
+        """Return whether so many samples are solved by the native engine; its library is compiled then."""
         work = count * max(1, len(self.plan.blocks))
+        if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING):
+            return False
+        try:
+            self.load_library()
+        except CompilerError:
+            if self.engine == "native":
+                raise
+            return False
+        return True
+
+    def _engine(self, count: int, setting: Setting, tolerance: float, *, by_law: bool) -> Engine:
+        """Return an engine with the parameters set."""
         start = self.mechanism.run.start if by_law and setting.starts_elsewhere else None
-        if self.engine == "native" or (self.engine == "auto" and work >= WORTH_COMPILING):
+        if self._is_native(count):
             from kinfmu.sweep.native_engine import NativeEngine
 
-            try:
-                library = self._library
-            except CompilerError:
-                if self.engine == "native":
-                    raise
-            else:
-                if start is not None:
-                    library.require_start(setting.values or self._written, setting.constants, start, tolerance)
-                return NativeEngine(library, setting.values, lambda: self._fixed(setting), tolerance)
+            library = self._library
+            if start is not None:
+                library.require_start(setting.values or self._written, setting.constants, start, tolerance)
+            return NativeEngine(library, setting.values, lambda: self._fixed(setting), tolerance)
         return PythonEngine(self._solver(setting.values, setting.constants if start is not None else None, tolerance))
 
     def _new_solver(self, values: Vector, starting: Vector | None, tolerance: float) -> Solver:
@@ -363,7 +441,7 @@ class Model:
         """Solve the mechanism as a file with these parameters would be."""
         changed = self.mechanism.with_parameters(given)
         run = Model(compile_plan(changed, self.outputs), self.engine).solve(t, **arguments)
-        note = Event(float(run.t[0]), "info", anew(reason)) if len(run.t) else None
+        note = Event(float(run.t[0]), "info", anew_note(reason)) if len(run.t) else None
         return run.replaced(events=(note, *run.events)) if note else run
 
 

@@ -28,6 +28,7 @@ def solve(
     engine: str = "auto",
     tolerance: float = TOLERANCE,
     wrap: bool = False,
+    anew: bool = True,
     out: Tables | None = None,
     **inputs: ArrayLike,
 ) -> Run:
@@ -41,13 +42,14 @@ def solve(
         mechanism: The mechanism, or its plan from `compile_plan`.
         t: (n,) times [s] for the laws of the file; default: those of the file's run, unless inputs are given.
         parameters: Values of parameters and law constants, such as {"crank_length": 0.2, "crank.speed": "30 rpm"}.
-            Other geometry is reached by continuation from the pose of the geometry as written; if that fails, the
-            mechanism is assembled anew, with an event of level "info".
+            Other geometry is reached by continuation from the pose of the geometry as written.
         outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
         engine: 'python'; 'native', generated C, compiled on first use and then cached; or 'auto', native if there are
             enough samples to pay for compiling and a compiler is found.
         tolerance: Residual relative to the size above which a sample is not ok; positive.
         wrap: Unwrap angles given as inputs: a jump from 2 pi to 0 goes on forwards. Without it such a jump turns back.
+        anew: If continuation does not reach the parameters, assemble the mechanism anew from its start poses, as a file
+            with these parameters is, with an event of level "info". False: that is an error.
         out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
         **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and crank_acceleration=,
             arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per unit of the driver. The
@@ -73,7 +75,7 @@ def solve(
         derived = [name for name, p in mechanism.parameters.items() if p.expression and name in set_ones]
         chosen = outputs if outputs is None or isinstance(outputs, str) else tuple(outputs)
         model = _model(mechanism, chosen, tuple(derived), engine)
-    return model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, out=out, **inputs)
+    return model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, out=out, **inputs)
 
 
 @lru_cache(maxsize=MODELS_KEPT)
