@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from kinfmu.sweep.designs import Designs
 from kinfmu.sweep.driving import run_times
 from kinfmu.sweep.model import Model, compile  # noqa: A004  as re.compile
 from kinfmu.sweep.solve import solve
 
-__all__ = ["Model", "compile", "run_times", "solve"]
+__all__ = ["Designs", "Model", "compile", "run_times", "solve"]
