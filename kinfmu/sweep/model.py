@@ -252,7 +252,7 @@ class Model:
             CompilerError: The engine is 'native' and no compiler is found, or it fails.
 
         """
-        require_tolerance(tolerance)
+        tolerance = read_tolerance("tolerance", tolerance)
         if derivatives not in (0, 1, 2):
             raise RequestError(f"derivatives = {derivatives!r} must be 0, 1 or 2")
         if not (isinstance(workers, int) and workers > 0):

@@ -66,7 +66,9 @@ def test_named_parameters_alone_stay_arguments() -> None:
         rtol=0,
         atol=1e-12,
     )
-    with pytest.raises(RequestError, match=r"parameter 'c' is a number of the model; compile\(mechanism, parameters="):
+    with pytest.raises(
+        RequestError, match=r"c is a number of the model; compile\(mechanism, parameters=\['c'\]\) makes it an argument"
+    ):
         model.solve(parameters={"c": 40.0})
 
 
@@ -74,7 +76,7 @@ def test_a_parameter_by_an_expression_can_be_an_argument_too() -> None:
     mechanism = leg()
     name = next(name for name, parameter in mechanism.parameters.items() if parameter.expression)
     value = float(mechanism.parameters[name].value) + 0.5
-    with pytest.raises(RequestError, match=f"parameter '{name}' is the expression"):
+    with pytest.raises(RequestError, match=f"{name} follows from '.*'; compile"):
         kinfmu.compile(mechanism).solve(parameters={name: value})
     own = kinfmu.compile(mechanism, parameters=[name]).solve([0.0, 0.3], parameters={name: value})
     np.testing.assert_allclose(
@@ -147,10 +149,10 @@ def test_a_wrong_request_is_refused_in_one_line(arguments: dict[str, Any], messa
 @pytest.mark.parametrize(
     ("values", "error", "message"),
     [
-        ({"aa": 1.0}, RequestError, "parameter 'aa' is not known; did you mean 'a'"),
+        ({"aa": 1.0}, RequestError, "there is no parameter 'aa'; did you mean 'a'"),
         ({"a": "1 rpm"}, MechanismError, "is an angular speed and must be a length"),
-        ({"a": float("nan")}, MechanismError, "must be a finite number"),
-        ({"crank.speed": "fast"}, MechanismError, "crank.speed"),
+        ({"a": float("nan")}, RequestError, "must be a finite number"),
+        ({"crank.speed": "fast"}, RequestError, "crank.speed = 'fast' must be a number"),
     ],
 )
 def test_wrong_parameters_are_refused_in_one_line(
