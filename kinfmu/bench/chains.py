@@ -7,7 +7,7 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 
-from kinfmu.bench.rounds import samples_in_turn
+from kinfmu.bench.rounds import samples_in_turn, spread, table
 from kinfmu.codegen.python import load_model
 from kinfmu.gallery.chains import fourbar_chain, open_chain
 from kinfmu.mechanism import Mechanism
@@ -23,17 +23,15 @@ FIRST_LOOP = ("bar_1.phi",)
 
 def run(rounds: int = ROUNDS) -> str:
     """A table: seconds to compile and microseconds a sample, for all outputs and for one output of the first loop."""
-    lines = [f"chain of four-bars, q, qd, qdd of all bodies, {rounds} rounds in turn; processor time"]
-    lines.append(f"{'loops':>6}{'compile, s':>12}{'us a sample':>13}{'min':>9}{'max':>9}{'us, first loop only':>21}")
     whole, compiled = zip(*(_ready(fourbar_chain(n)) for n in LOOPS), strict=True)
     first, _ = zip(*(_ready(fourbar_chain(n), FIRST_LOOP) for n in LOOPS), strict=True)
     times = samples_in_turn([*whole, *first], rounds, MOST)
-    for k, n in enumerate(LOOPS):
-        of_all, of_first = times[k], times[k + len(LOOPS)]
-        lines.append(
-            f"{n:6}{compiled[k]:12.2f}{statistics.median(of_all):13.2f}{min(of_all):9.2f}{max(of_all):9.2f}"
-            f"{statistics.median(of_first):21.2f}"
-        )
+    rows = [
+        [str(n), f"{seconds:.2f}", *spread(of_all).cells(2), f"{statistics.median(of_first):.2f}"]
+        for n, seconds, of_all, of_first in zip(LOOPS, compiled, times, times[len(LOOPS) :], strict=False)
+    ]
+    lines = [f"chain of four-bars, q, qd, qdd of all bodies, {rounds} rounds in turn; processor time"]
+    lines += table(("loops", "compile, s", "us a sample", "min", "max", "us, first loop only"), rows)
     grown = sorted(math.log(b / a) / math.log(LOOPS[3] / LOOPS[1]) for a, b in zip(times[1], times[3], strict=True))
     median, low, high = statistics.median(grown), grown[0], grown[-1]
     lines.append(

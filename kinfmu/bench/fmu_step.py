@@ -11,7 +11,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.bench.rounds import in_turn, spread, table
 from kinfmu.errors import FmuError
 from kinfmu.fmu.build import build
 from kinfmu.mechanism import Mechanism
@@ -30,13 +30,13 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
         with _stepper(ours, body, _fifteen(ours)) as step_ours, _stepper(toy, "u", None) as step_toy:
             seconds = in_turn([step_ours, step_toy], rounds, process_time)
     costs = [[value / STEPS * 1e6 for value in row] for row in seconds]
-    lines = [f"{'FMU step: set 1, step 1 deg, get 15':38}{'median':>9}{'quartiles':>18}"]
+    rows = []
     for name, measured in zip((mechanism.name, "toy (sin, cos)"), costs, strict=True):
         of = spread(measured)
-        lines.append(f"{name:38}{of.median:6.2f} us{of.lower:8.2f} to {of.upper:.2f} us")
+        rows.append((name, f"{of.median:.2f} us", f"{of.lower:.2f} to {of.upper:.2f} us"))
     ratio = spread([a / b for a, b in zip(*costs, strict=True)])
-    lines.append(f"{'ratio, round by round':38}{ratio.median:6.2f}   {ratio.lower:8.2f} to {ratio.upper:.2f}")
-    return "\n".join(lines)
+    rows.append(("ratio, round by round", f"{ratio.median:.2f}", f"{ratio.lower:.2f} to {ratio.upper:.2f}"))
+    return "\n".join(table(("FMU step: set 1, step 1 deg, get 15", "median", "quartiles"), rows))
 
 
 def _fifteen(fmu: Path) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import kinfmu
-from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.bench.rounds import in_turn, spread, table
 
 ROUNDS = 21
 STATEMENTS = ("pass", "import kinfmu")
@@ -18,11 +18,9 @@ def run(rounds: int = ROUNDS) -> str:
     """A table: milliseconds of a whole process, and of the differences round by round."""
     bare, ours = ([1e3 * value for value in seconds] for seconds in in_turn([_process(s) for s in STATEMENTS], rounds))
     differences = [b - a for a, b in zip(bare, ours, strict=True)]
-    lines = [f"whole process, {rounds} rounds in turn; ms{'':8}{'median':>9}{'min':>9}{'max':>9}"]
-    for name, measured in zip((*STATEMENTS, "difference"), (bare, ours, differences), strict=True):
-        of = spread(measured)
-        lines.append(f"{name:39}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}")
-    return "\n".join(lines)
+    measured = zip((*STATEMENTS, "difference"), (bare, ours, differences), strict=True)
+    rows = [[name, *spread(milliseconds).cells(1)] for name, milliseconds in measured]
+    return "\n".join(table((f"whole process, {rounds} rounds in turn; ms", "median", "min", "max"), rows))
 
 
 def _process(statement: str) -> Callable[[], object]:

@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.bench.logged_step import STEPS
-from kinfmu.bench.logged_step import table as logged_steps
-from kinfmu.bench.rounds import in_turn, spread
-from kinfmu.errors import MissingPackageError
+from kinfmu.bench.rounds import in_turn, spread, table
+from kinfmu.errors import CompilerError, MissingPackageError
+from kinfmu.fmu.build import FLAVOURS, build
+from kinfmu.fmu.simulate import simulate
 from kinfmu.gallery import load
-from kinfmu.log import read, write_mcap, write_rrd
+from kinfmu.log import McapLog, read, write_mcap, write_rrd
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.record import layout, tables
 from kinfmu.log.topics import sample_template
@@ -32,6 +32,8 @@ ROUNDS = 5
 SAMPLES = 1_000_000
 PLAIN_SAMPLES = 100_000  # of them for the package mcap: its time a row does not depend on their number
 TURNS = 0.5  # of the crank
+STEPS = 20_000  # of an FMU, in a round
+TURN = 360.0  # [s] that the crank of the FMU takes for a turn
 PER_DOUBLE, PER_ROW = 9.0, 20.0  # [bytes] that a file may take
 
 
@@ -57,17 +59,16 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str
         clock = in_turn(takes, rounds, perf_counter)
         sizes = [task.file.stat().st_size / task.rows for task in found]
     doubles = len(list(long_run.places()))
-    lines = [
-        f"{samples} samples of the four-bar, {doubles} columns of 8 bytes, {rounds} rounds in turn",
-        f"{'':40}{'million rows/s':>16}{'best':>7}{'processor':>13}{'mcap/this':>11}{'size':>14}",
-    ]
+    rows = []
     usual = spread([value / found[0].rows for value in processor[found[0].name][1:]]).median
     for task, seconds, size in zip(found, clock, sizes, strict=True):
         speed = spread([task.rows / value / 1e6 for value in seconds])
         busy = spread([value / task.rows for value in processor[task.name][1:]]).median  # the first round warms up
         share = "" if absent else f"{usual / busy:.1f}"
-        figures = f"{speed.median:16.2f}{speed.high:7.2f}{busy * 1e6:6.2f} us/row{share:>11}{size:8.1f} B/row"
-        lines.append(f"{task.name:40}{figures}")
+        cost = f"{busy * 1e6:.2f} us/row"
+        rows.append((task.name, f"{speed.median:.2f}", f"{speed.high:.2f}", cost, share, f"{size:.1f} B/row"))
+    lines = [f"{samples} samples of the four-bar, {doubles} columns of 8 bytes, {rounds} rounds in turn"]
+    lines += table(("", "million rows/s", "best", "processor", "mcap/this", "size"), rows)
     allowed = PER_DOUBLE * doubles + PER_ROW
     recorded, best = found[-1].rows, min(clock[-1])
     lines.append(f"a Rerun recording of {recorded} samples, its record read, takes {best:.2f} s at best")
@@ -136,3 +137,50 @@ def _plain(long_run: Run, file: Path) -> LogTask:
             writer.finish()
 
     return LogTask("the record by the package mcap", len(part), take, file)
+
+
+def logged_steps(rounds: int, steps: int = STEPS) -> list[str]:
+    """Return lines: processor time of a step of the four-bar's FMU, by flavour, without and with a record.
+
+    Loading the FMU does not count: time runs from the first sample to the end of `simulate`.
+    """
+    ways: dict[str, list[Callable[[], float]]] = {}
+    absent = []
+    with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as name:
+        folder = Path(name)
+        for flavour in FLAVOURS:
+            try:
+                fmu = build(load("fourbar"), folder / f"{flavour}.fmu", flavour=flavour, drive="time")
+            except CompilerError as error:
+                absent.append(f"native: {error}")
+                continue
+            ways[flavour] = [_alone(fmu, steps), _logged(fmu, steps, folder / "run.mcap")]
+        seconds = {flavour: [[way() for way in pair] for _ in range(rounds + 1)][1:] for flavour, pair in ways.items()}
+    rows = []
+    for flavour, measured in seconds.items():
+        costs = (spread([one / steps * 1e6 for one in column]) for column in zip(*measured, strict=True))
+        rows.append([flavour, *(f"{cost.median:.1f} us{f'best {cost.low:.1f}':>14}" for cost in costs)])
+    return table((f"{steps} steps of its FMU, all channels", "step alone", "logged step"), rows) + absent
+
+
+def _alone(fmu: Path, steps: int) -> Callable[[], float]:
+    """Return a function that steps an FMU, asks for no channel, and gives the processor time [s]."""
+    return lambda: _measured(fmu, steps, None)
+
+
+def _logged(fmu: Path, steps: int, record: Path) -> Callable[[], float]:
+    """The same with all channels, which are written to a record as `kinfmu simulate` does."""
+    return lambda: _measured(fmu, steps, McapLog(record))
+
+
+def _measured(fmu: Path, steps: int, record: McapLog | None) -> float:
+    start = 0.0
+
+    def after(done: int, _count: int) -> None:
+        nonlocal start
+        if done == 1:
+            start = process_time()
+
+    channels = None if record else ["none"]
+    simulate(fmu, start=0.0, stop=TURN, step=TURN / steps, channels=channels, sink=record, progress=after)
+    return process_time() - start

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
-from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.bench.rounds import in_turn, spread, table
 from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.build import build
@@ -32,9 +32,7 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
 
     In both versions of FMI, with their ratio and what it takes to instantiate the FMU.
     """
-    lines = [
-        f"{'native FMU step: set 1, step 1 deg, get 15':44}{'ours':>10}{'closed form':>14}{'ratio':>9}{'quartiles':>16}"
-    ]
+    rows = []
     for fmi in (2, 3):
         with tempfile.TemporaryDirectory(prefix="kinfmu_bench_", ignore_cleanup_errors=True) as folder:
             ours, instantiate = _ours(mechanism, fmi, Path(folder))
@@ -43,9 +41,10 @@ def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
         ratio = spread([a / b for a, b in zip(*ns, strict=True)])
         mine, other = (spread(row).median for row in ns)
         name = f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us"
-        figures = f"{mine:7.0f} ns{other:11.0f} ns{ratio.median:9.2f}{ratio.lower:8.2f} to {ratio.upper:.2f}"
-        lines.append(f"{name:44}{figures}")
-    return "\n".join(lines)
+        quartiles = f"{ratio.lower:.2f} to {ratio.upper:.2f}"
+        rows.append((name, f"{mine:.0f} ns", f"{other:.0f} ns", f"{ratio.median:.2f}", quartiles))
+    head = ("native FMU step: set 1, step 1 deg, get 15", "ours", "closed form", "ratio", "quartiles")
+    return "\n".join(table(head, rows))
 
 
 def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], None], float]:

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.bench.rounds import in_turn, spread, table
+from kinfmu.bench.singular_points import FOURBAR
 from kinfmu.codegen.c import compiler
 from kinfmu.errors import MissingPackageError
 from kinfmu.gallery import load
@@ -32,19 +33,18 @@ WHOLE = "crank-rocker, q, qd, qdd"
 ALONE = "the same, q alone"
 LOOP = "closed form in a loop, by numba"
 PYLINKAGE = "pylinkage, by numba: points, not angles"
-COORDINATES = ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
 
 
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     """A table: nanoseconds of processor time a sample, and how often the closed form's."""
     u = np.linspace(0.0, np.pi / 180.0 * samples, samples, endpoint=False)
     driven = (u[:, None].copy(), np.ones((samples, 1)), np.zeros((samples, 1)))
-    crank_rocker, fourbar = (Library(compile_plan(load(name), COORDINATES)) for name in ("crank_rocker", "fourbar"))
+    crank_rocker, fourbar = (Library(compile_plan(load(name), FOURBAR)) for name in ("crank_rocker", "fourbar"))
     columns = np.empty((15, samples))
     tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
     by_samples = [np.empty((samples, 5)) for _ in range(3)]
     result, fourbar_result = (compiled.sweep(driven, tables) for compiled in (crank_rocker, fourbar))
-    plan = compile_plan(load("crank_rocker"), COORDINATES)
+    plan = compile_plan(load("crank_rocker"), FOURBAR)
     ways: dict[str, Callable[[], object]] = {
         CLOSED: closed_form(u, columns),
         WHOLE: lambda: crank_rocker.sweep(driven, tables, reuse=result),
@@ -64,10 +64,9 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
         spread([value / samples * 1e9 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
     ]
+    rows = [[name, *of.cells(1), f"{of.median / times[0].median:.2f}"] for name, of in zip(ways, times, strict=True)]
     lines = [f"{samples} samples of 1 degree, {rounds} rounds in turn; ns of processor time a sample"]
-    lines.append(f"{'':44}{'median':>9}{'min':>9}{'max':>9}{'times closed form':>19}")
-    for name, of in zip(ways, times, strict=True):
-        lines.append(f"{name:44}{of.median:9.1f}{of.low:9.1f}{of.high:9.1f}{of.median / times[0].median:19.2f}")
+    lines += table(("", "median", "min", "max", "times closed form"), rows)
     medians = dict(zip(ways, (time.median for time in times), strict=True))
     lines.append(f"q alone takes {medians[ALONE] / medians[WHOLE]:.2f} of the time of q, qd, qdd")
     lines += [
@@ -77,7 +76,7 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
 
 
 def _allocated(samples: int) -> list[FloatArray]:
-    return [np.empty((samples, len(COORDINATES)), order="F") for _ in range(3)]
+    return [np.empty((samples, len(FOURBAR)), order="F") for _ in range(3)]
 
 
 def _chain(rounds: int, count: int) -> list[str]:
@@ -99,7 +98,7 @@ def _chain(rounds: int, count: int) -> list[str]:
 
 
 def closed_form(u: FloatArray, columns: FloatArray) -> Callable[[], object]:
-    """Fills columns (15, n): COORDINATES at u (n,), their rates and accelerations, by hand-written C at speed 1."""
+    """Fills columns (15, n): FOURBAR at u (n,), their rates and accelerations, by hand-written C at speed 1."""
     files = {"closed_form.c": Path(__file__).with_name("closed_form.c").read_text("utf-8")}
     library = compiler.load(files | compiler.sources(("sincos.h",)), FLAGS)
     ud, udd = np.ones(len(u)), np.zeros(len(u))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import statistics
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -21,11 +21,25 @@ class Spread(NamedTuple):
     lower: float
     upper: float
 
+    def cells(self, places: int) -> list[str]:
+        """Return median, smallest and largest as cells of a table."""
+        return [f"{value:.{places}f}" for value in (self.median, self.low, self.high)]
+
 
 def spread(measured: Sequence[float]) -> Spread:
     """Median, range and quartiles of at least one number."""
     lower, upper = statistics.quantiles(measured, n=4)[::2] if len(measured) > 1 else (measured[0], measured[0])
     return Spread(statistics.median(measured), min(measured), max(measured), lower, upper)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table: the first column to the left, the others to the right, as wide as their cells."""
+    lines = [head, *rows]
+    width, *widths = (max(map(len, column)) for column in zip(*lines, strict=True))
+    return [
+        "  ".join([name.ljust(width), *(cell.rjust(k) for cell, k in zip(cells, widths, strict=True))])
+        for name, *cells in lines
+    ]
 
 
 def in_turn(

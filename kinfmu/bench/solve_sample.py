@@ -7,8 +7,8 @@ from time import process_time
 
 import numpy as np
 
-from kinfmu.bench.exact_fourbar import closed_form
-from kinfmu.bench.rounds import in_turn, spread
+from kinfmu.bench.rounds import in_turn, spread, table
+from kinfmu.bench.singular_points import FOURBAR, parallelogram
 from kinfmu.codegen.python import load_model
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.reference import solve_reference
@@ -35,12 +35,12 @@ def run(rounds: int = ROUNDS) -> str:
         spread([value / len(u) * 1e6 for value in seconds])
         for seconds in in_turn(list(ways.values()), rounds, process_time)
     ]
-    lines = [f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds; processor time a sample [us], absolute errors"]
-    lines.append(f"{'':48}{'median':>9}{'min':>9}{'max':>9}{'times faster':>14}{'largest error':>15}")
-    for (name, way), of in zip(ways.items(), times, strict=True):
-        faster, error = base.median / of.median, _error(way())
-        lines.append(f"{name:48}{of.median:9.2f}{of.low:9.2f}{of.high:9.2f}{faster:14.1f}{error:15.1e}")
-    return "\n".join(lines)
+    rows = [
+        [name, *of.cells(2), f"{base.median / of.median:.1f}", f"{_error(way(), u):.1e}"]
+        for (name, way), of in zip(ways.items(), times, strict=True)
+    ]
+    title = f"four-bar, {len(u)} samples of 1 degree, {rounds} rounds; processor time a sample [us], absolute errors"
+    return "\n".join([title, *table(("", "median", "min", "max", "times faster", "largest error"), rows)])
 
 
 Results = tuple[FloatArray, FloatArray, FloatArray]
@@ -49,9 +49,7 @@ Results = tuple[FloatArray, FloatArray, FloatArray]
 def _reference(u: FloatArray) -> Callable[[], Results]:
     system = System(load("fourbar"))
     kept = [*find_redundancy(system).kept, system.joint_row_count]
-    five = [
-        system.coordinates.index(name) for name in ("crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi")
-    ]
+    five = [system.coordinates.index(name) for name in FOURBAR]
     q0 = np.array([0, 0, u[0], 1 + np.cos(u[0]), np.sin(u[0]), 0, 1, 0, u[0]])
 
     def way() -> Results:
@@ -68,9 +66,7 @@ def _reference(u: FloatArray) -> Callable[[], Results]:
 
 def _engine(u: FloatArray) -> Callable[[], Results]:
     mechanism = load("fourbar")
-    solver = Solver(
-        load_model(compile_plan(mechanism, ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]))
-    )
+    solver = Solver(load_model(compile_plan(mechanism, FOURBAR)))
 
     def way() -> Results:
         pose, rows = solver.anchor, []
@@ -99,9 +95,6 @@ def _stacked(rows: Sequence[tuple[object, ...]]) -> Results:
     return q, qd, qdd
 
 
-def _error(results: Results) -> float:
-    """Largest difference from the closed form in q, qd and qdd at a crank speed of 1 rad/s."""
-    w = np.pi / 180.0
-    q, qd, qdd = closed_form(DEGREES)
-    exact = (q, qd / w, qdd / w**2)
-    return max(float(np.abs(ours - theirs).max()) for ours, theirs in zip(results, exact, strict=True))
+def _error(results: Results, u: FloatArray) -> float:
+    """Return the largest difference from the closed form in q, qd and qdd at a crank speed of 1 rad/s."""
+    return max(float(np.abs(ours - exact).max()) for ours, exact in zip(results, parallelogram(u), strict=True))

@@ -23,9 +23,8 @@ from kinfmu.bench.engines import (
     READABLE,
     SHIPPED,
 )
-from kinfmu.bench.exact_fourbar import exact_fourbar
 from kinfmu.bench.pictures import LOOKS
-from kinfmu.bench.singular_points import POINTS
+from kinfmu.bench.singular_points import POINTS, exact_fourbar
 from kinfmu.equations.reference import solve_reference
 from kinfmu.errors import CompilerError, MissingPackageError
 from tests.oracle import follow, fourbar, largest_error, reference_fourbar, slider_crank
