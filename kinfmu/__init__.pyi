@@ -2,6 +2,7 @@
 
 from kinfmu import draw as draw
 from kinfmu import log as log
+from kinfmu import readings as readings
 from kinfmu.analysis import Report as Report
 from kinfmu.analysis import check as check
 from kinfmu.drivers import AngleDriver as AngleDriver
@@ -52,6 +53,8 @@ from kinfmu.mechanism import Parameter as Parameter
 from kinfmu.mechanism import Point as Point
 from kinfmu.mechanism import RunSettings as RunSettings
 from kinfmu.mechanism import Start as Start
+from kinfmu.motion import MeasuredValue as MeasuredValue
+from kinfmu.motion import measure as measure
 from kinfmu.run import Run as Run
 from kinfmu.run import Sink as Sink
 from kinfmu.solver.python.status import Status as Status

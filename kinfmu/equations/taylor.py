@@ -22,10 +22,13 @@ class Taylor:
         (f g)'' = f'' g + 2 f' g' + f g'',   h(f)'' = h''(f) f'^2 + h'(f) f''
 
     The joints' own formulas run on these numbers: with unit vectors as f' they give the Jacobian, with the velocities
-    they give nu and gamma. No formula is differentiated by hand, none by finite differences.
+    they give nu and gamma. No formula is differentiated by hand, none by finite differences. `f` may be an array too:
+    the quantities of a motion at all its samples.
     """
 
-    f: float
+    __array_ufunc__ = None  # so that an array on the left of an operator leaves it to this class
+
+    f: Any  # float, or an array
     d1: Derivative = 0.0
     d2: Derivative = 0.0
 
@@ -61,30 +64,35 @@ class Taylor:
 
 
 def _lifted(x: Taylor | float) -> Taylor:
-    return x if isinstance(x, Taylor) else Taylor(float(x))
+    return x if isinstance(x, Taylor) else Taylor(x if isinstance(x, np.ndarray) else float(x))
 
 
-def _chain(x: Taylor, h: float, h1: float, h2: float) -> Taylor:
+def _plain(x: Any) -> Any:
+    """Return a scalar of numpy as a float, with which Python computes faster; arrays stay arrays."""
+    return x if x.ndim else float(x)
+
+
+def _chain(x: Taylor, h: Any, h1: Any, h2: Any) -> Taylor:
     """Return h(x) from the value and the two derivatives of h at x.f."""
     return Taylor(h, h1 * x.d1, h2 * x.d1 * x.d1 + h1 * x.d2)
 
 
 @sin.register
 def _(x: Taylor) -> Taylor:
-    s, c = float(np.sin(x.f)), float(np.cos(x.f))
+    s, c = _plain(np.sin(x.f)), _plain(np.cos(x.f))
     return _chain(x, s, c, -s)
 
 
 @cos.register
 def _(x: Taylor) -> Taylor:
-    s, c = float(np.sin(x.f)), float(np.cos(x.f))
+    s, c = _plain(np.sin(x.f)), _plain(np.cos(x.f))
     return _chain(x, c, -s, -c)
 
 
 @sqrt.register
 def _(x: Taylor) -> Taylor:
-    root = float(np.sqrt(x.f))
-    slope = 0.5 / (root or _NOTHING)
+    root = _plain(np.sqrt(x.f))
+    slope = 0.5 / (np.where(root == 0.0, _NOTHING, root) if isinstance(root, np.ndarray) else root or _NOTHING)
     return _chain(x, root, slope, -2.0 * slope * slope * slope)
 
 

@@ -14,7 +14,9 @@ from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.members import path_text
 from kinfmu.mechanism.valid import check_line, check_name, quoted
-from kinfmu.units import METRES
+from kinfmu.readings import Reading
+from kinfmu.readings.extremes import PeakAcceleration, PeakSpeed
+from kinfmu.units import METRES, CoordinateName
 
 if TYPE_CHECKING:
     from kinfmu.mechanism.mechanism import Mechanism
@@ -35,10 +37,11 @@ def check_names_and_unit(mechanism: Mechanism) -> None:
     if len(mechanism.bodies) > MOST_BODIES:
         raise MechanismError(f"[bodies] holds {len(mechanism.bodies)} bodies; {MOST_BODIES} at most")
     check_line("title", mechanism.title)
-    tables: dict[str, Iterable[Body | Joint | Driver]] = {
+    tables: dict[str, Iterable[Body | Joint | Driver | Reading]] = {
         "bodies": mechanism.bodies,
         "joints": mechanism.joints,
         "drivers": mechanism.drivers,
+        "measures": mechanism.measures,
     }
     for table, members in tables.items():
         _check_names(table, [member.name for member in members])
@@ -79,6 +82,38 @@ def check_members(mechanism: Mechanism) -> None:
                 )
         if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
             raise MechanismError("[outputs] coordinates names a coordinate twice")
+    for reading in mechanism.measures:
+        _check_reading(mechanism, bodies, reading)
+
+
+def coordinate_orders(mechanism: Mechanism) -> dict[str, tuple[CoordinateName, int]]:
+    """Return each coordinate of a body or of a point of interest, and its rates, with the coordinate and the order."""
+    points = [CoordinateName(name, axis) for name in mechanism.points for axis in ("x", "y")]
+    return {
+        name.derivative(order): (name, order) for name in (*mechanism.coordinate_names, *points) for order in range(3)
+    }
+
+
+def _check_reading(mechanism: Mechanism, bodies: Bodies, reading: Reading) -> None:
+    """Raise a MechanismError for a measure with an invalid reference or value."""
+    where = f"[measures.{reading.name}] "
+    _check_fields(bodies, where, reading)
+    known: dict[str, Any] = {}
+    for key in keys_of(type(reading)):
+        value = getattr(reading, key.name)
+        is_measured = key.takes == "measured" or (key.refers is not None and key.refers.kind == "coordinate")
+        if not is_measured or value is None or isinstance(value, Measure):
+            continue
+        known = known or coordinate_orders(mechanism)
+        if not isinstance(value, str):
+            raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
+        is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in mechanism.body_points
+        if value not in known and not is_point:
+            raise MechanismError(
+                f"{where}{key.name}: {quoted(value)} is not a coordinate of this mechanism{suggestion(value, known)}; "
+                f"coordinates: {listed(name for name, (_, order) in known.items() if not order)}"
+            )
+    reading.check()
 
 
 def _check_names(table: str, names: Iterable[str]) -> None:
@@ -107,7 +142,7 @@ def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
-def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure) -> None:
+def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure | Reading) -> None:
     """Check the references in its fields; messages put `before` in front of the key."""
     for key in keys_of(type(member)):
         where, value = f"{before}{key.name}", getattr(member, key.name)
@@ -142,7 +177,7 @@ def _check_reference(bodies: Bodies, where: str, value: Any, reference: Referenc
             _check_point(bodies, where, one)
         elif reference.kind == "body":
             _check_body(bodies, where, one)
-        elif one not in reference.choices:
+        elif reference.kind == "choice" and one not in reference.choices:
             raise MechanismError(f"{where} = {quoted(one)} must be one of {listed(reference.choices)}")
 
 

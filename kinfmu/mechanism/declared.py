@@ -17,12 +17,13 @@ from kinfmu.measures import Measure
 from kinfmu.measures.placement import Reference
 from kinfmu.units import Quantity
 
-Takes = Literal["number", "text", "pair", "truth", "numbers", "points", "segments", "measure", "law"]
+Takes = Literal["number", "text", "pair", "truth", "numbers", "points", "segments", "measure", "measured", "law"]
 REQUIRED = MISSING
 _PLAIN: dict[Any, Takes] = {
     bool: "truth",
     Law: "law",
     Measure: "measure",
+    str | Measure: "measured",
     tuple[float, ...]: "numbers",
     tuple[tuple[float, float], ...]: "points",
     tuple[Segment, ...]: "segments",

@@ -19,6 +19,7 @@ from kinfmu.mechanism.members import Members, NumberPath
 from kinfmu.mechanism.parameters import Parameter, parameter_values
 from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
+from kinfmu.readings import Reading
 from kinfmu.units import CoordinateName, Quantity
 
 COORDINATES = ("x", "y", "phi")
@@ -43,6 +44,7 @@ class Mechanism:
         length_unit: Unit of all lengths. Default: 'm'.
         title: One line for people.
         parameters: Parameters by name, also as plain numbers or text ("40 mm", "2*a"). Default: none.
+        measures: What `check` and `measure` read off a motion, such as a stroke. Default: none.
 
     Attributes:
         expressions: The expressions of computed numbers, by path (see `NumberPath`).
@@ -62,10 +64,11 @@ class Mechanism:
     length_unit: str = "m"
     title: str = ""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    measures: tuple[Reading, ...] = ()
     expressions: Mapping[NumberPath, Expression] = field(init=False)
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers"):
+        for key in ("bodies", "joints", "drivers", "measures"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         if not isinstance(self.coordinates, str):
             object.__setattr__(self, "coordinates", tuple(self.coordinates))
@@ -74,7 +77,7 @@ class Mechanism:
         object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
         check_names_and_unit(self)
         members, parameters, expressions = resolve(self.members, self.parameters, self.length_unit)
-        for key in ("bodies", "joints", "drivers", "run"):
+        for key in ("bodies", "joints", "drivers", "run", "measures"):
             object.__setattr__(self, key, getattr(members, key))
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "expressions", MappingProxyType(expressions))
@@ -118,8 +121,8 @@ class Mechanism:
 
     @property
     def members(self) -> Members:
-        """Bodies, joints, drivers and run, with their numbers."""
-        return Members(self.bodies, self.joints, self.drivers, self.run)
+        """Bodies, joints, drivers, run and measures, with their numbers."""
+        return Members(self.bodies, self.joints, self.drivers, self.run, self.measures)
 
     def with_expressions(self) -> Members:
         """Return the members with expressions as they were written, instead of their numbers."""
@@ -136,7 +139,7 @@ class Mechanism:
         known = parameter_values(self.parameters, values)
 
         def computed(place: NumberPath, value: Any, _: Quantity) -> Any:
-            is_open = isinstance(value, Computed) and place[0] != "run"  # the run does not move with the geometry
+            is_open = isinstance(value, Computed) and place[0] not in ("run", "measures")  # not of the geometry
             return value.expression.value(known) if is_open else value
 
         return self.members.changed(computed)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
-from kinfmu.laws import Law
+from kinfmu.laws import Law, LawQuantity
 from kinfmu.measures import Measure
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.declared import keys_of
+from kinfmu.readings import Reading
 from kinfmu.units import Quantity
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
 ("joints", joint, key), ("drivers", driver, key), ("joints", joint, measure, key), ("run", key), and of a law
-("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1)."""
+("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1), and
+("measures", measure, key), ("measures", measure, "targets", number, 0 or 1)."""
 
 Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
@@ -37,11 +39,17 @@ class Members:
     joints: tuple[Joint, ...]
     drivers: tuple[Driver, ...]
     run: RunSettings
+    measures: tuple[Reading, ...] = ()
 
     @property
     def body_points(self) -> dict[str, tuple[Value, Value]]:
         """Body-fixed coordinates of every point, by 'body.point'."""
         return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
+
+    @property
+    def driver_kind(self) -> str:
+        """What the value of the driver is, of which measures choose a part: time where several drivers move."""
+        return self.drivers[0].quantity.kind if len(self.drivers) == 1 else "time"
 
     def changed(self, change: Change) -> Members:
         """Return the members with each number replaced by change(path, value, quantity); equal parts stay identical."""
@@ -51,6 +59,7 @@ class Members:
             tuple(_member(joint, ("joints", joint.name), change) for joint in self.joints),
             tuple(_member(driver, ("drivers", driver.name), change) for driver in self.drivers),
             _replaced(self.run, run),
+            tuple(_reading(reading, self.driver_kind, change) for reading in self.measures),
         )
 
 
@@ -90,6 +99,32 @@ def _member(member: Any, place: NumberPath, change: Change) -> Any:
         elif isinstance(part, Measure):
             values[key.name] = _member(part, (*place, key.name), change)
     return _replaced(member, values)
+
+
+def _reading(reading: Reading, driver_kind: str, change: Change) -> Reading:
+    """Return a measure with changed numbers; those of its quantity's and its driver's kinds come after the others."""
+    place: NumberPath = ("measures", reading.name)
+    values = {}
+    for key in keys_of(type(reading)):
+        part = getattr(reading, key.name)
+        if isinstance(key.measures, LawQuantity) and part is not None:
+            quantity = key.measures.quantity(kind_of_measured(getattr(reading, "of", "")), driver_kind)
+            values[key.name] = change((*place, key.name), part, quantity)
+        elif key.takes == "points":
+            new = tuple(
+                tuple(change((*place, key.name, k, axis), point[axis], LENGTH) for axis in (0, 1))
+                for k, point in enumerate(part)
+            )
+            is_same = all(map(is_, (one for point in new for one in point), (one for point in part for one in point)))
+            values[key.name] = part if is_same else new
+    return _member(_replaced(reading, values), place, change)  # type: ignore[no-any-return]  # of the same class
+
+
+def kind_of_measured(of: object) -> str:
+    """Return 'length' or 'angle': what a measured quantity is, a coordinate by its name or a Measure."""
+    if isinstance(of, Measure):
+        return of.kind
+    return "angle" if isinstance(of, str) and of.rpartition(".")[2] in ("phi", "omega", "alpha") else "length"
 
 
 def _law(law: Law, kinds: tuple[str, str], place: NumberPath, change: Change) -> Law:

@@ -28,7 +28,7 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     """Replace texts with units and expressions by numbers, and list the expressions.
 
     Args:
-        members: Bodies, joints, drivers and run as written.
+        members: Bodies, joints, drivers, run and measures as written.
         given: Parameters as written.
         unit: Unit of length.
 

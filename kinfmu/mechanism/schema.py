@@ -19,12 +19,13 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST
 from kinfmu.mechanism.toml_tables import table_keys
+from kinfmu.readings import READINGS
 from kinfmu.units import METRES, Quantity
 
 Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"  # the newest that editors of TOML agree on
 NAME = "^[A-Za-z_][A-Za-z0-9_]{0,99}$"
-_REFERRED = {"point": "point", "body": "name"}  # definitions by what a reference refers to
+_REFERRED = {"point": "point", "body": "name", "coordinate": "point"}  # definitions by what a reference refers to
 _EXAMPLES = {"length": "25 mm", "angle": "60 deg", "time": "10 ms", "number": "z_1/z_2"}
 
 
@@ -62,6 +63,7 @@ def schema() -> Schema:
             "additionalProperties": _ref("point"),
             **names,
         },
+        "measures": _named("reading", "What `kinfmu check` reads off a motion, such as a stroke", **names),
         "outputs": _table(
             {
                 "coordinates": {
@@ -101,6 +103,8 @@ def _definitions() -> Schema:
         "segment": _segment(),
         **{f"law_{law.type}": _law(law) for law in LAWS},
         "measure": {"oneOf": [_member(cls, (), "measure") for cls in MEASURES]},
+        "measured": {"anyOf": [_ref("point"), _ref("measure")]},
+        "reading": {"oneOf": [_member(cls, ()) for cls in READINGS]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},
         "driver": {"oneOf": [_member(cls, LAWS) for cls in DRIVERS]},
     }
@@ -193,6 +197,7 @@ def _value(key: Key) -> Schema:
         "points": _list(_ref("xy"), 2),
         "segments": _list(_ref("segment"), 1),
         "measure": _ref("measure"),
+        "measured": _ref("measured"),
     }
     default = {} if key.default in (REQUIRED, None) else {"default": key.default}
     shape = shapes[key.takes]

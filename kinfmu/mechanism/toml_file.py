@@ -29,6 +29,7 @@ from kinfmu.mechanism.toml_tables import (
     text_of,
 )
 from kinfmu.mechanism.valid import check_name, quoted
+from kinfmu.readings import READINGS
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
@@ -44,7 +45,19 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _SEGMENT = ("law", "rise", "duration")
-_TABLES = ("name", "title", "units", "parameters", "run", "bodies", "joints", "drivers", "points", "outputs")
+_TABLES = (
+    "name",
+    "title",
+    "units",
+    "parameters",
+    "run",
+    "bodies",
+    "joints",
+    "drivers",
+    "points",
+    "outputs",
+    "measures",
+)
 
 
 def read(path: str | Path) -> Mechanism:
@@ -138,6 +151,10 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
         coordinates=coordinates,
         parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
         run=_run(table_of(document, "run")),
+        measures=tuple(
+            _member(f"[measures.{name}]", name, reading, READINGS, (), folder)
+            for name, reading in named_tables(document, "measures")
+        ),
     )
 
 
@@ -159,7 +176,7 @@ def _member(
     laws: Iterable[type[Law]],
     folder: Path | None,
 ) -> Any:
-    """Return a joint or driver; the keys of its law, if it has one, are in the same table."""
+    """Return a joint, driver or measure; the keys of its law, if it has one, are in the same table."""
     cls = class_of_type(where, table, "type", classes)
     keys = table_keys(cls)
     values: dict[str, Any] = {}
@@ -198,7 +215,7 @@ def _value(where: str, value: Any, takes: Takes) -> Any:
         return text_of(where, value)
     if takes == "truth" and not isinstance(value, bool):
         raise MechanismError(f"{where} = {quoted(value)} must be true or false")
-    if takes == "measure":
+    if takes == "measure" or (takes == "measured" and not isinstance(value, str)):
         return _measure(where, value)
     if takes == "segments":
         return _segments(where, value)

@@ -39,11 +39,13 @@ def text(mechanism: Mechanism) -> str:
     if mechanism.points:
         lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
     lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]
+    for reading in mechanism.measures:
+        lines += ["", f"[measures.{reading.name}]", f"type = {_toml(reading.type)}", *_keys(reading)]
     return "\n".join(lines) + "\n"
 
 
 def _keys(member: Any) -> Iterator[str]:
-    """Yield the lines of a joint, a driver or its law."""
+    """Yield the lines of a joint, a driver or its law, or a measure."""
     cls: object = type(member)  # object: mypy does not take type[Any] for hashable
     for key in keys_of(cls):
         value = getattr(member, key.name)
@@ -56,7 +58,7 @@ def _keys(member: Any) -> Iterator[str]:
                 of_rise = f"rise = {_toml(rise)}, " if law != DWELL else ""
                 yield f"    {{ law = {_toml(law)}, {of_rise}duration = {_toml(duration)} }},"
             yield "]"
-        else:
+        elif value is not None:
             yield f"{key.name} = {_toml(value)}"
 
 

@@ -49,13 +49,13 @@ CHANGES = {
         "[joints.O]",
         "[joint.O]",
         "[joint]: unknown key; did you mean 'joints'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
     ),
     "a key of the file that is not known": (
         "title =",
         "tittle =",
         "tittle: unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
     ),
     "a key of a joint that is not known": (
         "length = 1\n",
@@ -313,7 +313,7 @@ CHANGES = {
         "title =",
         r'"tit\nle" =',
         r"'tit\nle': unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
     ),
     "a title with a line break": (
         'title = "Four-bar',

@@ -1,0 +1,9 @@
+"""Motion: the arithmetic of what designers read off a motion, on arrays of samples and of designs."""
+
+from __future__ import annotations
+
+from kinfmu.motion.measure import MeasuredValue, measure
+from kinfmu.motion.motion import Motion
+from kinfmu.motion.track import Extreme, Track
+
+__all__ = ["Extreme", "MeasuredValue", "Motion", "Track", "measure"]

@@ -1,0 +1,211 @@
+"""The line and the circle from which a path deviates least: the largest distance is as small as possible.
+
+The best one touches the path at p + 1 points with equal distances of both signs (p: its parameters). Among the samples
+these points are found by exchange (the dual simplex method for the linearized distance), between the samples by Newton.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.equations.taylor import Taylor
+from kinfmu.measures.arithmetic import sqrt
+from kinfmu.motion.track import FloatArray, IntArray, Track
+
+_ROUNDS = 5  # of linearizing and exchanging; the line and the circle need two or three
+_EXCHANGES = 60  # per round; each makes the smallest possible distance larger
+_POLISHES = 12
+_NEAR = 0.05  # [rad] from the direction that fits the samples, in which a better one is searched
+_SECTIONS = 40  # each leaves 0.62 of the range; the deviation changes with the square of what is left
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_EQUAL = 1e-14  # of the size of the path; distances closer than this are equal
+
+
+class Shape(ABC):
+    """A line or a circle for each design, with parameters (..., p)."""
+
+    parameters: FloatArray
+
+    @abstractmethod
+    def distance(self, x: Any, y: Any) -> Any:
+        """Return the distance of points (..., n) with its sign; also of tracks, as Taylor numbers."""
+
+    @abstractmethod
+    def basis(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return (..., n, p): the change of the distance per change of the parameters, times -1."""
+
+
+class Line(Shape):
+    """A line n.(x, y) = o with n = (-sin theta, cos theta); parameters o and theta."""
+
+    def __init__(self, x: FloatArray, y: FloatArray) -> None:
+        dx, dy = x - x.mean(-1, keepdims=True), y - y.mean(-1, keepdims=True)
+        theta = 0.5 * np.arctan2(2.0 * (dx * dy).sum(-1), (dx * dx - dy * dy).sum(-1))  # of least squares
+        offset = np.cos(theta) * y.mean(-1) - np.sin(theta) * x.mean(-1)
+        self.parameters = np.stack([offset, theta], axis=-1)
+
+    def distance(self, x: Any, y: Any) -> Any:
+        offset, theta = self.parameters[..., :1], self.parameters[..., 1:]
+        return np.cos(theta) * y - np.sin(theta) * x - offset
+
+    def basis(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        theta = self.parameters[..., 1:]
+        return np.stack([np.ones_like(x), np.cos(theta) * x + np.sin(theta) * y], axis=-1)
+
+
+class Circle(Shape):
+    """A circle; parameters radius and centre."""
+
+    def __init__(self, x: FloatArray, y: FloatArray) -> None:
+        rows = np.stack([np.ones_like(x), x, y], axis=-1)  # x^2 + y^2 = c + 2 a x + 2 b y, least squares
+        c, a, b = np.moveaxis(np.linalg.pinv(rows) @ (x * x + y * y)[..., None], -2, 0)[..., 0]
+        a, b = 0.5 * a, 0.5 * b
+        self.parameters = np.stack([np.sqrt(np.maximum(c + a * a + b * b, 0.0)), a, b], axis=-1)
+
+    def distance(self, x: Any, y: Any) -> Any:
+        radius, a, b = (self.parameters[..., k : k + 1] for k in range(3))
+        return _length(x - a, y - b) - radius
+
+    def basis(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        _, a, b = (self.parameters[..., k : k + 1] for k in range(3))
+        angle = np.arctan2(y - b, x - a)
+        return np.stack([np.ones_like(x), np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def deviation(x: Track, y: Track, shape: type[Line] | type[Circle]) -> FloatArray:
+    """Return the largest distance of a path from the line or circle for which it is smallest.
+
+    Args:
+        x: World coordinate x of the path, (..., n).
+        y: World coordinate y.
+        shape: Line or Circle.
+
+    Returns:
+        (...) the distances; NaN for designs with unknown samples.
+
+    """
+    leading = x.value.shape[:-1]
+    known = (x.is_known & y.is_known).reshape(-1)
+    x, y = (_flat(track, known) for track in (x, y))
+    middle = [t.value.mean(-1, keepdims=True) for t in (x, y)]  # small numbers keep more digits
+    x, y = (Track.of(t, t.taylor - m) for t, m in zip((x, y), middle, strict=True))
+    size = np.maximum(np.ptp(x.value, axis=-1), np.ptp(y.value, axis=-1))
+    best = shape(x.value, y.value)
+    contacts = _exchange(best, x.value, y.value, size)
+    fitted = best.parameters
+    found = _largest(best, x, y)
+    candidates = [_polished(best, x, y, contacts)]
+    if isinstance(best, Line):
+        candidates.append(_turned(fitted, x, y, contacts))
+    for candidate in candidates:
+        best.parameters = candidate
+        found = np.fmin(found, _largest(best, x, y))
+    return np.where(known, found, np.nan).reshape(leading)
+
+
+def _largest(shape: Shape, x: Track, y: Track) -> FloatArray:
+    return Track.of(x, shape.distance(x.taylor, y.taylor)).largest_size().value
+
+
+def _flat(track: Track, known: NDArray[np.bool_]) -> Track:
+    """Return a track with one axis of designs, and zeros for designs with unknown samples."""
+    value, rate, acceleration = (np.where(known[:, None], row.reshape(-1, len(track.x)), 0.0) for row in track.rows)
+    return Track(track.x, value, rate, acceleration)
+
+
+def _length(x: Any, y: Any) -> Any:
+    squared = x * x + y * y
+    return sqrt(squared) if isinstance(squared, Taylor) else np.sqrt(squared)
+
+
+def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> IntArray:
+    """Fit the shape to the samples and return the numbers of those at the largest distance, (designs, p + 1)."""
+    count = shape.parameters.shape[-1] + 1
+    n = x.shape[-1]
+    contacts = np.tile(np.arange(count) * (n - 1) // count, (len(x), 1))
+    for _ in range(_ROUNDS):
+        errors, basis = shape.distance(x, y), shape.basis(x, y)
+        for _ in range(_EXCHANGES):
+            at, e = _rows(basis, contacts), np.take_along_axis(errors, contacts, 1)
+            weights = np.linalg.svd(np.swapaxes(at, 1, 2))[2][:, -1]  # (designs, count): sum of weight times row is 0
+            step, level, signs = _level(at, e, np.where(weights < 0.0, -1.0, 1.0))
+            left = errors - (basis @ step[..., None])[..., 0]
+            entering = np.argmax(np.abs(left), axis=1)
+            worst = np.take_along_axis(left, entering[:, None], 1)[:, 0]
+            grows = np.abs(worst) > level + _EQUAL * size
+            if not grows.any():
+                break
+            signed = np.concatenate([at * signs[..., None], np.ones((*contacts.shape, 1))], axis=-1)
+            row = np.where(worst < 0.0, -1.0, 1.0)[:, None] * _rows(basis, entering[:, None])[:, 0]
+            of_row = np.concatenate([row, np.ones((len(x), 1))], axis=-1)
+            d = (np.linalg.pinv(np.swapaxes(signed, 1, 2)) @ of_row[..., None])[..., 0]
+            shares = np.where(d > 0.0, np.abs(weights) / np.where(d > 0.0, d, 1.0), np.inf)
+            leaving = np.argmin(shares, axis=1)
+            contacts[grows, leaving[grows]] = entering[grows]
+        shape.parameters = shape.parameters + step
+        if np.all(np.abs(step).max(axis=-1) <= _EQUAL * (1.0 + size)):
+            break
+    return contacts
+
+
+def _polished(shape: Shape, x: Track, y: Track, contacts: IntArray) -> FloatArray:
+    """Return the parameters with contacts between the samples: extremes of the distance nearest to the samples."""
+    at = x.x[contacts]
+    low = x.x[np.maximum(contacts - 1, 0)]
+    high = x.x[np.minimum(contacts + 1, len(x.x) - 1)]
+    for _ in range(_POLISHES):
+        px, py = (Taylor(*t.at(at)) for t in (x, y))
+        e = shape.distance(px, py)
+        is_peak = e.f * e.d2 < 0.0  # elsewhere, as at an end of the path, the distance grows up to the bound
+        uphill = np.where(e.f * e.d1 < 0.0, low, high)
+        at = np.where(is_peak, np.clip(at - e.d1 / np.where(is_peak, e.d2, 1.0), low, high), uphill)
+        p_x, p_y = (t.at(at)[0] for t in (x, y))
+        basis = shape.basis(p_x, p_y)
+        weights = np.linalg.svd(np.swapaxes(basis, 1, 2))[2][:, -1]
+        step, _, _ = _level(basis, shape.distance(p_x, p_y), np.where(weights < 0.0, -1.0, 1.0))
+        shape.parameters = shape.parameters + step
+    return shape.parameters
+
+
+def _turned(fitted: FloatArray, x: Track, y: Track, contacts: IntArray) -> FloatArray:
+    """Return the lines whose deviation is smallest among directions near the fitted ones, by golden sections.
+
+    The strip around an oval touches it at two points only: two of the three contacts are neighbours. Elsewhere the
+    fitted lines are returned.
+    """
+    is_double = np.diff(np.sort(contacts, axis=1), axis=1).min(axis=1) <= 1
+    parameters = fitted.copy()
+    if not is_double.any():
+        return parameters
+    x, y = (Track(t.x, t.value[is_double], t.rate[is_double], t.acceleration[is_double]) for t in (x, y))
+
+    def strip(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the half width of the strip at an angle, and its offset."""
+        across = Track.of(x, np.cos(theta)[:, None] * y.taylor - np.sin(theta)[:, None] * x.taylor)
+        high, low = across.maximum().value, across.minimum().value
+        return 0.5 * (high - low), 0.5 * (high + low)
+
+    low, high = (fitted[is_double, 1] + side * _NEAR for side in (-1.0, 1.0))
+    for _ in range(_SECTIONS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        is_left = strip(left)[0] < strip(right)[0]
+        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+    theta = 0.5 * (low + high)
+    parameters[is_double] = np.stack([strip(theta)[1], theta], axis=-1)
+    return parameters
+
+
+def _level(basis: FloatArray, errors: FloatArray, signs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the step of the parameters that makes the errors equal but for these signs, their size, and the signs."""
+    rows = np.concatenate([basis, signs[..., None]], axis=-1)
+    solution = (np.linalg.pinv(rows) @ errors[..., None])[..., 0]
+    level = solution[:, -1]
+    return solution[:, :-1], np.abs(level), np.where(level[:, None] < 0.0, -signs, signs)
+
+
+def _rows(basis: FloatArray, places: IntArray) -> FloatArray:
+    return np.take_along_axis(basis, places[..., None], 1)

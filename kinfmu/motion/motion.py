@@ -1,0 +1,355 @@
+"""Motion: the coordinates of a mechanism over time or over a driver's value, in the words of readings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from kinfmu.equations.taylor import Taylor
+from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.measures import Measure
+from kinfmu.measures.arithmetic import Value, sqrt
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.checks import coordinate_orders
+from kinfmu.mechanism.members import kind_of_measured
+from kinfmu.motion.fitting import Circle, Line, deviation
+from kinfmu.motion.track import FEWEST, FloatArray, Track
+from kinfmu.run import Run
+from kinfmu.run.axis import TIME, axis_of, rates_per
+from kinfmu.solver.python.status import Status
+from kinfmu.units import CoordinateName, Quantity
+
+SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
+_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
+_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
+Vector = tuple[Taylor, Taylor]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion of a mechanism, for one design or for many.
+
+    Attributes:
+        mechanism: The mechanism; of many designs the one they vary.
+        x: (n,) ascending arguments: time, or values of the driver; rates are derivatives by them.
+        per: What x is: 'time', 'angle' or 'length'.
+        tables: Values, rates and accelerations of the outputs, each (..., n, m).
+        outputs: Names of the m outputs.
+        fixed: Coordinates that a joint holds at a constant, by name.
+        drive: Value of the driver over x; None if several drivers move.
+        driver: Name of that driver; 'time' if several move.
+        margin: (..., n) 1 / condition of the samples; None if unknown.
+        is_closed: True if the motion goes round: the last sample is the first, after one period.
+        window: First and last argument of the part that readings see; None: all of it.
+
+    """
+
+    mechanism: Mechanism
+    x: FloatArray
+    per: str
+    tables: tuple[FloatArray, FloatArray, FloatArray]
+    outputs: Sequence[str]
+    fixed: Mapping[CoordinateName, float]
+    drive: Track | None
+    driver: str = TIME
+    margin: FloatArray | None = None
+    is_closed: bool = False
+    window: tuple[float, float] | None = None
+    _tracks: dict[str, Track] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of_run(cls, run: Run) -> Motion:
+        """Return the motion of a run.
+
+        Raises:
+            RequestError: The run has too few samples or no mechanism, or its samples are not in the order of time or of
+                one driver that has a constant speed.
+
+        """
+        mechanism = run.mechanism
+        if mechanism is None:
+            raise RequestError("the run holds no mechanism, so nothing can be measured on it")
+        if len(run) < FEWEST:
+            raise RequestError(f"the run has {len(run)} samples; measures need {FEWEST} or more")
+        x, per = _argument(run)
+        order = np.s_[:] if x[-1] > x[0] else np.s_[::-1]
+        x = x[order]
+        if not np.all(np.diff(x) > 0.0):
+            raise RequestError("the samples of the run are not in ascending or descending order")
+        tables = tuple(table[order] for table in (run.values, run.rates, run.accelerations))
+        drive, driver, is_closed = None, TIME, _goes_round(run)
+        if len(run.input_names) == 3 or run.axis != TIME:
+            column = 0 if run.axis == TIME else run.input_names.index(run.axis)
+            driver = run.input_names[column].driver
+            u, ud, udd = (run.inputs[order, column + k] for k in range(3))
+            if per != "time":
+                ud, udd = np.ones_like(x), np.zeros_like(x)
+            drive = Track(x, u, ud, udd, is_closed)
+        return cls(
+            mechanism,
+            x,
+            per,
+            tables,  # type: ignore[arg-type]  # three of them
+            run.outputs,
+            run.fixed,
+            drive,
+            driver,
+            run.margin[order],
+            is_closed,
+        )
+
+    @property
+    def argument(self) -> Track:
+        """The argument itself as a track: what rates are derivatives by, and the driver where it is one."""
+        return Track(self.x, self.x, np.ones_like(self.x), np.zeros_like(self.x), self.is_closed)
+
+    @property
+    def driver_quantity(self) -> Quantity:
+        """What the value of the driver measures; time where several drivers move."""
+        found = [driver.quantity for driver in self.mechanism.drivers if driver.name == self.driver]
+        return found[0] if found else Quantity("time")
+
+    def driven_at(self, x: FloatArray) -> FloatArray:
+        """Return values of the driver at arguments (...)."""
+        if self.drive is None:
+            return x
+        turns = np.floor((x - self.x[0]) / (self.x[-1] - self.x[0])) if self.is_closed else np.zeros_like(x)
+        travel = self.drive.value[-1] - self.drive.value[0]
+        found = self.drive.at((x - turns * (self.x[-1] - self.x[0])).reshape(-1))[0].reshape(np.shape(x))
+        return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
+
+    def driven_between(self, start: FloatArray, stop: FloatArray) -> FloatArray:
+        """Return how far the driver moves between arguments (...)."""
+        return np.abs(self.driven_at(stop) - self.driven_at(start))
+
+    def part(self, begin: float | None, end: float | None) -> Motion:
+        """Return the part of the motion between two values of the driver; None: its first or last.
+
+        Raises:
+            RequestError: The driver turns back or does not reach the values.
+
+        """
+        if begin is None and end is None:
+            return self
+        drive = self.argument if self.drive is None else self.drive
+        ends = sorted((float(drive.value[0]), float(drive.value[-1])))
+        if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
+            raise RequestError("'begin' and 'end' need a driver that moves in one direction")
+        wanted = [ends[0] if begin is None else begin, ends[1] if end is None else end]
+        if self.is_closed:
+            wanted[0] = ends[0] + (wanted[0] - ends[0]) % (ends[1] - ends[0])
+            wanted[1] = ends[1] - (ends[1] - wanted[1]) % (ends[1] - ends[0])
+        for value in wanted:
+            if not ends[0] <= value <= ends[1]:
+                raise RequestError(
+                    f"the driver does not reach {value:.9g}; the motion goes from {ends[0]:.9g} to {ends[1]:.9g}"
+                )
+        start, stop = (_argument_at(drive, value) for value in wanted)
+        if drive.rate[0] < 0.0:
+            start, stop = stop, start
+        if self.is_closed and stop <= start:
+            stop += drive.span
+        if stop <= start:
+            raise RequestError(f"'begin' {wanted[0]:.9g} must be before 'end' {wanted[1]:.9g}")
+        return replace(self, window=(start, stop), _tracks={})
+
+    def require_closed(self, word: str) -> None:
+        """Raise a RequestError unless the motion goes round; word: what needs that."""
+        if not self.is_closed:
+            raise RequestError(f"{word} needs a motion that goes round: its last pose must be the first")
+
+    def quantity(self, of: str | Measure, order: int = 0) -> Quantity:
+        """Return what a quantity, or its derivative of an order, measures."""
+        own = coordinate_orders(self.mechanism).get(of) if isinstance(of, str) else None
+        order += own[1] if own else 0
+        return Quantity(kind_of_measured(of), order, self.per if order else "time")
+
+    def ratio_quantity(self, of: str | Measure, to: str | None, *, inverse: bool = False) -> Quantity:
+        """Return what the ratio of two speeds measures."""
+        kinds = [kind_of_measured(of), self.driver_quantity.kind if to is None else kind_of_measured(to)]
+        over, under = kinds[::-1] if inverse else kinds
+        return Quantity("number") if over == under else Quantity(over, 1, under)
+
+    def track(self, of: str | Measure) -> Track:
+        """Return a quantity over the motion: a coordinate, a rate of one, or a measured quantity."""
+        return self._cut(self._whole(of))
+
+    def derivative(self, of: str | Measure, order: Literal[1, 2]) -> Track:
+        """Return the speed (order 1) or acceleration (2) of a quantity; of a point 'body.point' its magnitude."""
+        if isinstance(of, str) and of in self.mechanism.body_points:
+            x, y = (_derived(track, order).taylor for track in self._path(of))
+            return self._cut(self._as_track(sqrt(x * x + y * y)))
+        return self._cut(_derived(self._whole(of), order))
+
+    def speed_ratio(self, of: str | Measure, to: str | None) -> Track:
+        """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
+        if to is None and self.drive is None:
+            raise RequestError("a ratio of speeds needs the key 'to' where several drivers move")
+        below = self.drive if to is None and self.drive is not None else self._whole(to or "")
+        return self._cut(self._as_track(self._whole(of).derivative().taylor / below.derivative().taylor))
+
+    def vector(self, between: tuple[str, str]) -> Vector:
+        """Return the vector from one point to another, in the world."""
+        return self._placement(tuple(map(body_of, between))).vector(between)
+
+    def direction(self, angle: float) -> Vector:
+        """Return the unit vector at an angle [rad]."""
+        x, y = unit_vector(float(angle))
+        return Taylor(x), Taylor(y)
+
+    def velocity_against(self, point: str, body: str) -> Vector:
+        """Return the velocity of a point relative to the point of a body at the same place."""
+        at = self._placement((body_of(point), body))
+        frame = at.poses[body]
+        p_x, p_y = at.point(point)
+        v_x, v_y = (self._as_track(one).derivative().taylor for one in (p_x - frame.x, p_y - frame.y))
+        turning = self._as_track(frame.phi + 0.0 * p_x).derivative().taylor
+        return v_x + turning * (p_y - frame.y), v_y - turning * (p_x - frame.x)
+
+    def cosine(self, a: Vector, b: Vector) -> Track:
+        """Return the cosine of the angle between two vectors."""
+        (a_x, a_y), (b_x, b_y) = a, b
+        sizes = sqrt((a_x * a_x + a_y * a_y) * (b_x * b_x + b_y * b_y))
+        return self._cut(self._as_track((a_x * b_x + a_y * b_y) / sizes))
+
+    def arc_sine(self, sine: FloatArray) -> FloatArray:
+        """Return the angle [rad] of a sine that may exceed 1 by rounding."""
+        return np.arcsin(np.clip(sine, -1.0, 1.0))
+
+    def deviation(self, point: str, shape: Literal["line", "circle"]) -> FloatArray:
+        """Return the deviation of the path of a point from the best line or circle."""
+        x, y = map(self._cut, self._path(point))
+        return deviation(x, y, SHAPES[shape])
+
+    def path_distance(self, point: str, targets: Sequence[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+        """Return the largest distance of targets from the path of a point, and where the path is closest to it."""
+        p_x, p_y = (track.taylor for track in self._path(point))
+        value, x = np.asarray(-np.inf), np.asarray(np.nan)
+        for t_x, t_y in targets:
+            d_x, d_y = p_x - float(t_x), p_y - float(t_y)
+            nearest = self._cut(self._as_track(d_x * d_x + d_y * d_y)).minimum()
+            distance = np.sqrt(np.maximum(nearest.value, 0.0))
+            is_worse = ~(distance <= value)
+            value, x = np.where(is_worse, distance, value), np.where(is_worse, nearest.x, x)
+        return value, x
+
+    def lowest_margin(self) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest margin of the samples and where it occurs; margins have no rates."""
+        if self.margin is None:
+            raise RequestError("the motion has no margins")
+        first, last = self.window or (self.x[0], self.x[-1])
+        shifts = (0.0, self.x[-1] - self.x[0]) if self.is_closed else (0.0,)
+        x = np.concatenate([self.x + shift for shift in shifts])
+        inside = (x >= first) & (x <= last)
+        if not inside.any():
+            raise RequestError("no sample of the motion is between 'begin' and 'end'")
+        margin = np.concatenate([self.margin] * len(shifts), axis=-1)[..., inside]
+        k = np.argmin(margin, axis=-1)
+        value = np.take_along_axis(margin, k[..., None], -1)[..., 0]
+        return value, np.where(np.isnan(value), np.nan, x[inside][k])
+
+    def _whole(self, of: str | Measure) -> Track:
+        """Return a quantity as `track` does, without regard to the window."""
+        if isinstance(of, str):
+            name, order = coordinate_orders(self.mechanism).get(of, (of, 0))
+            return _derived(self._coordinate(name), order)
+        return self._as_track(of.value(self._placement(of.bodies())))
+
+    def _path(self, point: str) -> tuple[Track, Track]:
+        """Return the world coordinates of a point, without regard to the window."""
+        x, y = self._placement((body_of(point),)).point(point)
+        return self._as_track(x), self._as_track(y)
+
+    def _coordinate(self, name: str) -> Track:
+        """Return the track of a coordinate."""
+        if name not in self._tracks:
+            if name in self.fixed:
+                constant = np.full(self.x.shape, self.fixed[name])  # type: ignore[index]  # a name is a text
+                track = Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
+            elif name in self.outputs:
+                k = list(self.outputs).index(name)
+                value, rate, acceleration = (table[..., k] for table in self.tables)
+                track = Track(self.x, value, rate, acceleration, self.is_closed)
+            else:
+                raise RequestError(
+                    f"the run has no output '{name}', which a measure needs{suggestion(name, self.outputs)}; "
+                    f"outputs: {listed(self.outputs)}"
+                )
+            self._tracks[name] = track
+        return self._tracks[name]
+
+    def _cut(self, track: Track) -> Track:
+        """Return the part of a track that is in the window."""
+        if self.window is None:
+            return track
+        return track.part(*self.window)
+
+    def _placement(self, bodies: Sequence[str]) -> Placement:
+        """Return bodies with their poses over the motion."""
+        poses = {
+            body: GROUND
+            if body == GROUND_NAME
+            else BodyFrame.of(*(self._coordinate(f"{body}.{axis}").taylor for axis in ("x", "y", "phi")))
+            for body in {*bodies, GROUND_NAME}
+        }
+        return Placement(poses, self.mechanism.body_points)
+
+    def _as_track(self, value: Value) -> Track:
+        """Return a computed quantity as a track of this motion."""
+        like = Track(self.x, self.x, self.x, self.x, self.is_closed)
+        return Track.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
+
+
+def _derived(track: Track, order: int) -> Track:
+    """Return the derivative of an order 0 to 2."""
+    return (lambda: track, track.derivative, track.second_derivative)[order]()
+
+
+def _argument(run: Run) -> tuple[FloatArray, str]:
+    """Return the arguments of a run's samples and what they are: 'time', or 'angle' or 'length' of a driver."""
+    if run.axis == TIME:
+        return run.t, "time"
+    per = rates_per(run)
+    if run.axis not in run.input_names:
+        raise RequestError("measures need samples over time or over one driver; here several drivers change")
+    column = run.input_names.index(run.axis)
+    speed = run.inputs[:, column + 1]
+    others = np.delete(run.inputs, (column, column + 1, column + 2), axis=1)
+    if not (np.all(speed == speed[0]) and speed[0] and not run.inputs[:, column + 2].any()) or np.ptp(others, 0).any():
+        raise RequestError(
+            f"measures over {axis_of(run).name} need one constant speed other than 0, acceleration 0, "
+            f"and other drivers at rest"
+        )
+    return (run.inputs[:, column], per) if per != "time" else (run.inputs[:, column] / speed[0], per)
+
+
+def _argument_at(drive: Track, value: float) -> float:
+    """Return the argument at which a driver that moves in one direction has a value that it reaches."""
+    for k in (0, -1):
+        if value == drive.value[k]:
+            return float(drive.x[k])
+    return float(drive.crossings(np.asarray(value))[1][0])
+
+
+def _goes_round(run: Run) -> bool:
+    """Return True if the last sample of a run is its first, after one period."""
+    if not (run.status <= Status.BRIDGED).all():
+        return False
+    ends = [table[[0, -1]] for table in (run.values, run.rates, run.accelerations)]
+    apart = ends[0][1] - ends[0][0]
+    is_angle = np.array([name.is_angle for name in run.outputs], bool)
+    apart[is_angle] = np.vectorize(lambda angle: math.remainder(angle, math.tau), otypes=[float])(apart[is_angle])
+    size = max(float(np.ptp(run.values[:, ~is_angle], axis=0).max(initial=0.0)), 1e-300)
+    scale = np.where(is_angle, 1.0, size)
+    is_same = [np.abs(apart) <= _SAME_POSE * scale]
+    for end, table in zip(ends[1:], (run.rates, run.accelerations), strict=True):
+        largest = np.abs(table).max(axis=0)
+        of_kind = np.where(is_angle, largest[is_angle].max(initial=0.0), largest[~is_angle].max(initial=0.0))
+        is_same.append(np.abs(end[1] - end[0]) <= _SAME_RATE * of_kind)
+    return bool(np.ptp(run.values, axis=0).any()) and bool(np.all(is_same))

@@ -1,0 +1,52 @@
+"""The contract of a reading: one number that a designer reads off a motion, declared in `[measures]`.
+
+A reading is a formula in the words of a motion: tracks of quantities, their extremes, crossings and derivatives. The
+package `kinfmu.motion` computes these on arrays; this package only declares the readings, as a mechanism file holds
+them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from kinfmu.laws import LawQuantity
+from kinfmu.measures import Measure
+from kinfmu.units import Quantity
+
+Motion = Any  # kinfmu.motion.Motion, which is made of numpy's arrays; this package uses the standard library only
+Numbers = Any  # (...) an array with one number per design
+
+Measured = Annotated[
+    str | Measure, "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle"
+]
+Begin = Annotated[float | None, LawQuantity("argument"), "value of the driver where the part of the motion begins"]
+End = Annotated[float | None, LawQuantity("argument"), "value of the driver at the end of the part"]
+
+
+class Finding(NamedTuple):
+    """What a reading found: numbers (...), what they measure, the arguments of the motion where they occur."""
+
+    value: Numbers
+    quantity: Quantity
+    at: tuple[Numbers, ...] = ()
+
+
+class Reading(ABC):
+    """One number of a motion.
+
+    A leaf is a frozen dataclass whose first field is `name`; its other fields are the keys of its table in a mechanism
+    file. `begin` and `end` choose a part of the motion by values of the driver.
+    """
+
+    type: ClassVar[str]  # its name in mechanism files
+    name: str
+    begin: float | None = None
+    end: float | None = None
+
+    @abstractmethod
+    def read(self, motion: Motion) -> Finding:
+        """Return the numbers of a motion; NaN for designs without them."""
+
+    def check(self) -> None:  # noqa: B027  most readings accept all values
+        """Raise a MechanismError for invalid values; numbers are finite and references valid by then."""

@@ -1,0 +1,57 @@
+"""Readings of when a quantity moves and rests: time ratio and dwell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from kinfmu.errors import MechanismError
+from kinfmu.laws import LawQuantity
+from kinfmu.measures.placement import Reference
+from kinfmu.readings.reading import Begin, End, Finding, Measured, Motion, Reading
+from kinfmu.units import Quantity
+
+
+@dataclass(frozen=True)
+class TimeRatio(Reading):
+    """Time of the slower stroke over that of the faster one (quick return), of a motion that goes round.
+
+    The strokes lie between the smallest and the largest value of the quantity, one after the other.
+    """
+
+    type: ClassVar[str] = "time_ratio"
+
+    name: str
+    of: Measured
+
+    def read(self, motion: Motion) -> Finding:
+        motion.require_closed(self.type)
+        track = motion.track(self.of)
+        low, high = track.minimum().x, track.maximum().x
+        stroke = abs(high - low)
+        other = track.span - stroke
+        longer = 0.5 * (track.span + abs(stroke - other))
+        return Finding(longer / (track.span - longer), Quantity("number"), (low, high))
+
+
+@dataclass(frozen=True)
+class Dwell(Reading):
+    """How far the driver moves while a quantity stays within a band below its maximum or above its minimum."""
+
+    type: ClassVar[str] = "dwell"
+
+    name: str
+    of: Measured
+    band: Annotated[float, LawQuantity("led"), "height of the band, positive"]
+    near: Annotated[str, Reference("choice", ("maximum", "minimum")), "'maximum' or 'minimum'"] = "maximum"
+    begin: Begin = None
+    end: End = None
+
+    def check(self) -> None:
+        if not self.band > 0.0:
+            raise MechanismError(f"[measures.{self.name}] band = {float(self.band):g} must be positive")
+
+    def read(self, motion: Motion) -> Finding:
+        track = motion.track(self.of)
+        start, stop = (track if self.near == "maximum" else track.negative()).stay(self.band)
+        return Finding(motion.driven_between(start, stop), motion.driver_quantity, (start, stop))
