@@ -23,6 +23,7 @@ MOST_UNPACKED = 2**27  # [bytes] in all chunks of a channel, or LARGEST_RATIO ti
 LARGEST_RATIO = 2000  # of unpacked to packed; an index of 16 bytes a message leaves less
 MOST_RECORDS = 4  # per packed byte of a chunk; a message takes at least one, because messages differ
 _HEAD = struct.Struct("<BQ")  # of a record: its kind and its length
+_HEAD_SIZE = _HEAD.size
 _ENTRY = 16  # [bytes] of a message in the index of its chunk
 
 
@@ -97,17 +98,17 @@ class McapReader:
             place = file.tell()
             if is_ended and size - place == len(MAGIC) and file.read(len(MAGIC)) == MAGIC:
                 return ""
-            head = file.read(9)
-            if len(head) < 9:
+            head = file.read(_HEAD_SIZE)
+            if len(head) < _HEAD_SIZE:
                 return f"it ends at byte {size}, within a record" if head else f"it ends at byte {size}"
-            kind, length = struct.unpack("<BQ", head)
-            if length > size - place - 9:
+            kind, length = _HEAD.unpack(head)
+            if length > size - place - _HEAD_SIZE:
                 return f"the record at byte {place} goes beyond the end, byte {size}"
             try:
                 is_ended = self._take(kind, file, length)
             except (ValueError, struct.error) as error:
                 return f"the record at byte {place} is damaged: {error}"
-            file.seek(place + 9 + length)
+            file.seek(place + _HEAD_SIZE + length)
 
     def _take(self, kind: int, file: BinaryIO, length: int) -> bool:
         """Take what is needed of a record; return True for the last record of a file."""
@@ -212,7 +213,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
 
 def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[MessageBlock]:
     """Yield the messages of a channel in an unpacked chunk at byte `place`; most: largest valid number of records."""
-    length = 9 + int(raw[1:9].view("<u8")[0]) if len(raw) >= 9 else 0
+    length = _HEAD_SIZE + _HEAD.unpack_from(raw.data)[1] if len(raw) >= _HEAD_SIZE else 0
     if length and len(raw) % length == 0:
         table = raw.reshape(-1, length)
         heads = table[:, : MESSAGE.itemsize].view(MESSAGE)[:, 0] if length >= MESSAGE.itemsize else None
@@ -221,17 +222,18 @@ def _messages(raw: Bytes, channel: int, place: int, most: int) -> Iterator[Messa
                 yield _block(table)
             return
     at, count, view = 0, 0, raw.data
-    while at + 9 <= len(raw):
+    while at + _HEAD_SIZE <= len(raw):
         kind, length = _HEAD.unpack_from(view, at)
         count += 1
-        if at + 9 + length > len(raw) or (kind == Opcode.MESSAGE and 9 + length < MESSAGE.itemsize) or count > most:
+        end = at + _HEAD_SIZE + length
+        if end > len(raw) or (kind == Opcode.MESSAGE and end - at < MESSAGE.itemsize) or count > most:
             fault = "too many records" if count > most else "a record goes beyond its end"
             raise LogError(f"the chunk at byte {place} is damaged: {fault}")
         if kind == Opcode.MESSAGE:
-            record = raw[at : at + 9 + length].reshape(1, -1)
-            if record[0, 9:11].view("<u2")[0] == channel:
+            record = raw[at:end].reshape(1, -1)
+            if record[0, _HEAD_SIZE : _HEAD_SIZE + 2].view("<u2")[0] == channel:
                 yield _block(record)
-        at += 9 + length
+        at = end
 
 
 def _are_uniform(heads: NDArray[np.void]) -> bool:

@@ -9,7 +9,7 @@
 #define SURE 0.05           /* determinant from which lanes may solve samples: nine digits of qdd remain */
 #define MOST_MOVED 1e-3     /* largest correction for which one Newton step and the rotations suffice */
 #define CLOSED 1e-30        /* squared residual of a closed pose, for angles of some radians */
-#define SOME 40.0           /* [rad^2, sizes^2]; those of a turn, squared */
+#define ONE_TURN 40.0       /* [rad^2, sizes^2]; a turn, squared: beyond it CLOSED grows no further in the first pass */
 #define SETTLED 1e-7        /* second correction up to which the residual is rounding of large angles */
 #define BRIDGED 1e-24       /* squared residual of a closed pose in a window */
 #define MOST_CACHED 4000000 /* [bytes] largest tables written through the caches */
@@ -166,7 +166,7 @@ static int correct(kf_sweep *sweep, const double *u, int32_t *alone)
             const double margin = lanes->margin[i], moved = lanes->moved[i];
             const bool is_trusted = (margin >= SURE) & (KF_TRUST * moved <= margin) & (moved <= MOST_MOVED);
             const double error = lanes->error[i], far = u[i] * u[i] * per_square;
-            const bool has_closed = error <= CLOSED * (1.0 + (far < SOME ? far : SOME));
+            const bool has_closed = error <= CLOSED * (1.0 + (far < ONE_TURN ? far : ONE_TURN));
             const bool is_settled = may_settle & (passes == 2) & (moved <= SETTLED) & (error <= CLOSED * (1.0 + far));
             const bool has_arrived = (has_closed | is_settled) & (error <= most);
             open += is_trusted & !has_arrived & !alone[i];

@@ -30,7 +30,7 @@ class _Looped(Lists):
         self.curves = curve_names(plan)
         self.names = Names((name for block in plan.blocks for name in block.coordinates), self.curves)
         self.moving = {name: f"{LISTS[order]}[{k}]" for order in range(3) for name, k in self.places(order).items()}
-        self.alone = len(plan.drivers) == 1
+        self.has_one_driver = len(plan.drivers) == 1
         self.unknowns = len(plan.unknowns)
 
     def module(self) -> str:
@@ -40,7 +40,7 @@ class _Looped(Lists):
             *self._position(),
             *self._velocity(),
             *self._acceleration(),
-            *(self._tangent() if self.alone else ()),
+            *(self._tangent() if self.has_one_driver else ()),
             *self._carried(),
             *self._stage("outputs", "Positions of the outputs.", (0,)),
             *self._stage("rates", "Rates of the outputs.", (1,)),
@@ -264,12 +264,12 @@ class _Looped(Lists):
         arguments = [["values"], ["values", "ud", "first"], ["values", "ud", "udd", "first", "second"]][highest]
         lines = ["", f"def {name}({', '.join(arguments)}):", f'    """{docstring}"""', "    x = values[0]"]
         if highest:
-            ud, udd = ("(1.0,)", "(0.0,)") if self.alone else ("ud", "udd")
+            ud, udd = ("(1.0,)", "(0.0,)") if self.has_one_driver else ("ud", "udd")
             lines.append(f"    x1 = carried(values, {ud}, first)")
             if highest == 2:
                 lines.append(f"    x2 = carried_twice(values, {udd}, x1, second)")
-                lines += ["    x1, x2 = at_speed(x1, x2, ud, udd)"] if self.alone else []
-            elif self.alone:
+                lines += ["    x1, x2 = at_speed(x1, x2, ud, udd)"] if self.has_one_driver else []
+            elif self.has_one_driver:
                 lines.append("    x1 = [d * ud[0] for d in x1]")
         if len(orders) == 1:
             return lines + self._row(orders)

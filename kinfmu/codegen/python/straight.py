@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from kinfmu.codegen.lists import parametric
 from kinfmu.codegen.newton import ROUND_OFF, jacobian_text
-from kinfmu.codegen.python.alone import Alone, Definitions
 from kinfmu.codegen.python.block_code import (
     assigned_lines,
     indented,
@@ -17,10 +16,14 @@ from kinfmu.codegen.python.block_code import (
     tupled,
     unpacking,
 )
+from kinfmu.codegen.python.definitions import Definitions, UnitSpeed
 from kinfmu.codegen.python.header import bound, curve_names, differences, drive, header, places
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.plan import Block, SolvePlan
+
+_VALUES = "    <values>"  # in place of the statements that unpack `values`, which are known when all stages are written
+_Right = Callable[[Block], tuple[Node, ...]]  # right side of a block's linear solve
 
 
 def straight(plan: SolvePlan) -> str:
@@ -29,6 +32,8 @@ def straight(plan: SolvePlan) -> str:
 
 
 class _Straight:
+    """The writer of the module of one plan."""
+
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
         self.solved = [block for block in plan.blocks if block.unknowns]
@@ -56,7 +61,7 @@ class _Straight:
         later = [
             self._velocity(),
             self._acceleration(),
-            *(self._alone() if len(self.plan.drivers) == 1 else ()),
+            *(self._tangent() if len(self.plan.drivers) == 1 else ()),
             self._stage("outputs", "Positions of the outputs.", (0,)),
             self._stage("rates", "Rates of the outputs.", (1,)),
             self._stage("accelerations", "Accelerations of the outputs.", (2,)),
@@ -164,13 +169,13 @@ class _Straight:
         lines += unpacking([identifier(name.derivative(1)) for name in self.unknowns], "zd")
         return lines + self._linear(2, lambda block: block.acceleration)
 
-    def _alone(self) -> list[list[str]]:
-        """Return, for one driver, the derivatives with respect to it, which every pose needs, and motion with them."""
+    def _tangent(self) -> list[list[str]]:
+        """Return two functions of one driver: the derivatives by its value, which every pose needs; these and motion."""
         writer = Writer(self.names, self.known)
-        alone = Alone(self.inputs[1][0], self.inputs[2][0], self.formulas)
-        definitions = Definitions(alone.formulas)
+        unit_speed = UnitSpeed(self.inputs[1][0], self.inputs[2][0], self.formulas)
+        definitions = Definitions(unit_speed.formulas)
         lines, done = [], set[str]()
-        for order, right in ((1, alone.velocity), (2, alone.acceleration)):
+        for order, right in ((1, unit_speed.velocity), (2, unit_speed.acceleration)):
             lines += indented(self._linear_lines(writer, order, right, definitions, done))
         self._import(writer)
         first, second = (tupled(identifier(name.derivative(order)) for name in self.unknowns) for order in (1, 2))
@@ -334,10 +339,6 @@ class _Straight:
                 self.exports.setdefault(self.names.of(node), node)
             elif node.name in coordinates:
                 self.exports.setdefault(identifier(node.name), None)
-
-
-_VALUES = "    <values>"
-_Right = Callable[[Block], tuple[Node, ...]]
 
 
 def _names(targets: Sequence[Node]) -> list[str]:

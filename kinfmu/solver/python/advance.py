@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from .bridge import Bridge
 from .limit import MOST_STEPS, NO_BLOCK, TOO_FAR, Limit, is_beyond, limit_beyond
-from .pose import ALONE, Model, Pose, Vector, with_map
+from .pose import UNIT_SPEED, Model, Pose, Vector, with_map
 from .singularity_map import SingularityMap
 from .span import REGULAR
 from .status import Status
@@ -48,7 +48,7 @@ class Path:
         self.pose = self.before = self.regular = start
         self.margin = start.margin
         if len(target) == 1:
-            self.direction, self.distance = ALONE, target[0] - start.u[0]
+            self.direction, self.distance = UNIT_SPEED, target[0] - start.u[0]
             self.longest: float = LONGEST_STEP * model.REACH[0]
         else:
             self.direction, self.distance = straight_path(model, start.u, target)

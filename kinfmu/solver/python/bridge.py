@@ -12,7 +12,7 @@ from math import sqrt
 from typing import Any
 
 from .linear import unclosed
-from .pose import ALONE, AT_REST, EPS, Found, Model, Pose, Vector, evaluated
+from .pose import AT_REST, EPS, UNIT_SPEED, Found, Model, Pose, Vector, evaluated
 from .span import Span, restored_span
 from .status import Status
 from .trusted_step import follow_path
@@ -83,8 +83,8 @@ class Bridge:
         pose = Pose(u, evaluated(model, u, self._raised(z), held))
         pose.bridge = self
         pose.status = Status.BRIDGED
-        zd = model.velocity(pose.values, ALONE, zd, held)
-        pose.tangent = zd, model.acceleration(pose.values, ALONE, AT_REST, zd, zdd, held)
+        zd = model.velocity(pose.values, UNIT_SPEED, zd, held)
+        pose.tangent = zd, model.acceleration(pose.values, UNIT_SPEED, AT_REST, zd, zdd, held)
         return pose
 
     def closes(self) -> bool:

@@ -19,7 +19,7 @@ from math import copysign, inf, isfinite, sqrt
 from typing import NamedTuple
 
 from .linear import reciprocal_condition
-from .pose import ALONE, AT_REST, EPS, STEEP, UNDECIDED, Found, Model, Pose, Vector, evaluated, tangent_of
+from .pose import AT_REST, EPS, STEEP, UNDECIDED, UNIT_SPEED, Found, Model, Pose, Vector, evaluated, tangent_of
 from .tracks import MIXED, Track, held_blocks, rates_in_time
 from .worst_case_step import worst_case_step
 
@@ -126,7 +126,7 @@ def _is_at_a_crossing(model: Model, pose: Pose, rates: UnknownRates) -> bool:
     There the rates stay as they are while the determinant falls; right before a dead centre they are steep.
     """
     if any(
-        _is_at_a_crossing(track, own, _rates(track, own, _driver_motion(own, ALONE, AT_REST)))
+        _is_at_a_crossing(track, own, _rates(track, own, _driver_motion(own, UNIT_SPEED, AT_REST)))
         for track, own in pose.tracks
     ):
         return True
@@ -203,7 +203,7 @@ def _largest(model: Model, there: Vector, here: Vector) -> float:
 
 def _driver_motion(pose: Pose, ud: Vector, udd: Vector) -> DriverMotion:
     held = held_blocks(pose)
-    return DriverMotion(ALONE, AT_REST, held) if len(ud) == 1 else DriverMotion(ud, udd, held)
+    return DriverMotion(UNIT_SPEED, AT_REST, held) if len(ud) == 1 else DriverMotion(ud, udd, held)
 
 
 def _rates(model: Model, pose: Pose, driven: DriverMotion) -> UnknownRates:
@@ -279,7 +279,7 @@ def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRat
 
 def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
     """Return the source of the bridge of one track, in time."""
-    alone = _driver_motion(own, ALONE, AT_REST)
+    alone = _driver_motion(own, UNIT_SPEED, AT_REST)
     along = _rates(track, own, alone)
     off = _of_bridge(track, own, alone, along)
     v, a = driven.ud[track.driver], driven.udd[track.driver]
@@ -300,7 +300,7 @@ def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverM
 
 def _of_node(model: Model, node: Pose, half: float) -> Vector:
     """Return the error of a bridge's node in each unknown: of z, half z' and half^2 z'' together."""
-    driven = _driver_motion(node, ALONE, AT_REST)
+    driven = _driver_motion(node, UNIT_SPEED, AT_REST)
     rates = _rates(model, node, driven)
     squares = [0.0] * len(node.z)
     for source in _sources(model, node, driven, rates):

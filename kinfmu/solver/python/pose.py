@@ -14,7 +14,7 @@ EPS = 2.220446049250313e-16
 POLISHED = 0.1  # determinant below which Newton goes on until the residual no longer falls
 UNDECIDED = 1e-6  # determinant below which a path ends: lengths within 1e-12 of a change point give such a determinant
 STEEP = 100.0  # slope of an unknown over the driver, both in radians or sizes; right before a dead centre it is more
-ALONE: Vector = (1.0,)  # the direction of a single driver: derivatives are with respect to it
+UNIT_SPEED: Vector = (1.0,)  # of a single driver: derivatives are then with respect to its value
 AT_REST: Vector = (0.0,)
 
 

@@ -11,7 +11,7 @@ from .estimate import estimated_errors, margin_of, with_driver_errors
 from .limit import Limit, limit_message
 from .message import place
 from .mixed import advance_mixed
-from .pose import ALONE, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
+from .pose import UNIT_SPEED, Model, Pose, Vector, evaluated, failed, tangent_of, with_map
 from .singularity_map import restored_map
 from .span import REGULAR
 from .status import Status
@@ -59,12 +59,14 @@ class Solver:
             s = u[0] - start.u[0]
             is_apart = singularities is None or singularities.low <= u[0] <= singularities.high
             if is_apart and -self._longest <= s <= self._longest:
-                near = trusted_step(self.model, start, ALONE, s, u)
+                near = trusted_step(self.model, start, UNIT_SPEED, s, u)
                 if near is not None and near.watch <= self.tolerance >= near.residual:
                     margin = near.margin
                     if margin >= REGULAR:
                         return near
-                    if margin > NEAR_SINGULAR and (margin >= CLOSE or keeps_branch(self.model, start, near, ALONE, s)):
+                    if margin > NEAR_SINGULAR and (
+                        margin >= CLOSE or keeps_branch(self.model, start, near, UNIT_SPEED, s)
+                    ):
                         singularities = surveyed(self.model, start, near)
                         if singularities is start.singularities:  # nothing new there
                             return near

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from .linear import orientation
-from .pose import ALONE, POLISHED, UNDECIDED, Model, Pose, Vector, directed, polished
+from .pose import POLISHED, UNDECIDED, UNIT_SPEED, Model, Pose, Vector, directed, polished
 
 LONGEST_STEP = 0.2  # [rad, sizes]; longer predictions may land on another branch by accident
 TRUST = 10.0  # a correction of the prediction must be this much smaller than the determinants: so far off lie branches
@@ -78,7 +78,7 @@ def follow_path(model: Model, start: Pose, u: float) -> Pose | None:
         distance = u - pose.u[0]
         whole = -step <= distance <= step
         s = distance if whole else step if distance > 0.0 else -step
-        trial = trusted_step(model, pose, ALONE, s, (u,) if whole else (pose.u[0] + s,))
+        trial = trusted_step(model, pose, UNIT_SPEED, s, (u,) if whole else (pose.u[0] + s,))
         if trial is not None:
             pose = trial
         else:

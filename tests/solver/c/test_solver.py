@@ -25,7 +25,7 @@ from kinfmu.codegen.python import load_model, load_module
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver, Status, with_parameters
 from kinfmu.solver.python.hermite import weights
-from kinfmu.solver.python.pose import ALONE, AT_REST
+from kinfmu.solver.python.pose import AT_REST, UNIT_SPEED
 from kinfmu.solver.python.span import PLACES
 from kinfmu.sweep import run_times
 from tests.fmu.test_parameters import geared, linkage
@@ -56,8 +56,8 @@ def solver_of(plan: SolvePlan) -> Solver:
     velocity, acceleration, motion = model.velocity, model.acceleration, model.motion
 
     def tangent(values: Any) -> Any:
-        zd = velocity(values, ALONE)
-        return zd, acceleration(values, ALONE, AT_REST, zd)
+        zd = velocity(values, UNIT_SPEED)
+        return zd, acceleration(values, UNIT_SPEED, AT_REST, zd)
 
     def first_motion(values: Any, ud: Any, udd: Any) -> Any:
         return tangent(values), motion(values, ud, udd, *tangent(values))

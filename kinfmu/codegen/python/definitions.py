@@ -1,4 +1,4 @@
-"""Formulas with constants folded for a single driver at speed 1 and acceleration 0; definitions in order."""
+"""Definitions of names by formulas, in order; formulas folded for a single driver at speed 1 and acceleration 0."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OPERATIONS: dict[str, Callable[..., Node]] = {
 }
 
 
-class Alone:
+class UnitSpeed:
     """Right sides and formulas of a plan whose only driver has speed 1 and acceleration 0.
 
     formulas: rates and accelerations of assigned coordinates by name, in the order of evaluation.
