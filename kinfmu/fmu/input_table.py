@@ -269,9 +269,9 @@ def _span(experiment: RunSettings, table: InputTable, start: float | None, stop:
     if (start is None and table.start != experiment.start) or (stop is None and table.stop != experiment.stop):
         first, last = table.start if start is None else start, table.stop if stop is None else stop
         rows = "as" if start is None and stop is None else "one end as"
-        alone = "; add a second row to hold the values until a later time" if table.start == table.stop else ""
+        hint = "; add a second row to hold the values until a later time" if table.start == table.stop else ""
         yield Event(
-            first, "info", f"the run goes from {first:g} to {last:g} s, {rows} the rows of {table.source}{alone}"
+            first, "info", f"the run goes from {first:g} to {last:g} s, {rows} the rows of {table.source}{hint}"
         )
 
 

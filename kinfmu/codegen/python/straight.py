@@ -170,7 +170,7 @@ class _Straight:
         return lines + self._linear(2, lambda block: block.acceleration)
 
     def _tangent(self) -> list[list[str]]:
-        """Return two functions of one driver: the derivatives by its value, which every pose needs; these and motion."""
+        """Return two functions for one driver: `tangent`, which every pose needs, and `first_motion`."""
         writer = Writer(self.names, self.known)
         unit_speed = UnitSpeed(self.inputs[1][0], self.inputs[2][0], self.formulas)
         definitions = Definitions(unit_speed.formulas)

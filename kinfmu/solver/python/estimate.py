@@ -130,8 +130,8 @@ def _is_at_a_crossing(model: Model, pose: Pose, rates: UnknownRates) -> bool:
         for track, own in pose.tracks
     ):
         return True
-    one = len(pose.u) == 1 and pose.bridge is None
-    return one and pose.margin < UNDECIDED and rates.speed * model.REACH[0] < STEEP
+    may_cross = len(pose.u) == 1 and pose.bridge is None
+    return may_cross and pose.margin < UNDECIDED and rates.speed * model.REACH[0] < STEEP
 
 
 def margin_of(model: Model, pose: Pose) -> float:
@@ -193,8 +193,8 @@ def _differences(model: Model, there: Vector, here: Vector) -> tuple[float, floa
 def _largest(model: Model, there: Vector, here: Vector) -> float:
     """Return the largest difference of two rows of outputs, in radians and sizes."""
     largest = 0.0
-    for name, a, b in zip(model.OUTPUTS, there, here):  # noqa: B905  one item per output
-        gap = abs(a - b) if name[-4:] == ".phi" else abs(a - b) / model.SIZE
+    for k, (a, b) in enumerate(zip(there, here)):  # noqa: B905  one item per output
+        gap = abs(a - b) if k in model.ANGLES else abs(a - b) / model.SIZE
         if gap != gap:
             return inf
         largest = max(largest, gap)
@@ -238,7 +238,7 @@ def _sources(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRates
         found.append((c * farthest, block, step, c))
     count = len(found)
     if count > 2:  # a sum of two is the same in any order
-        found.sort(key=lambda one: -one[0])
+        found.sort(key=lambda source: -source[0])
         found = found[:MOST_SOURCES]
     sources = []
     still = (0.0,) * len(driven.ud)
@@ -279,15 +279,15 @@ def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRat
 
 def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
     """Return the source of the bridge of one track, in time."""
-    alone = _driver_motion(own, UNIT_SPEED, AT_REST)
-    along = _rates(track, own, alone)
-    off = _of_bridge(track, own, alone, along)
+    at_unit_speed = _driver_motion(own, UNIT_SPEED, AT_REST)
+    along = _rates(track, own, at_unit_speed)
+    off = _of_bridge(track, own, at_unit_speed, along)
     v, a = driven.ud[track.driver], driven.udd[track.driver]
     still = (0.0,) * len(rates.first)
-    one = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one item per unknown
-    two = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
-    first = track.put([v * x for x in one], still)
-    second = track.put([v * v * y + a * x for x, y in zip(one, two)], still)  # noqa: B905
+    off_first = [x - y for x, y in zip(off.given_first, along.first)]  # noqa: B905  one item per unknown
+    off_second = [x - y for x, y in zip(off.given_second, along.second)]  # noqa: B905
+    first = track.put([v * x for x in off_first], still)
+    second = track.put([v * v * y + a * x for x, y in zip(off_first, off_second)], still)  # noqa: B905
     of_tracks = sum([1 << k for k, by in enumerate(model.BLOCK_DRIVERS) if by != MIXED])
     return Source(
         tuple(model.velocity(pose.values, (0.0,) * len(pose.u), track.put(off.z, still), of_tracks)),
@@ -306,8 +306,8 @@ def _of_node(model: Model, node: Pose, half: float) -> Vector:
     for source in _sources(model, node, driven, rates):
         _, first, second = _moved(model, node, driven, rates, source)
         for k, dz in enumerate(source.z):
-            one = abs(dz) + half * abs(first[k] - rates.first[k]) + half**2 * abs(second[k] - rates.second[k])
-            squares[k] += one * one
+            error = abs(dz) + half * abs(first[k] - rates.first[k]) + half**2 * abs(second[k] - rates.second[k])
+            squares[k] += error * error
     return tuple([sqrt(square) for square in squares])
 
 

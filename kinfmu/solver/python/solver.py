@@ -37,14 +37,14 @@ class Solver:
         self.tolerance = tolerance
         u, z = model.ANCHOR
         self.anchor = Pose(u, evaluated(model, u, z, held=0)) if anchor is None else anchor
-        self._one = len(u) == 1
-        tracks = () if self._one else tracks_of(model, u, self.anchor.z)
+        self._has_one_driver = len(u) == 1
+        tracks = () if self._has_one_driver else tracks_of(model, u, self.anchor.z)
         self._tracks: Tracks | None = None
         if tracks:  # the tolerance applies to the whole pose only
             solvers = [None if one is None else Solver(one, inf, on_track(one, self.anchor)) for one in tracks]
             mixed = Track(model, MIXED, u, self.anchor.z) if MIXED in model.BLOCK_DRIVERS else None
             self._tracks = Tracks(model, tolerance, solvers, mixed)
-        self._longest: float = LONGEST_STEP * model.REACH[0] if self._one else 0.0
+        self._longest: float = LONGEST_STEP * model.REACH[0] if self._has_one_driver else 0.0
 
     def solve(self, start: Pose, u: Vector) -> Pose:
         """Return the pose at driver values u, followed from a good pose in a straight line of the driver values."""
@@ -55,7 +55,7 @@ class Solver:
         if u == start.u:
             return self._again(start)
         singularities = start.singularities
-        if self._one:  # most samples: one trusted step, away from all that is singular
+        if self._has_one_driver:  # most samples: one trusted step, away from all that is singular
             s = u[0] - start.u[0]
             is_apart = singularities is None or singularities.low <= u[0] <= singularities.high
             if is_apart and -self._longest <= s <= self._longest:
@@ -73,7 +73,7 @@ class Solver:
         refused = self._refused(start, u, self.model.DISTANCES)
         if refused is not None:
             return refused
-        if not self._one:  # most samples of several drivers: one trusted step, too
+        if not self._has_one_driver:  # most samples of several drivers: one trusted step, too
             direction, distance = straight_path(self.model, start.u, u)
             near = trusted_step(self.model, start, direction, distance, u) if distance <= LONGEST_STEP else None
             if near is not None and near.margin >= REGULAR and near.watch <= self.tolerance >= near.residual:
@@ -109,7 +109,7 @@ class Solver:
         """Return the pose at the driver values of `start`: `start` itself, or its checked copy if it is the anchor."""
         pose = start
         if start.margin < REGULAR and start.status == Status.OK and start.singularities is None:
-            singularities = surveyed(self.model, start, start) if self._one else None
+            singularities = surveyed(self.model, start, start) if self._has_one_driver else None
             found = start if singularities is None else advance(self.model, start, start.u, singularities)
             if not isinstance(found, Limit):
                 pose = found
@@ -145,7 +145,7 @@ class Solver:
 
     def _first(self, pose: Pose, ud: Vector) -> Vector:
         """Return the argument of the model's rates: z' = dz/du with one driver, else zd."""
-        if self._one:
+        if self._has_one_driver:
             return tangent_of(self.model, pose)[0]
         return (
             self._both(pose, ud, (0.0,) * len(ud))[0]
@@ -155,7 +155,7 @@ class Solver:
 
     def _both(self, pose: Pose, ud: Vector, udd: Vector) -> tuple[Vector, Vector]:
         """Return the arguments of the model's accelerations: z' and z'' with one driver, else zd and zdd."""
-        if self._one:
+        if self._has_one_driver:
             return tangent_of(self.model, pose)
         return rates_in_time(self.model, pose, ud, udd)
 
@@ -174,7 +174,9 @@ class Solver:
 
     def motion(self, pose: Pose, ud: Vector, udd: Vector) -> Vector:
         """Return positions, rates and accelerations of the OUTPUTS in one row; common terms are computed once."""
-        if self._one and pose.tangent is None:  # the rule in an FMU: each pose is read once, before the next step
+        if (
+            self._has_one_driver and pose.tangent is None
+        ):  # the rule in an FMU: each pose is read once, before the next step
             pose.tangent, row = self.model.first_motion(pose.values, ud, udd)
             return row  # type: ignore[no-any-return]
         first, second = pose.tangent or self._both(pose, ud, udd)
