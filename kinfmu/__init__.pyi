@@ -60,6 +60,7 @@ from kinfmu.run import Sink as Sink
 from kinfmu.solver.python.status import Status as Status
 from kinfmu.sweep import Designs as Designs
 from kinfmu.sweep import Model as Model
+from kinfmu.sweep import Sensitivities as Sensitivities
 from kinfmu.sweep import compile as compile  # noqa: A004  as re.compile
 from kinfmu.sweep import solve as solve
 

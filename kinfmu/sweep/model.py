@@ -30,6 +30,7 @@ from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
 from kinfmu.sweep.engine import Engine, Tables, UnreachedError
 from kinfmu.sweep.python_engine import PythonEngine
+from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel
 
 ENGINES = ("auto", "python", "native")
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
@@ -281,6 +282,49 @@ class Model:
         if name in self._places:
             return setting.values[self._places[name]]
         return setting.constants[self._constant_places[name]]
+
+    def sensitivities(
+        self,
+        t: ArrayLike | None = None,
+        *,
+        outputs: Sequence[str] | None = None,
+        wrt: Sequence[str] | None = None,
+        parameters: Settings | None = None,
+        tolerance: float = TOLERANCE,
+        wrap: bool = False,
+        **inputs: ArrayLike,
+    ) -> Sensitivities:
+        """Return exact derivatives of positions and rates with respect to parameters.
+
+            J z_p = -Phi_p,   J zd_p = -(d/dp)(J zd + Phi_u ud)      block after block, then outputs by the chain rule
+
+        Parameters change alone: times or driver values stay, and all that is written as an expression of a parameter
+        changes with it. No difference quotients are involved.
+
+        Args:
+            t: (n,) times [s], as in `solve`.
+            outputs: Names of outputs; default: all of the model.
+            wrt: With respect to these: names of `parameters` of the model, and over time law constants, such as
+                'crank.speed'; default: all of them.
+            parameters: Values of parameters and law constants, as in `solve`.
+            tolerance: As in `solve`.
+            wrap: As in `solve`.
+            **inputs: Driver values in place of t, as in `solve`.
+
+        Returns:
+            Positions and rates (n, outputs) and their derivatives (n, outputs, parameters), with a status for every
+            sample. Samples that are not reached or are interpolated across a singular point are NaN.
+
+        Raises:
+            RequestError: A name is unknown, a value is invalid, or the model has no parameters.
+            KinfmuError: As in `solve`.
+
+        """
+        return self._sensitivity_model.solve(t, outputs, parameters, wrt, tolerance=tolerance, wrap=wrap, inputs=inputs)
+
+    @cached_property
+    def _sensitivity_model(self) -> SensitivityModel:
+        return SensitivityModel(self)
 
     def setting(self, given: Settings) -> Setting:
         """Return parameters and law constants as numbers.

@@ -1,0 +1,168 @@
+"""Sensitivity stage: a function of one sample, and of all samples at once; printed when first needed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
+from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.equations.graph import Node, reachable, symbols
+from kinfmu.measures.arithmetic import floor
+from kinfmu.plan.sensitivity import Assignment, SensitivitySteps, Step
+from kinfmu.solver.python.curve import CurveData
+from kinfmu.solver.python.curve import curve as curve_value
+from kinfmu.solver.python.linear import factor, lu_solve, qr_factor, qr_solve
+
+FEW = 16  # samples up to which numbers are faster than arrays: numpy takes a microsecond for each operation
+FEW_WITH_SOLVES = 2  # likewise where blocks of three unknowns are solved by loops in Python
+
+Fill = Callable[[Sequence[Any]], tuple[Any, ...]]
+Entries = Sequence[Sequence[Any]]
+
+
+class SensitivityStage(NamedTuple):
+    """A compiled sensitivity stage.
+
+    given: names of the symbols whose values the functions take, in this order; places: of the returned values in the
+    row of all results, where the others are 0; text: the source; of_sample: for numbers; of_samples: for arrays (n,);
+    few: up to so many samples are faster one by one.
+    """
+
+    given: tuple[str, ...]
+    places: tuple[int, ...]
+    text: str
+    of_sample: Fill
+    of_samples: Fill
+    few: int
+
+
+def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
+    """Return the compiled stage."""
+    roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
+    nodes = reachable(roots)
+    made = {name for step in steps.steps for name in _names(step)}
+    given = tuple(symbol.name for symbol in symbols(roots) if symbol.name not in made)
+    data = dict.fromkeys(node.curve[0] for node in nodes if node.op == "curve")
+    curves = {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
+    text = _text(steps, given, curves, _used_again(nodes, roots))
+    code = compile(text, "<sensitivity stage>", "exec")
+    constants = {name: one for one, name in curves.items()}
+
+    def function(operations: dict[str, Any]) -> Fill:
+        namespace = operations | constants
+        exec(code, namespace)  # noqa: S102  our own generated source
+        fill: Fill = namespace["sensitivities"]
+        return fill
+
+    places = tuple(k for k, node in enumerate(steps.results) if node.constant != 0.0)
+    few = FEW if all(isinstance(step, Assignment) for step in steps.steps) else FEW_WITH_SOLVES
+    return SensitivityStage(given, places, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
+
+
+def _text(steps: SensitivitySteps, given: Sequence[str], curves: Mapping[CurveData, str], keep: set[Node]) -> str:
+    made = [name for step in steps.steps for name in _names(step)]
+    writer = Writer(Names((*given, *made), curves), (), keep)
+    lines = []
+    for step in steps.steps:
+        lines += writer.statements(_nodes(step))
+        if isinstance(step, Assignment):
+            lines.append(f"{identifier(step.name)} = {writer.expression(step.node)}")
+        else:
+            rows, columns = ([[writer.expression(node) for node in row] for row in part] for part in step[:2])
+            solved = tupled(map(identifier, _names(step)))
+            lines.append(f"{solved} = solutions({matrix(rows)}, {matrix(columns)})")
+    results = [node for node in steps.results if node.constant != 0.0]
+    lines += writer.statements(results)
+    returned = tupled(writer.expression(node) for node in results)
+    return "\n".join(
+        [
+            "def sensitivities(given):",
+            '    """Return outputs and their derivatives with respect to parameters, without those that are 0."""',
+            *unpacking(map(identifier, given), "given"),
+            *indented(lines),
+            f"    return {returned}",
+            "",
+        ]
+    )
+
+
+def _nodes(step: Step) -> list[Node]:
+    if isinstance(step, Assignment):
+        return [step.node]
+    return [node for row in (*step.jacobian, *step.columns) for node in row]
+
+
+def _names(step: Step) -> list[str]:
+    return [step.name] if isinstance(step, Assignment) else [name for names in step.names for name in names]
+
+
+def _used_again(nodes: list[Node], roots: list[Node]) -> set[Node]:
+    """Return the operations that several others are made of: steps share them."""
+    uses = Counter(arg for node in nodes for arg in node.args)
+    uses.update(roots)
+    return {node for node, count in uses.items() if count > 1 and node.args}
+
+
+def _solutions_of_numbers(rows: Entries, columns: Entries) -> list[float]:
+    """Return the entries of the solutions x of J x = -b, column after column; least squares for more rows.
+
+    rows: of J; columns: the columns b.
+    """
+    matrix_rows, right = [list(row) for row in rows], [[-b for b in column] for column in columns]
+    if len(rows) > len(rows[0]):
+        orthogonal = qr_factor(matrix_rows)
+        return [entry for column in right for entry in qr_solve(orthogonal, column)]
+    factors = factor(matrix_rows)
+    return [entry for column in right for entry in lu_solve(factors, column)]
+
+
+def _solutions_of_arrays(rows: Entries, columns: Entries) -> list[Any]:
+    """Return the same for entries that are numbers or arrays (n,); NaN where J is singular."""
+    n = max(np.size(entry) for row in (*rows, *columns) for entry in row)
+    jacobian = np.empty((n, len(rows), len(rows[0])))
+    right = np.empty((n, len(rows), len(columns)))
+    for i, row in enumerate(rows):
+        for k, entry in enumerate(row):
+            jacobian[:, i, k] = entry
+    for k, column in enumerate(columns):
+        for i, entry in enumerate(column):
+            right[:, i, k] = entry
+    if len(rows) > len(rows[0]):
+        orthogonal, jacobian = np.linalg.qr(jacobian)
+        right = orthogonal.transpose(0, 2, 1) @ right
+    try:
+        solved = np.linalg.solve(jacobian, right)
+    except np.linalg.LinAlgError:  # one of them is exactly singular
+        jacobian[np.linalg.det(jacobian) == 0.0] = np.nan
+        solved = np.linalg.solve(jacobian, right)
+    return [-solved[:, i, k] for k in range(len(columns)) for i in range(len(rows[0]))]
+
+
+def _curve_of_arrays(data: CurveData, order: int, x: Any) -> Any:
+    """Return a piecewise function at numbers (n,)."""
+    return np.array([curve_value(data, order, value) for value in np.atleast_1d(x).tolist()])
+
+
+_OF_NUMBERS: dict[str, Any] = {
+    "sin": math.sin,
+    "cos": math.cos,
+    "sqrt": math.sqrt,
+    "floor": floor,
+    "atan2": math.atan2,
+    "curve": curve_value,
+    "solutions": _solutions_of_numbers,
+}
+_OF_ARRAYS: dict[str, Any] = {
+    "sin": np.sin,
+    "cos": np.cos,
+    "sqrt": np.sqrt,
+    "floor": np.floor,
+    "atan2": np.arctan2,
+    "curve": _curve_of_arrays,
+    "solutions": _solutions_of_arrays,
+}

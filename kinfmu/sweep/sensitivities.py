@@ -1,0 +1,225 @@
+"""Sensitivities: exact derivatives of a model's outputs with respect to parameters over the samples of a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
+from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.plan import SolvePlan, compile_plan, localized
+from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
+from kinfmu.plan.trace import parameter_symbol
+from kinfmu.run import FloatArray, IntArray, Run
+from kinfmu.solver.python.status import Status
+
+if TYPE_CHECKING:
+    from kinfmu.sweep.model import Model, Settings
+
+OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
+AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
+_STAGES_KEPT = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Outputs and rates of a motion with their derivatives with respect to parameters.
+
+    Angles are in radians, lengths in the mechanism's unit of length. A derivative is in the output's unit per unit of
+    the parameter. Without times, rates and their derivatives are for the driver speeds that were given.
+
+    Attributes:
+        outputs: Names of the outputs.
+        parameters: Names of the parameters.
+        t: (n,) times [s], or sample numbers.
+        values: (n, outputs) positions.
+        rates: (n, outputs).
+        values_by: (n, outputs, parameters) derivatives of the positions.
+        rates_by: (n, outputs, parameters) derivatives of the rates.
+        status: (n,) of the samples, as in a Run. Numbers of samples with status 0 are exact to round-off; with status
+            1, near a singular point, they have fewer digits. Samples with status 2 are interpolated across a singular
+            point, where derivatives with respect to lengths need not exist: they are NaN, as are those with a status
+            of 3 to 5, which are not reached.
+        refused: Parameters that cannot change by themselves, with the reason: a redundant row would not close. Their
+            derivatives are NaN.
+
+    """
+
+    outputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    t: FloatArray
+    values: FloatArray
+    rates: FloatArray
+    values_by: FloatArray
+    rates_by: FloatArray
+    status: IntArray
+    refused: Mapping[str, str]
+
+    def of(self, output: str, parameter: str) -> FloatArray:
+        """Return the derivative of an output's position with respect to a parameter, (n,)."""
+        return self.values_by[:, self.outputs.index(output), self.parameters.index(parameter)]
+
+    def rate_of(self, output: str, parameter: str) -> FloatArray:
+        """Return the derivative of an output's rate with respect to a parameter, (n,)."""
+        return self.rates_by[:, self.outputs.index(output), self.parameters.index(parameter)]
+
+
+class SensitivityModel:
+    """Sensitivities of a model; code is printed when it is first needed and kept."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._poses = _model_of_unknowns(model)
+        self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
+
+    def solve(
+        self,
+        t: ArrayLike | None,
+        outputs: Sequence[str] | None,
+        parameters: Settings | None,
+        wrt: Sequence[str] | None,
+        *,
+        tolerance: float,
+        wrap: bool,
+        inputs: Mapping[str, Any],
+    ) -> Sensitivities:
+        """Return the sensitivities; arguments and errors as in `Model.sensitivities`."""
+        plan, by_law = self._model.plan, not inputs
+        names = _names("outputs", outputs, plan.outputs)
+        chosen = self._chosen(wrt, by_law=by_law)
+        setting = self._model.setting(parameters or {})
+        run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs)
+        given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
+        given["time"] = run.t
+        for name, values, rates in zip(self._poses.outputs, run.values.T, run.rates.T, strict=True):
+            if name in plan.unknowns:
+                given |= {name: values, name.derivative(1): rates}
+        written = [parameter.value for parameter in plan.parameters]
+        for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
+            given[parameter_symbol(parameter.name)] = value
+        given |= dict(zip((constant.name for constant in plan.law_constants), setting.constants, strict=True))
+        stage, gap_names = self._stage(names, chosen, by_law, frozenset(parameters or ()))
+        return _evaluated(plan, stage, gap_names, names, chosen, run, given)
+
+    def _chosen(self, wrt: Sequence[str] | None, *, by_law: bool) -> tuple[str, ...]:
+        """Return the names of the parameters."""
+        plan = self._model.plan
+        own = [parameter.name for parameter in plan.parameters]
+        constants = [constant.name for constant in plan.law_constants]
+        known = [*own, *constants] if by_law else own
+        for name in wrt or ():
+            if name in constants and not by_law:
+                raise RequestError(
+                    f"wrt: '{name}' is a law constant, which acts over time; give t in place of driver values"
+                )
+            if name not in known and name in plan.mechanism.parameters:
+                self._model.setting({name: 0.0})  # reports why it is not open
+        if not known:
+            raise RequestError("the model has no parameters: write [parameters] and use their names for numbers")
+        return _names("wrt", wrt, known)
+
+    def _new_stage(
+        self, outputs: tuple[str, ...], parameters: tuple[str, ...], by_law: bool, given: frozenset[str]
+    ) -> tuple[SensitivityStage, tuple[str, ...]]:
+        steps = sensitivity_steps(self._model.plan, outputs, parameters, by_law=by_law, given=given)
+        return load_sensitivity(steps), steps.gap_names
+
+
+def _model_of_unknowns(model: Model) -> Model:
+    """Return a model whose outputs are the unknowns of all blocks, as seen from the plan's own origin."""
+    plan = model.plan
+    if set(plan.unknowns) <= set(plan.outputs) and plan.origin == (0.0, 0.0):
+        return model
+    local, _ = localized(plan.mechanism)
+    return type(model)(
+        compile_plan(replace(local, coordinates="moving"), plan.unknowns, model.parameters), model.engine
+    )
+
+
+def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
+    """Return the names wanted, each once; default: all that are known."""
+    if wanted is None:
+        return tuple(known)
+    if isinstance(wanted, str):
+        raise RequestError(f"{what}: '{wanted}' must be a list of names, such as ['{wanted}']")
+    for name in wanted:
+        if name not in known:
+            raise RequestError(f"{what}: '{name}' is not known{suggestion(name, known)}; valid: {listed(known)}")
+    return tuple(dict.fromkeys(wanted))
+
+
+def _evaluated(
+    plan: SolvePlan,
+    stage: SensitivityStage,
+    gap_names: Sequence[str],
+    outputs: tuple[str, ...],
+    parameters: tuple[str, ...],
+    run: Run,
+    given: Mapping[str, FloatArray | float],
+) -> Sensitivities:
+    """Return what a stage gives for the samples of a run that hold numbers and are not interpolated."""
+    good = np.flatnonzero(run.status < Status.BRIDGED)
+    n, m, p, rows = len(good), len(outputs), len(parameters), len(gap_names)
+    shapes = ((m,), (m,), (m, p), (m, p), (p, rows))
+    ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)])
+    results = np.zeros((int(ends[-1]), n))
+    numbers = [given[name] for name in stage.given]
+    results[list(stage.places)] = _results(stage, numbers, good)
+    tables = [
+        np.moveaxis(results[a:b].reshape(*shape, n), -1, 0) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)
+    ]
+    *tables, gaps = tables
+    refused = _refused(plan, parameters, gap_names, gaps, run.status[good])
+    for table in tables:
+        table[~np.isfinite(table)] = np.nan
+    for name in refused:
+        for table in tables[2:]:
+            table[:, :, parameters.index(name)] = np.nan
+    whole = [np.full((len(run.t), *table.shape[1:]), np.nan) for table in tables]
+    for there, table in zip(whole, tables, strict=True):
+        there[good] = table
+    values, rates, values_by, rates_by = whole
+    return Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
+
+
+def _results(stage: SensitivityStage, numbers: Sequence[FloatArray | float], good: IntArray) -> FloatArray:
+    """Return what a stage returns at good samples, (places, n); not finite where a block is singular."""
+    table = np.empty((len(stage.places), len(good)))
+    if len(good) <= stage.few:
+        columns = [
+            number[good].tolist() if isinstance(number, np.ndarray) else [number] * len(good) for number in numbers
+        ]
+        for k, given in enumerate(zip(*columns, strict=True)):
+            try:
+                table[:, k] = stage.of_sample(given)
+            except (ArithmeticError, ValueError):
+                table[:, k] = np.nan
+        return table
+    with np.errstate(all="ignore"):
+        for start in range(0, len(good), AT_ONCE):
+            part = good[start : start + AT_ONCE]
+            own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
+            for row, result in zip(table, stage.of_samples(own), strict=True):
+                row[start : start + AT_ONCE] = result
+    return table
+
+
+def _refused(
+    plan: SolvePlan, parameters: Sequence[str], rows: Sequence[str], gaps: FloatArray, status: IntArray
+) -> dict[str, str]:
+    """Return the parameters whose change would open a row, with the reason; gaps: (n, parameters, rows)."""
+    if (status == Status.OK).any():
+        gaps = gaps[status == Status.OK]
+    found = {}
+    for k, name in enumerate(parameters):
+        largest = np.abs(gaps[:, k]).max(axis=0, initial=0.0) * scale_of(plan, name)
+        if largest.max(initial=0.0) > OPEN:
+            row = rows[int(largest.argmax())]
+            found[name] = f"'{name}' cannot change by itself: redundant row {row} would not close"
+    return found
