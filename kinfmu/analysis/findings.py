@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinfmu.analysis.drivers import DriverAdvice
+from kinfmu.analysis.measuring import Measurements
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, SingularPoint
 from kinfmu.equations.redundancy import DependentRow, Redundancy
@@ -28,7 +29,8 @@ class Findings:
     """What a check finds. `problem` is the error that prevents solving, None if there is none.
 
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
-    None where drivers and degrees of freedom match; notes: further findings, one line each.
+    None where drivers and degrees of freedom match; notes: further findings, one line each;
+    measured: values of the measures, None without measures.
     """
 
     mechanism: Mechanism
@@ -39,6 +41,7 @@ class Findings:
     loops: tuple[NamedLoop, ...] = ()
     advice: DriverAdvice | None = None
     notes: tuple[str, ...] = ()
+    measured: Measurements | None = None
 
     @property
     def mobility(self) -> int:
@@ -100,6 +103,8 @@ class Findings:
         class, shape, sums, transmission: driver, coupler, output, smallest, at_smallest, largest, at_largest, verdict.
         advice: null if drivers and degrees of freedom match, else missing (number), surplus (name, implied_by), loose
         (coordinates), suggestions (name, and the keys of the driver's table).
+        measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
+        reason (why the value is null), refused: reason by name; null without measures.
         notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.
         """
         plan, mechanism = self.plan, self.mechanism
@@ -130,6 +135,7 @@ class Findings:
             "ranges": [reach.as_json() for reach in self.ranges],
             "loops": [loop.as_json() for loop in self.loops],
             "advice": None if self.advice is None else self.advice.as_json(),
+            "measures": None if self.measured is None else self.measured.as_json(),
             "notes": list(self.notes),
             "problem": str(self.problem) if self.problem else None,
         }

@@ -9,6 +9,7 @@ from kinfmu.analysis.drivers import clearer_problem, driver_advice
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.matrices import Matrix, pose_matrices
+from kinfmu.analysis.measuring import measurements
 from kinfmu.analysis.named_loops import find_named_loops
 from kinfmu.analysis.singular import driver_range
 from kinfmu.analysis.text import lines
@@ -51,7 +52,7 @@ class Report(Findings):
 
 
 def check(mechanism: Mechanism) -> Report:
-    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges.
+    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, measures.
 
     Args:
         mechanism: The mechanism to check.
@@ -83,4 +84,5 @@ def check(mechanism: Mechanism) -> Report:
     notes += run_notes(plan, ranges)
     loops = find_named_loops(mechanism, redundancy, paths)
     notes += motion_notes(mechanism, paths, loops)
-    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes))
+    measured = measurements(mechanism, ranges)
+    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes), measured)

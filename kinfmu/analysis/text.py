@@ -12,6 +12,7 @@ from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import TransmissionAngle
 from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
 from kinfmu.errors import listed
+from kinfmu.motion import MeasuredValue
 
 _MOST_LOOPS = 8  # in the text; JSON has all
 _END = {
@@ -26,7 +27,7 @@ _MOST_NAMES = 24  # in one line; JSON has all
 def lines(report: Findings) -> list[str]:
     """Return the findings, one per line, each after its subject."""
     found = [f"{report.mechanism.name}: {report.mechanism.title}" if report.mechanism.title else report.mechanism.name]
-    for parts in (_count, _rows, _plan, _advice, _loops, _motion):
+    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _measures, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(_line("problem", str(report.problem)))
@@ -191,6 +192,34 @@ def _motion(report: Findings) -> Iterator[str]:
         yield _line("", "each with the other drivers at their start values")
     if report.ranges and not report.singular and not any(reach.stopped for reach in report.ranges):
         yield _line("singular", "none in the range")
+
+
+def _measures(report: Findings) -> Iterator[str]:
+    measured = report.measured
+    if measured is None:
+        return
+    yield _line("measures", f"over {measured.over}")
+    for value in measured.values:
+        yield _line(
+            "", f"{value.name} = {_measured(value)}" if not value.reason else _no_value(value.name, value.reason)
+        )
+    for name, reason in measured.refused.items():
+        yield _line("", _no_value(name, reason))
+
+
+def _no_value(name: str, reason: str) -> str:
+    return f"{name}: no value, because {reason}"
+
+
+def _measured(value: MeasuredValue) -> str:
+    """Return a value with its unit and the driver values where it occurs."""
+    number = value_text(value.value, value.unit, "angle" if value.unit == "rad" else "length")
+    at = [degrees(u) if value.at_unit == "rad" else f"{u:.6g} {value.at_unit}" for u in value.at]
+    places = f" ({value.driver} at {' and '.join(at)})" if at else ""
+    return f"{number.removesuffix(' 1')}{places}"
+
+
+def _notes(report: Findings) -> Iterator[str]:
     for note in report.notes:
         yield _line("note", note)
 

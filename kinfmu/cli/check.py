@@ -41,7 +41,8 @@ def check(
 ) -> None:
     """Check a mechanism and report its properties.
 
-    Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points.
+    Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points, and the
+    measures of the file.
     """
     from kinfmu.analysis import check as checked
 

@@ -44,6 +44,7 @@ _TOKEN = re.compile(
     r"""|[^\w"'#-]++""",
     re.DOTALL,
 )
+_MEASURE = '{ measure = "angle", of = "rocker" }'  # in messages
 _SEGMENT = ("law", "rise", "duration")
 _TABLES = (
     "name",
@@ -215,7 +216,9 @@ def _value(where: str, value: Any, takes: Takes) -> Any:
         return text_of(where, value)
     if takes == "truth" and not isinstance(value, bool):
         raise MechanismError(f"{where} = {quoted(value)} must be true or false")
-    if takes == "measure" or (takes == "measured" and not isinstance(value, str)):
+    if takes == "measured" and not isinstance(value, dict):
+        return text_of(where, value, "a coordinate such as 'rocker.phi' or a table such as " + _MEASURE)
+    if takes in ("measure", "measured"):
         return _measure(where, value)
     if takes == "segments":
         return _segments(where, value)
@@ -237,8 +240,7 @@ def _value(where: str, value: Any, takes: Takes) -> Any:
 def _measure(where: str, table: Any) -> Measure:
     """Return a measure from a table such as { measure = "angle", of = "rocker" }."""
     if not isinstance(table, dict):
-        example = '{ measure = "angle", of = "rocker" }'
-        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {example}")
+        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_MEASURE}")
     cls = class_of_type(where, table, "measure", MEASURES)
     check_keys(where, table, ("measure", *table_keys(cls)))
     measure: Measure = cls(**_values(where, cls, table, None))

@@ -116,17 +116,25 @@ class Motion:
         return found[0] if found else Quantity("time")
 
     def driven_at(self, x: FloatArray) -> FloatArray:
-        """Return values of the driver at arguments (...)."""
+        """Return values of the driver at arguments (...); the end of a motion that goes round is its begin."""
         if self.drive is None:
             return x
-        turns = np.floor((x - self.x[0]) / (self.x[-1] - self.x[0])) if self.is_closed else np.zeros_like(x)
-        travel = self.drive.value[-1] - self.drive.value[0]
-        found = self.drive.at((x - turns * (self.x[-1] - self.x[0])).reshape(-1))[0].reshape(np.shape(x))
-        return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
+        found, first, last = self._driven(x), self.drive.value[0], self.drive.value[-1]
+        is_end = self.is_closed & (np.abs(found - last) <= _SAME_POSE * np.abs(last - first))
+        return np.asarray(np.where(is_end, first, found))
 
     def driven_between(self, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Return how far the driver moves between arguments (...)."""
-        return np.abs(self.driven_at(stop) - self.driven_at(start))
+        return np.abs(self._driven(stop) - self._driven(start))
+
+    def _driven(self, x: FloatArray) -> FloatArray:
+        """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
+        if self.drive is None:
+            return x
+        span, travel = self.drive.span, self.drive.value[-1] - self.drive.value[0]
+        turns = np.floor((x - self.x[0]) / span) if self.is_closed else np.zeros_like(x)
+        found = self.drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
+        return np.asarray(np.where(np.isnan(x), np.nan, found + turns * travel))
 
     def part(self, begin: float | None, end: float | None) -> Motion:
         """Return the part of the motion between two values of the driver; None: its first or last.
