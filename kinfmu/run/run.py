@@ -84,9 +84,9 @@ class Event(NamedTuple):
 class Run:
     """The motion of a mechanism at n samples.
 
-    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields that are
-    seldom read (fixed, inputs, iterations, margin, error, mechanism_source, info, axis) may be given as functions,
-    which are called when the field is first read.
+    Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields declared as
+    Lazy may be given as functions, which are called when the field is first read: a call with few samples, or with
+    given tables, then costs little more than its solving.
 
     Attributes:
         t: (n,) times [s]; of a run over driver values the numbers of the samples.
@@ -116,16 +116,16 @@ class Run:
 
     """
 
-    t: FloatArray
+    t: Lazy[FloatArray] = Lazy()  # a descriptor, not a default
     outputs: tuple[CoordinateName, ...]
     coordinate_count: int
     values: FloatArray
     rates: FloatArray
     accelerations: FloatArray
-    fixed: Lazy[Mapping[CoordinateName, float]] = Lazy()  # a descriptor, not a default
+    fixed: Lazy[Mapping[CoordinateName, float]] = Lazy()
     input_names: tuple[InputName, ...]
     inputs: Lazy[FloatArray] = Lazy()
-    status: IntArray
+    status: Lazy[IntArray] = Lazy()
     iterations: Lazy[IntArray] = Lazy()
     residual: FloatArray
     margin: Lazy[FloatArray] = Lazy()
@@ -224,7 +224,7 @@ class Run:
         return f"<Run of {name}: {len(self.t)} samples{span}, {bad} without numbers; {', '.join(self.outputs)}>"
 
     def __len__(self) -> int:
-        return len(self.t)
+        return len(self.values)
 
     def part(self, rows: slice | NDArray[Any], events: tuple[Event, ...] = ()) -> Run:
         """Return some of the samples, with these events; lazy tables stay lazy."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,8 @@ from kinfmu.run.unwrap import unwrap
 from kinfmu.sweep.engine import Driven
 
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
+_LARGEST_KEPT = 1_000_000  # numbers
+_FEW = 1000  # numbers that one product checks sooner than two reductions; longer products are given to threads
 _SAFE = 1e150  # its square is finite
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
@@ -82,14 +86,37 @@ def driven_by_inputs(
     n = next(iter(lengths - {1}), min(lengths, default=1))
     is_by_design = any(array.ndim == 2 for array in columns.values())
     shape = (rows, n) if is_by_design else (n,)
-    tables = tuple(np.empty((*shape, len(drivers))) for _ in range(3))
-    for order, (table, default) in enumerate(zip(tables, _DEFAULTS, strict=True)):
-        for k, driver in enumerate(drivers):
-            name = driver.inputs[order]
-            table[..., k] = columns.get(name, default)
-            if order and name in columns:
+    for driver in drivers:
+        for name in driver.inputs[1:]:
+            if name in columns:
                 _refuse_huge(name, columns[name])
-    return tables  # type: ignore[return-value]  # three of them
+    u, ud, udd = (
+        _table([columns.get(driver.inputs[order]) for driver in drivers], shape, default)
+        for order, default in enumerate(_DEFAULTS)
+    )
+    return u, ud, udd
+
+
+def _table(columns: Sequence[FloatArray | None], shape: tuple[int, ...], default: float) -> FloatArray:
+    """Return a table (n, d) or (m, n, d) of columns, of which None are the default.
+
+    Columns are copied: a run reads them later too, when the caller may have changed them.
+    """
+    size = math.prod(shape)
+    if all(column is None for column in columns) and size * len(columns) <= _LARGEST_KEPT:
+        return _constant(size * len(columns), default).reshape(*shape, len(columns))
+    table = np.empty((*shape, len(columns)))
+    for k, column in enumerate(columns):
+        table[..., k] = default if column is None else column
+    return table
+
+
+@lru_cache(maxsize=4)
+def _constant(count: int, value: float) -> FloatArray:
+    """Return so many equal numbers; the last ones are kept, because filling them takes as long as solving."""
+    numbers = np.full(count, value)
+    numbers.flags.writeable = False
+    return numbers
 
 
 def without_huge_rates(driven: Driven) -> Driven:
@@ -130,8 +157,9 @@ def _refuse_huge(name: str, rates: FloatArray) -> None:
 
 def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
-    flat = values.ravel(order="K")
-    with np.errstate(over="ignore"):
-        if float(flat.dot(flat)) <= min(largest, _SAFE) ** 2:  # one pass; it decides unless values are huge
-            return True
+    if values.size < _FEW:
+        flat = values.ravel(order="K")
+        with np.errstate(over="ignore"):
+            if float(flat.dot(flat)) <= min(largest, _SAFE) ** 2:  # it decides unless values are huge
+                return True
     return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)

@@ -17,12 +17,12 @@ class UnreachedError(KinfmuError):
 
 
 class SweepResult(NamedTuple):
-    """Per-sample diagnostics as in Run; iterations, margin and error are functions that compute them.
+    """Per-sample diagnostics as in Run; status, iterations, margin and error are functions that return them.
 
     failures: the first sample of each interval without numbers, and the reason.
     """
 
-    status: IntArray
+    status: Callable[[], IntArray]
     iterations: Callable[[], IntArray]
     residual: FloatArray
     watch: FloatArray

@@ -172,21 +172,22 @@ class Model:
         """
         tolerance = read_tolerance("tolerance", tolerance)
         setting = self.setting(parameters or {})
-        driven = None
+        driven, times = None, np.empty(0)
         if inputs:
             if t is not None:
                 raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
             driven = driven_by_inputs(self.plan.drivers, inputs, wrap=wrap)
-            times = np.arange(len(driven[0]), dtype=float)
+            count = len(driven[0])
         elif wrap:
             raise RequestError("wrap unwraps angles given as inputs, such as crank_angle; times by a law have no jumps")
         else:
             times = column_of("t", run_times(self.mechanism.run) if t is None else t)
+            count = len(times)
         try:
-            engine = self._engine(len(times), setting, tolerance, by_law=driven is None)
+            engine = self._engine(count, setting, tolerance, by_law=driven is None)
             if driven is None:
                 driven = without_huge_rates(engine.drive(times, setting.constants))
-            tables = _tables(out, (len(times), len(self.outputs)), engine.order)
+            tables = _tables(out, (count, len(self.outputs)), engine.order)
             result = engine.sweep(driven, tables)
         except UnreachedError as reason:
             if not anew:
@@ -194,7 +195,7 @@ class Model:
             return self._solve_anew(str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs)
         plan, given = self.plan, driven
         return Run(
-            t=times,
+            t=(lambda: np.arange(count, dtype=float)) if inputs else times,
             outputs=self.outputs,
             coordinate_count=plan.coordinate_count,
             values=tables[0],
@@ -202,7 +203,7 @@ class Model:
             accelerations=tables[2],
             fixed=lambda: dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
             input_names=self._input_names,
-            inputs=lambda: np.stack(given, axis=2).reshape(len(times), len(self._input_names)),
+            inputs=lambda: np.stack(given, axis=2).reshape(count, len(self._input_names)),
             status=result.status,
             iterations=result.iterations,
             residual=result.residual,
@@ -213,7 +214,7 @@ class Model:
             length_unit=plan.mechanism.length_unit,
             mechanism_source=self._mechanism_with(setting),
             info=lambda: self._info(setting, engine.name),
-            events=tuple(Event(float(times[k]), "error", message) for k, message in result.failures),
+            events=tuple(Event(float(k if inputs else times[k]), "error", message) for k, message in result.failures),
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
 

@@ -57,7 +57,7 @@ class NativeEngine:
             lambda: self._library.diagnose(driven, result.outcomes, self._parameters, self._tolerance)
         )
         return SweepResult(
-            status=result.outcomes[:, 0].astype(np.int64),
+            status=lambda: result.outcomes[:, 0].astype(np.int64),
             iterations=lambda: result.outcomes[:, 1].astype(np.int64),
             residual=result.residual,
             watch=result.watch,

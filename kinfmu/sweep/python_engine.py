@@ -101,7 +101,7 @@ class PythonEngine:
             array[:] = whole[:, k]
         diagnostics = np.array(outcomes, dtype=float).reshape(n, 3)
         return SweepResult(
-            status=diagnostics[:, 0].astype(np.int64),
+            status=lambda: diagnostics[:, 0].astype(np.int64),
             iterations=lambda: diagnostics[:, 2].astype(np.int64),
             residual=diagnostics[:, 1],
             watch=np.array(watches, dtype=float).reshape(n, watch_count),
