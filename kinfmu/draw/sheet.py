@@ -33,6 +33,10 @@ _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
 _EDGE = 12.0  # [pt], margin left and below without axes
 _FINEST = 0.45  # smallest factor of the sizes of details, for short links
 _SPACING = 3.0  # [pt] between the dots that record what is covered
+TITLE_FONT = 11.0  # [pt]
+TITLE_LINE = 15.0  # [pt], from line to line
+MOST_LINES = 2  # of a title
+_THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
 
 
 class Sheet:
@@ -241,12 +245,6 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
         spine.set_color(grey)
     axes.set_title("\n".join(lines), fontsize=TITLE_FONT, loc="left", color=ink(INK), parse_math=False)
     return made, axes
-
-
-TITLE_FONT = 11.0  # [pt]
-TITLE_LINE = 15.0  # [pt], from line to line
-MOST_LINES = 2
-_THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
 
 
 @lru_cache(maxsize=64)

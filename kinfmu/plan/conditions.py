@@ -110,6 +110,7 @@ def _loose(system: System, redundancy: Redundancy) -> list[str]:
 
 
 def _are(drivers: Sequence[str]) -> str:
+    """Return 'is no driver', 'is 1 driver (crank)' or 'are 2 drivers (crank, lift)'."""
     if not drivers:
         return "is no driver"
     return f"is 1 driver ({drivers[0]})" if len(drivers) == 1 else f"are {len(drivers)} drivers ({listed(drivers)})"

@@ -213,6 +213,7 @@ class SolvePlan:
 
 
 def _behind_all(nodes: Sequence[Node], behind: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    """Return the symbols of nodes, each coordinate in `behind` replaced by the symbols that it depends on."""
     names = {symbol.name for symbol in symbols(nodes)}
     return frozenset().union(*(behind.get(name, frozenset((name,))) for name in names))
 
@@ -226,4 +227,5 @@ def nodes_of(block: Block) -> list[Node]:
 
 
 def position_count(block: Block) -> int:
+    """Return how many of `nodes_of` belong to the position stage."""
     return len(block.assigned) + len(block.residuals) + sum(len(row) for row in block.jacobian)

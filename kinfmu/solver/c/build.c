@@ -22,14 +22,14 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
 {
     const double least = 0.1 * NARROWEST * kf_reach[KF_ALONG(solver)];
     double step = 0.5 * (*zero - KF_HERE(solver, pose));
-    bool whole = false; /* the first estimate may stem from the same two places */
+    bool is_compared = false; /* the first step says nothing: the estimate may stem from the same two places */
     while (fabs(step) > least) {
         const double here = KF_HERE(solver, pose);
         kf_pose *const ahead = kf_follow_path(solver, pose, here + step);
         double of_here, of_ahead, better, left, change;
         if (ahead == NULL) {
             step *= 0.5;
-            whole = false;
+            is_compared = false;
             continue;
         }
         of_here = pose->found.determinants[block];
@@ -43,12 +43,12 @@ static bool locate(kf_solver *solver, kf_pose *pose, int block, double *zero)
         }
         change = fabs(better - *zero);
         *zero = better;
-        if (whole && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
+        if (is_compared && change <= STRAIGHT * fabs(left) && change <= 0.2 * NARROWEST * kf_reach[KF_ALONG(solver)]) {
             return true;
         }
         solver->scratch.located = *ahead; /* paths from here may fail */
         pose = &solver->scratch.located;
-        whole = true;
+        is_compared = true;
         step = 0.5 * (better - KF_HERE(solver, pose));
     }
     return false;

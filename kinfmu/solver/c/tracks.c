@@ -88,7 +88,7 @@ static bool is_apart(const kf_pose *pose)
     return apart;
 }
 
-/* Take one trusted step of all drivers; false if it is none, or if a track is near a singular point. */
+/* Take one trusted step of all drivers; return false if it is not trusted, or if a track is near a singular point. */
 bool kf_is_near(kf_solver *solver, kf_pose *start, const double *u, kf_pose *pose)
 {
     double direction[KF_DRIVERS], distance;
@@ -140,7 +140,7 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
     memset(pose->held, 0, sizeof pose->held);
     pose->is_held = false;
     for (k = 0; k < KF_DRIVERS; ++k) {
-        kf_status one;
+        kf_status own_status;
         if (!has_track(k)) {
             pose->own[k].status = KF_OK;
             pose->own[k].map = pose->own[k].bridge = pose->own[k].base_bridge = -1;
@@ -149,8 +149,9 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
         }
         kf_enter_track(solver, k);
         solver->tolerance = INFINITY; /* it applies to the whole pose only */
-        one = kf_solve_along(solver, kf_on_track(solver, start, k), kf_driven_at(&solver->model, &u[k], buffer), own);
-        if (!KF_GOOD(one) && u != target) { /* the message names the target */
+        kf_driven_at(&solver->model, &u[k], buffer);
+        own_status = kf_solve_along(solver, kf_on_track(solver, start, k), buffer, own);
+        if (!KF_GOOD(own_status) && u != target) { /* the message names the target */
             char message[KF_MESSAGE];
             kf_status beyond;
             memcpy(message, solver->message, sizeof message);
@@ -159,18 +160,18 @@ kf_status kf_assembled(kf_solver *solver, kf_pose *start, const double *u, const
             if (KF_GOOD(beyond)) {
                 memcpy(solver->message, message, sizeof message);
             } else {
-                one = beyond;
+                own_status = beyond;
             }
         }
         solver->tolerance = tolerance;
-        if (KF_GOOD(one)) {
+        if (KF_GOOD(own_status)) {
             keep(solver, own, k, pose, z);
             iterations += own->found.iterations;
-            status = one == KF_NEAR_SINGULAR || status == KF_OK ? one : status;
+            status = own_status == KF_NEAR_SINGULAR || status == KF_OK ? own_status : status;
         }
         kf_leave_track(solver);
-        if (!KF_GOOD(one)) {
-            return kf_failed(pose, one);
+        if (!KF_GOOD(own_status)) {
+            return kf_failed(pose, own_status);
         }
     }
     pose->low = -INFINITY;

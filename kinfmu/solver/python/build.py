@@ -45,19 +45,19 @@ def _located(model: Model, pose: Pose, block: int, zero: float) -> float | None:
     """
     reach: float = model.REACH[0]
     step = 0.5 * (zero - pose.u[0])
-    whole = False  # the first estimate may stem from the same two places
+    is_compared = False  # the first step says nothing: the estimate may stem from the same two places
     while abs(step) > 0.1 * NARROWEST * reach:
         ahead = follow_path(model, pose, pose.u[0] + step)
         if ahead is None:
-            step, whole = 0.5 * step, False
+            step, is_compared = 0.5 * step, False
             continue
         better = secant_zero(pose, ahead, block)
         if better is None or (better - ahead.u[0]) * step <= 0.0:
             return None
         change = abs(better - zero)
-        if whole and change <= STRAIGHT * abs(better - ahead.u[0]) and change <= 0.2 * NARROWEST * reach:
+        if is_compared and change <= STRAIGHT * abs(better - ahead.u[0]) and change <= 0.2 * NARROWEST * reach:
             return better
-        pose, zero, whole = ahead, better, True
+        pose, zero, is_compared = ahead, better, True
         step = 0.5 * (zero - pose.u[0])
     return None
 
