@@ -355,7 +355,7 @@ def _lines(assemblies: Assemblies) -> Iterator[str]:
     for k, one in enumerate(assemblies.found, start=1):
         values = [_value(name, one.coordinates[name], mechanism.length_unit) for name in assemblies.distinguished_by]
         if one.is_chosen:
-            values.append("the file's")
+            values.append("that of the file")
         yield f"  {'*' if one.is_chosen else ' '} {k:<8}  {listed(values)}"
         for number, (body, start) in enumerate(one.start.items()):
             how = "and by" if number else "choose it by"

@@ -50,7 +50,8 @@ def _count(report: Findings) -> Iterator[str]:
     rows = sum(len(joint.labels) for joint in mechanism.joints)
     yield _line("bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}")
     yield _line("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
-    yield _line("mobility", f"{report.mobility}, driven by {_names(driver.name for driver in mechanism.drivers)}")
+    drivers = f"driven by {_names(driver.name for driver in mechanism.drivers)}" if mechanism.drivers else "no driver"
+    yield _line("mobility", f"{report.mobility}, {drivers}")
     if report.gruebler != report.mobility:
         yield _line("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 
@@ -114,7 +115,9 @@ def _loops(report: Findings) -> Iterator[str]:
             yield _line("loop", f"four-bar: {listed(f'{name} {length:.6g}' for name, length in links)} {unit}")
             yield _line("", _four_bar_class(named, loop))
         else:
-            sizes = f"crank {loop.crank.name} {loop.crank.length:.6g}, rod {loop.rod.name} {loop.rod.length:.6g}"
+            links = (("crank", loop.crank), ("rod", loop.rod))
+            names = (role if link.name == role else f"{role} {link.name}" for role, link in links)
+            sizes = listed(f"{name} {link.length:.6g}" for name, (_, link) in zip(names, links, strict=True))
             yield _line("loop", f"slider-crank: {sizes}, offset {loop.offset:.6g} {unit}")
             yield _line("", _slider_crank_class(named, loop))
         for angle in named.transmission:
@@ -126,12 +129,14 @@ def _loops(report: Findings) -> Iterator[str]:
 def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
     kind, first, coupler, last = named.grashof, *loop.links
     if kind.name == "does not close":
-        return f"does not close: its longest side {kind.small:.6g} is more than the others together, {kind.large:.6g}"
+        return (
+            f"does not close: its longest side ({kind.small:.6g}) is longer than the others together ({kind.large:.6g})"
+        )
     sign = _sign(kind.small, kind.large, kind.name)
-    sums = f"shortest + longest {kind.small:.6g} {sign} the two others {kind.large:.6g}"
+    sums = f"shortest + longest ({kind.small:.6g}) {sign} sum of the two others ({kind.large:.6g})"
     if kind.name == "change point":
         shape = f" ({kind.shape})" if kind.shape else ""
-        return f"change point{shape}: {sums}; the links fall in line"
+        return f"change point{shape}: {sums}; the links can fall in line"
     turns = {
         "crank-rocker": f"{first} can turn all the way round, {last} rocks",
         "rocker-crank": f"{last} can turn all the way round, {first} rocks",
@@ -147,7 +152,8 @@ def _slider_crank_class(named: NamedLoop, loop: SliderCrank) -> str:
     if kind.name == "does not close":
         return f"does not close: the offset of the slide is {kind.small:.6g}, crank and rod reach {kind.large:.6g}"
     shorter, longer = ("crank", "rod") if loop.crank.length <= loop.rod.length else ("rod", "crank")
-    sums = f"{shorter} + offset {kind.small:.6g} {_sign(kind.small, kind.large, kind.name)} {longer} {kind.large:.6g}"
+    sign = _sign(kind.small, kind.large, kind.name)
+    sums = f"{shorter} + offset ({kind.small:.6g}) {sign} {longer} ({kind.large:.6g})"
     turns = {
         "crank turns": f"{loop.crank.name} can turn all the way round",
         "rod turns": f"{loop.rod.name} can turn all the way round, {loop.crank.name} rocks",

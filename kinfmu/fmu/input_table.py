@@ -261,7 +261,7 @@ def undriven(interface: Interface, table: InputTable | None, t: float) -> Iterat
         why = "no inputs are given" if table is None else f"{table.source} does not drive all inputs"
         values = listed(f"{variable.name} stays at {variable.start:.6g} {variable.unit}" for variable in still)
         columns = listed((TIME, *(variable.name for variable in still)))
-        yield Event(t, "warning", f"{why}: {values}; a CSV with the columns {columns} drives (--input)")
+        yield Event(t, "warning", f"{why}: {values}; to set them, give a CSV file with the columns {columns} (--input)")
 
 
 def _span(experiment: RunSettings, table: InputTable, start: float | None, stop: float | None) -> Iterator[Event]:

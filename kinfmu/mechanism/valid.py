@@ -19,7 +19,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}\Z")
 def check_name(where: str, name: str) -> None:
     """Raise a MechanismError unless `name` is a valid name."""
     if not _NAME.match(name):
-        rule = "must be letters, digits and underscores, no digit first, at most 100 in all"
+        rule = "must consist of at most 100 letters, digits and underscores, and not begin with a digit"
         raise MechanismError(f"{where} {quoted(name)} {rule}")
 
 

@@ -74,8 +74,8 @@ def refuse_mobility(system: System, redundancy: Redundancy) -> None:
         missing = mobility - len(names)
         raise MobilityError(
             f"[drivers] mobility is {mobility} but there {_are(names)}: "
-            f"{missing} more {'driver is' if missing == 1 else 'drivers are'} needed, or joints: "
-            f"{listed(_loose(system, redundancy))} can still move",
+            f"{listed(_loose(system, redundancy))} can still move; "
+            f"add {missing} {'driver' if missing == 1 else 'drivers'}, or joints",
             mobility=mobility,
         )
     if mobility == 0:

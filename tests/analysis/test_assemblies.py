@@ -116,7 +116,7 @@ def test_every_assembly_is_found_and_its_start_poses_lead_to_it(mechanism: Mecha
 def test_one_start_angle_chooses_a_four_bar() -> None:
     text = str(found_for(fourbar(4, 1, 3.5, 3)))
     assert "  assemblies  2 at crank = 1 rad (57.2957795 deg), distinguished by coupler.phi" in text
-    assert "  * 1         coupler.phi 36.609 deg, the file's" in text
+    assert "  * 1         coupler.phi 36.609 deg, that of the file" in text
     assert '              choose it by [bodies.rocker] start.phi = "-129.9 deg"' in text
 
 

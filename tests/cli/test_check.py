@@ -136,8 +136,8 @@ def test_a_driver_too_many_or_too_few_is_reported(fails: Callable[..., str], fou
     text = path.read_text(encoding="utf-8")
     path.write_text(text[: text.index("[drivers.crank]")], encoding="utf-8")
     assert fails("check", path) == (
-        f"{path}: [drivers] mobility is 1 but there is no driver: 1 more driver is needed, "
-        "or joints: crank, coupler, rocker can still move"
+        f"{path}: [drivers] mobility is 1 but there is no driver: "
+        "crank, coupler, rocker can still move; add 1 driver, or joints"
     )
 
 

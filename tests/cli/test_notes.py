@@ -60,7 +60,9 @@ def test_an_fmu_driven_by_inputs_says_that_it_stands_still_and_how_to_drive_it(
     start = {driver.name: driver.law.at(0.0) for driver in kinfmu.load("five_bar").drivers}
     values = ", ".join(f"{name}_angle stays at {value:.6g} rad" for name, value in start.items())
     names = ", ".join(f"{name}_angle" for name in start)
-    assert message == (f"warning: no inputs are given: {values}; a CSV with the columns time, {names} drives (--input)")
+    assert message == (
+        f"warning: no inputs are given: {values}; to set them, give a CSV file with the columns time, {names} (--input)"
+    )
     first, second = names.split(", ")
     (tmp_path / "one.csv").write_text(f"time,{first}\n0,{start['left']}\n0.1,{start['left'] + 0.01}\n")
     *_, message = notes("simulate", "five.fmu", "--input", "one.csv", "--stop", "0.1", "--start", "0")
@@ -72,7 +74,7 @@ def test_a_mechanism_without_a_law_is_driven_by_inputs_and_reports_it(
 ) -> None:
     path = fourbar_file('law = "constant_speed"\nstart = 0\nspeed = "1 deg/s"', 'law = "external"\nstart = "60 deg"')
     (message,) = notes("simulate", path)
-    assert message.startswith("warning: no inputs are given: crank_angle stays at 1.0472 rad; a CSV")
+    assert message.startswith("warning: no inputs are given: crank_angle stays at 1.0472 rad; to set them, give a CSV")
     (message,) = notes("solve", path, "-o", "run.csv")
     assert message == (
         "warning: driver crank has no law and does not move with time; use solve --angle for one driver, simulate "

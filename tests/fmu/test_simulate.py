@@ -219,8 +219,8 @@ def test_fmu_driven_by_inputs_stays_at_its_start_without_inputs_and_warns(built:
     assert run["upper.omega"] == pytest.approx(np.zeros(4))
     assert [event.level for event in run.events] == ["warning"]
     assert run.events[0].text == (
-        "no inputs are given: crank_angle stays at 5.23599 rad; a CSV with the columns time, crank_angle "
-        "drives (--input)"
+        "no inputs are given: crank_angle stays at 5.23599 rad; "
+        "to set them, give a CSV file with the columns time, crank_angle (--input)"
     )
 
 

@@ -41,7 +41,7 @@ LAWS = (
     "4-5-6-7, spline, sequence, external"
 )
 LENGTHS = "m, mm, cm, um, km, in, ft"
-NAME_RULE = "must be letters, digits and underscores, no digit first, at most 100 in all"
+NAME_RULE = "must consist of at most 100 letters, digits and underscores, and not begin with a digit"
 
 # case: text in the file, its replacement, the message
 CHANGES = {
@@ -388,7 +388,7 @@ def test_a_number_of_thousands_of_digits_is_refused() -> None:
 
 
 def test_a_long_value_is_shortened_in_the_message() -> None:
-    assert re.fullmatch(r"name = 'a{40,}\.\.\.a{40,}' must be letters.*", message(f'name = "{"a" * 100_000}"'))
+    assert re.fullmatch(r"name = 'a{40,}\.\.\.a{40,}' must consist of at most 100 letters.*", message(f'name = "{"a" * 100_000}"'))
     assert message("name = [" + "1," * 100_000 + "]") == "name = [1, 1, 1, 1, 1, 1, ...] must be text"
 
 

@@ -300,7 +300,7 @@ WORDS = "sin, cos, tan, sqrt, asin, acos, atan2, pi"
         ),
         (
             {"2a": 1.0},
-            "[parameters] '2a' must be letters, digits and underscores, no digit first, at most 100 in all",
+            "[parameters] '2a' must consist of at most 100 letters, digits and underscores, and not begin with a digit",
         ),
         ({"b": "1 s", "c": "a + b"}, "[parameters] c = 'a + b', character 3: '+': a length and a time cannot be added"),
         ({"a": "30 deg"}, "[bodies.bar] points.P = 'a' is an angle and must be a length"),

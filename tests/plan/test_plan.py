@@ -108,13 +108,17 @@ def test_hash_order_never_reaches_the_plan_or_its_code() -> None:
 
 def test_too_few_and_too_many_drivers_have_different_messages() -> None:
     bodies, joints = fourbar(4, 1, 3.5, 3).bodies, fourbar(4, 1, 3.5, 3).joints
-    with pytest.raises(MobilityError, match=r"mobility is 1 but there is no driver: 1 more driver is needed"):
+    with pytest.raises(
+        MobilityError, match=r"no driver: crank, coupler, rocker can still move; add 1 driver, or joints"
+    ):
         compile_plan(Mechanism("m", bodies, joints))
     two = [AngleDriver("a", "crank"), AngleDriver("b", "rocker")]
     with pytest.raises(MobilityError, match=r"mobility is 1 but there are 2 drivers \(a, b\): remove 1"):
         compile_plan(Mechanism("m", bodies, joints, two))
     five = five_bar()
-    with pytest.raises(MobilityError, match=r"mobility is 2 but there is 1 driver \(shoulder\): 1 more driver"):
+    with pytest.raises(
+        MobilityError, match=r"mobility is 2 but there is 1 driver \(shoulder\): .* can still move; add 1"
+    ):
         compile_plan(Mechanism("m", five.bodies, five.joints, five.drivers[:1]))
 
 
@@ -240,9 +244,7 @@ def test_what_cannot_move_at_all_is_refused() -> None:
 
 
 def test_a_body_without_joints_is_free() -> None:
-    with pytest.raises(
-        MobilityError, match="mobility is 3 but there is no driver: 3 more drivers are needed, or joints: b can"
-    ):
+    with pytest.raises(MobilityError, match="there is no driver: b can still move; add 3 drivers, or joints"):
         compile_plan(Mechanism("free", [Body("b")]))
 
 
