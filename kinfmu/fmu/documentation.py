@@ -44,10 +44,10 @@ text-align: left; vertical-align: top }}</style></head>
 <p>If <code>driven_by_time</code> is true, the law in the mechanism file drives; its constants are parameters. If it is
 false, the inputs drive: {inputs}. A get after a set returns values at the new inputs, without a step between them.
 Speed and acceleration inputs may be left unconnected. Co-simulation then estimates them from the samples until they
-are first set to a value other than 0; the errors of the estimates fall with the step as h<sup>2</sup> and h. Model exchange does not estimate: unconnected inputs
-are 0. <code>solver.error_qd</code> and <code>solver.error_qdd</code> include these errors. Where the errors are unknown
-(<code>solver.error_qd</code> at the first two samples, <code>solver.error_qdd</code> at the first three) they are
-{unknown:g}.</p>
+are first set to a value other than 0; the errors of the estimates fall with the step as h<sup>2</sup> and h. Model
+exchange does not estimate: unconnected inputs are 0. <code>solver.error_qd</code> and <code>solver.error_qdd</code>
+include these errors. Where the errors are unknown (<code>solver.error_qd</code> at the first two samples,
+<code>solver.error_qdd</code> at the first three) they are {unknown:g}.</p>
 <h2>When a pose cannot be reached</h2>
 <p><code>solver.status</code> reports it, outputs keep the last good values, <code>solver.message</code> states driver,
 value and limit, and the next step returns Discard (in native FMUs also a get of positions, rates and accelerations).

@@ -388,7 +388,9 @@ def test_a_number_of_thousands_of_digits_is_refused() -> None:
 
 
 def test_a_long_value_is_shortened_in_the_message() -> None:
-    assert re.fullmatch(r"name = 'a{40,}\.\.\.a{40,}' must consist of at most 100 letters.*", message(f'name = "{"a" * 100_000}"'))
+    assert re.fullmatch(
+        r"name = 'a{40,}\.\.\.a{40,}' must consist of at most 100 letters.*", message(f'name = "{"a" * 100_000}"')
+    )
     assert message("name = [" + "1," * 100_000 + "]") == "name = [1, 1, 1, 1, 1, 1, ...] must be text"
 
 
