@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 
 from kinfmu.analysis.findings import Findings
-from kinfmu.analysis.loops import FourBar, SliderCrank
+from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import TransmissionAngle
@@ -115,15 +115,18 @@ def _loops(report: Findings) -> Iterator[str]:
             yield _line("loop", f"four-bar: {listed(f'{name} {length:.6g}' for name, length in links)} {unit}")
             yield _line("", _four_bar_class(named, loop))
         else:
-            links = (("crank", loop.crank), ("rod", loop.rod))
-            names = (role if link.name == role else f"{role} {link.name}" for role, link in links)
-            sizes = listed(f"{name} {link.length:.6g}" for name, (_, link) in zip(names, links, strict=True))
+            sizes = f"{_sized('crank', loop.crank)}, {_sized('rod', loop.rod)}"
             yield _line("loop", f"slider-crank: {sizes}, offset {loop.offset:.6g} {unit}")
             yield _line("", _slider_crank_class(named, loop))
         for angle in named.transmission:
             yield _line("", _transmission(angle, unit))
     if len(report.loops) > _MOST_LOOPS:
         yield _line("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
+
+
+def _sized(role: str, link: Link) -> str:
+    """Return the role, name and length of a link; the name only where it differs from the role."""
+    return f"{role} {link.length:.6g}" if link.name == role else f"{role} {link.name} {link.length:.6g}"
 
 
 def _four_bar_class(named: NamedLoop, loop: FourBar) -> str:
