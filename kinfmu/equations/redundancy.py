@@ -87,8 +87,8 @@ def find_redundancy(system: System) -> Redundancy:
         others = [k for k in kept if k != index]
         joints = {system.member_of[row] for row in (*implying, index)}
         of_joints = [k for k in others if system.member_of[k] in joints]  # some have no weight at a single pose
-        companies = [implying, of_joints, others] if implying else [others]
-        found = next(filter(None, (_poses_of_dependence(system, start, index, rows) for rows in companies)), None)
+        groups = [implying, of_joints, others] if implying else [others]  # few rows first: they are tested faster
+        found = next(filter(None, (_poses_of_dependence(system, start, index, rows) for rows in groups)), None)
         if found is None:
             continue
         poses, rows = found
@@ -119,7 +119,7 @@ def _poses_of_dependence(
 ) -> tuple[list[FloatArray], Sequence[int]] | None:
     """Return poses of the motion that other rows leave, if a row depends on them at all of these, and the rows.
 
-    Only the bodies that these rows touch move: what a few rows imply they imply in every company.
+    Only the bodies that these rows touch move: more rows only restrict the motion, so the dependence stays.
     """
     members = {system.member_of[row] for row in (*others, index)}
     columns = sorted({column for number in members for column in system.members[number].columns})
@@ -143,11 +143,13 @@ def _suspects(system: System, closed: FloatArray | None) -> dict[int, list[int]]
 
 
 def _in_span(system: System, pose: FloatArray, index: int, others: Sequence[int]) -> bool:
+    """Return whether the gradient of a row lies in the span of those of other rows at a pose."""
     _, gradient, outside = _combination(system, pose, index, others)
     return bool(np.linalg.norm(outside) <= _IN_SPAN * max(1.0, float(np.linalg.norm(gradient))))
 
 
 def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others: Sequence[int]) -> tuple[str, ...]:
+    """Return the names of the other rows that have a weight in the combination at any of the poses."""
     used = np.zeros(len(others), dtype=bool)
     for pose in poses:
         used |= np.abs(_combination(system, pose, index, others)[0]) > 1e-6

@@ -67,12 +67,12 @@ class BlockEstimates:
         u, z = self._model.ANCHOR
         drive = u, (1.0,) * len(u), (0.0,) * len(u)
         try:
-            one = self._of_one(*drive, z)
-            two = self._of_part(*(np.array([row, row]) for row in (*drive, z)))
+            by_numbers = self._of_one(*drive, z)
+            by_arrays = self._of_part(*(np.array([row, row]) for row in (*drive, z)))
         except (ArithmeticError, AttributeError, TypeError, ValueError) as error:
             raise LookupError(f"no arrays: {error}") from None
-        if not (np.isfinite(two).all() and (two == one).all()):
-            raise LookupError(f"at the anchor arrays give {two[0]}, numbers {one}")
+        if not (np.isfinite(by_arrays).all() and (by_arrays == by_numbers).all()):
+            raise LookupError(f"at the anchor arrays give {by_arrays[0]}, numbers {by_numbers}")
 
     def __call__(self, u: Array, ud: Array, udd: Array, z: Array) -> Array:
         """Return margin, error_q, error_qd and error_qdd of samples of status ok.
