@@ -16,6 +16,7 @@ from kinfmu.analysis.values import law_values, value_text
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
+from kinfmu.measures import Measure
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -51,18 +52,28 @@ def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath], loops: Seque
         yield from _toggles(mechanism, path, loops)
 
 
+def _texts(member: object) -> set[object]:
+    """Return the texts in the fields of a joint, a driver or a measure, and in those of its measured quantity."""
+    found: set[object] = set()
+    for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
+        value = getattr(member, entry.name)
+        if isinstance(value, Measure):
+            found |= _texts(value)
+        else:
+            found |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()
+    return found
+
+
 def _unused_points(mechanism: Mechanism) -> Iterator[str]:
-    used = set(mechanism.points.values())
-    for member in (*mechanism.joints, *mechanism.drivers):
-        for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
-            value = getattr(member, entry.name)
-            used |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()
+    used: set[object] = set(mechanism.points.values())
+    for member in (*mechanism.joints, *mechanism.drivers, *mechanism.measures):
+        used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
     if unused:
         one = len(unused) == 1
         yield (
-            f"point{'' if one else 's'} {listed(unused)} {'is' if one else 'are'} used by no joint, driver or point of "
-            "interest"
+            f"point{'' if one else 's'} {listed(unused)} {'is' if one else 'are'} used by no joint, driver, measure or "
+            "point of interest"
         )
 
 

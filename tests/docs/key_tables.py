@@ -1,4 +1,4 @@
-"""The key tables of docs/mechanism-files.md, from the declared keys of the classes."""
+"""The key tables of docs/mechanism-files.md and docs/measures.md, from the declared keys of the classes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, LawQuantity
 from kinfmu.measures import MEASURES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
+from kinfmu.readings import READINGS
 from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
 
 SHAPES = {
@@ -19,9 +20,14 @@ SHAPES = {
     "points": "list of `[x, u]`",
     "segments": "list of tables",
     "measure": "a measure",
+    "measured": "a coordinate, a rate or a quantity",
     "law": "a law, with its keys",
 }
-REFERRED = {"point": ('`"body.point"`', 'two `"body.point"`'), "body": ("a body", "two bodies")}
+REFERRED = {
+    "point": ('`"body.point"`', 'two `"body.point"`'),
+    "body": ("a body", "two bodies"),
+    "coordinate": ("a coordinate", "two coordinates"),
+}
 
 
 def sections() -> dict[str, str]:
@@ -37,7 +43,20 @@ def sections() -> dict[str, str]:
 
 def filled(page: str) -> str:
     """Return the page with its generated parts replaced."""
-    for name, text in sections().items():
+    return _with(page, sections())
+
+
+def with_readings(page: str) -> str:
+    """Return the page of measures with its generated part replaced."""
+    text = "\n".join(_types(READINGS, "type"))
+    words = {"| as u |": "| as the quantity |", "| as x |": "| as the driver |", "list of `[x, u]`": "list of `[x, y]`"}
+    for general, here in words.items():
+        text = text.replace(general, here)
+    return _with(page, {"readings": text})
+
+
+def _with(page: str, texts: dict[str, str]) -> str:
+    for name, text in texts.items():
         begin, end = f"<!-- generated: {name} -->", f"<!-- end: {name} -->"
         assert page.count(begin) == page.count(end) == 1, f"the page must have {begin} and {end}, once"
         page = re.sub(f"{begin}.*?{end}", lambda _, part=f"{begin}\n\n{text}\n\n{end}": part, page, flags=re.DOTALL)

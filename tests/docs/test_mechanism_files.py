@@ -46,7 +46,8 @@ def test_the_blocks_are_one_mechanism_that_solves() -> None:
 
 
 def test_every_table_of_the_format_is_on_the_page() -> None:
-    tables = ("units", "parameters", "bodies.NAME", "joints.NAME", "drivers.NAME", "points", "outputs", "run")
+    named = ("bodies.NAME", "joints.NAME", "drivers.NAME")
+    tables = ("units", "parameters", *named, "points", "outputs", "run", "measures.NAME")
     assert [re.sub(r"[`\[\]]", "", line[3:]) for line in PAGE.splitlines() if line.startswith("## `[")] == list(tables)
 
 
