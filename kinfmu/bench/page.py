@@ -68,7 +68,7 @@ def _bare() -> str:
 def conditions(rounds: int) -> str:
     """Return a sentence on the machine and method of the times."""
     where = f"{_processor()}, Python {platform.python_version()}"
-    return f"Measured on {where}; processor time, median of {rounds} rounds in which all take their turn."
+    return f"Measured on {where}; processor time, median of {rounds} rounds, each of which measures every engine once."
 
 
 def _processor() -> str:
@@ -110,7 +110,7 @@ def settings_page(measured: Sequence[Measured], rounds: int) -> str:
     """A page with every measurement."""
     parts = [
         "# Run time against error: every engine in every setting",
-        f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) says what it means. {conditions(rounds)} Errors are "
+        f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
         "the largest over the samples of a mechanism's reference.csv, relative to each column's largest magnitude.",
     ]
     for case in dict.fromkeys(one.case for one in measured):
