@@ -18,6 +18,7 @@ from kinfmu.errors import MissingPackageError, listed, suggestion
 TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench, and the mechanisms it measures
     "sample": ("solve_sample", ()),
     "sweep": ("native_sweep", ()),
+    "designs": ("designs", ()),
     "step": ("fmu_step", ("fourbar",)),
     "native": ("native_step", ("fourbar",)),
     "log": ("log_files", ()),
@@ -76,6 +77,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
               singular points: the tables and charts of docs/accuracy.md; takes minutes
     sample    a sample of solve, compared with the readable reference
     sweep     a sweep by the native engine, compared with closed forms and pylinkage
+    designs   calls and batches with other lengths, compared with closed forms and scipy
     step      a step of the FMU, compared with the smallest pythonfmu FMU
     native    a step of the native FMU in a C host, compared with closed forms
     log       writing and reading records of a million samples, compared with mcap

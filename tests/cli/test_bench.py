@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu import gallery
-from kinfmu.bench import accuracy, case, chains, log_files, native_sweep, singular
+from kinfmu.bench import accuracy, case, chains, designs, log_files, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, SHIPPED
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
@@ -161,7 +162,7 @@ def test_the_charts_name_every_engine_and_quantity(command: Command, tmp_path: P
         (
             ("accurcy",),
             "Invalid value for '[WHAT]...': 'accurcy' is not a measurement; did you mean 'accuracy'?; "
-            "known: accuracy, sample, sweep, step, native, log, import, chains, all",
+            "known: accuracy, sample, sweep, designs, step, native, log, import, chains, all",
         ),
         (
             ("--mechanism", "slidercrank"),
@@ -203,6 +204,20 @@ def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list
     for line, name in zip(rows[-len(lines) :], lines, strict=True):
         assert line.startswith(name)
         assert re.search(r"\d+\.\d", line)
+
+
+def test_designs_are_compared_with_the_closed_form() -> None:
+    mechanism, lengths = designs.crank_rocker(), designs.drawn(3)
+    angles = np.linspace(0.0, 6.0, 7)
+    found = kinfmu.compile(mechanism, ["coupler.phi", "rocker.phi"]).solve_designs(lengths, crank_angle=angles)
+    for k in range(3):
+        wanted = designs.closed_form(angles, *(values[k] for values in lengths.values()))
+        off = np.exp(1j * found.values[k]) - np.exp(1j * np.stack(wanted, axis=1))
+        assert np.abs(off).max() < 1e-14
+    text = designs.run(rounds=1, designs=8)
+    assert "8 crank-rockers at 361 angles" in text
+    for row in ("Model.solve, Python engine", "solve_designs, q alone", "scipy.optimize.fsolve", "two threads"):
+        assert row in text
 
 
 def test_a_sweep_is_compared_with_the_closed_form(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

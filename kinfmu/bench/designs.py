@@ -1,0 +1,166 @@
+"""Many designs: a call with other lengths, and thousands of crank-rockers over a turn, beside other ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from itertools import cycle
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+from scipy.optimize import fsolve
+
+from kinfmu.bench.rounds import in_turn, spread, table
+from kinfmu.gallery import load
+from kinfmu.mechanism import Mechanism
+from kinfmu.run import FloatArray
+from kinfmu.sweep import compile as compiled
+from kinfmu.sweep import solve
+
+ROUNDS = 7
+DESIGNS = 10_000
+ANGLES = 361  # a turn by one degree
+FEW = 5  # samples of a short call
+ALONE = 200  # designs that slow ways solve
+LENGTHS = {"ground_link": 42.0, "crank_link": 15.0, "coupler_link": 50.0, "rocker_link": 45.0}
+SPREAD = 0.03  # of the lengths, so that all are crank-rockers
+OUTPUTS = ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]
+PER_DESIGN = 1e6  # [us/s]
+
+
+def crank_rocker() -> Mechanism:
+    """Return the gallery's crank-rocker with its lengths as parameters."""
+    written = load("crank_rocker")
+    places = {
+        "ground": {"C": ("ground_link", 0.0)},
+        "crank": {"P": ("crank_link", 0.0)},
+        "coupler": {"Q": ("coupler_link", 0.0)},
+        "rocker": {"Q": ("rocker_link", 0.0)},
+    }
+    bodies = [replace(body, points={**body.points, **places[body.name]}) for body in written.bodies]  # type: ignore[dict-item]
+    return replace(written, bodies=tuple(bodies), parameters=LENGTHS)  # type: ignore[arg-type]  # numbers are read
+
+
+def drawn(count: int) -> dict[str, FloatArray]:
+    """Return random lengths around those of the crank-rocker, equal in every call."""
+    rng = np.random.default_rng(1)
+    return {name: value * np.exp(rng.uniform(-SPREAD, SPREAD, count)) for name, value in LENGTHS.items()}
+
+
+def run(rounds: int = ROUNDS, designs: int = DESIGNS) -> str:
+    """Return two tables: microseconds of a short call with other lengths, and of a design over a turn."""
+    return "\n".join([*_short_calls(rounds), "", *_batches(rounds, designs)])
+
+
+def _short_calls(rounds: int) -> list[str]:
+    mechanism = crank_rocker()
+    python, native = (compiled(mechanism, OUTPUTS, engine=engine) for engine in ("python", "native"))
+    angles = np.linspace(0.0, 1.0, FEW)
+    lengths = cycle(drawn(1000)["coupler_link"].tolist())
+    calls: dict[str, Callable[[], object]] = {
+        "Model.solve, Python engine": lambda: python.solve(
+            crank_angle=angles, parameters={"coupler_link": next(lengths)}
+        ),
+        "Model.solve, native engine": lambda: native.solve(
+            crank_angle=angles, parameters={"coupler_link": next(lengths)}
+        ),
+        "kinfmu.solve, the mechanism solved before": lambda: solve(
+            mechanism, outputs=OUTPUTS, engine="python", crank_angle=angles, parameters={"coupler_link": next(lengths)}
+        ),
+        "closed form in numpy, q alone": lambda: closed_form(angles, 42.0, 15.0, next(lengths), 45.0),
+    }
+    repeats = 200
+    ways = [_repeated(call, repeats) for call in calls.values()]
+    times = [spread([s / repeats * PER_DESIGN for s in seconds]) for seconds in in_turn(ways, rounds, process_time)]
+    rows = [[name, *of.cells(1)] for name, of in zip(calls, times, strict=True)]
+    return [
+        f"crank-rocker with another length at {FEW} angles, {rounds} rounds in turn; us of processor time a call",
+        *table(("", "median", "min", "max"), rows),
+    ]
+
+
+def _repeated(call: Callable[[], object], times: int) -> Callable[[], object]:
+    def way() -> None:
+        for _ in range(times):
+            call()
+
+    return way
+
+
+def _batches(rounds: int, count: int) -> list[str]:
+    mechanism, angles, lengths = crank_rocker(), np.linspace(0.0, 2.0 * np.pi, ANGLES), drawn(count)
+    native = compiled(mechanism, OUTPUTS, engine="native")
+    few = min(count, ALONE)
+    sets = [{name: float(values[k]) for name, values in lengths.items()} for k in range(few)]
+
+    def one_after_another() -> None:
+        for values in sets:
+            native.solve(crank_angle=angles, parameters=values)
+
+    def by_fsolve() -> None:
+        for values in sets[:2]:
+            guess = np.array([1.0, 1.8])
+            for angle in angles:
+                guess = fsolve(_loop_closure, guess, args=(angle, *values.values()))
+
+    ways: dict[str, tuple[int, Callable[[], object]]] = {
+        "solve_designs, q, qd, qdd": (count, lambda: native.solve_designs(lengths, crank_angle=angles)),
+        "solve_designs, q alone": (count, lambda: native.solve_designs(lengths, crank_angle=angles, derivatives=0)),
+        "Model.solve, design after design, q, qd, qdd": (few, one_after_another),
+        "closed form in a loop, by numba, q alone": (count, _numba(angles, lengths)),
+        "scipy.optimize.fsolve, q alone": (min(2, few), by_fsolve),
+    }
+    if find_spec("numba") is None:
+        del ways["closed form in a loop, by numba, q alone"]
+    measured = in_turn([way for _, way in ways.values()], rounds, process_time)
+    rows = []
+    for (name, (designs, _)), seconds in zip(ways.items(), measured, strict=True):
+        of = spread([value / designs * PER_DESIGN for value in seconds])
+        rows.append([name, *of.cells(1), f"{of.median * 1e3 / ANGLES:.1f}"])
+    walls = in_turn(
+        [lambda n=n: native.solve_designs(lengths, crank_angle=angles, workers=n) for n in (1, 2)],  # type: ignore[misc]
+        rounds,
+        perf_counter,
+    )
+    one, two = (spread(seconds).median for seconds in walls)
+    return [
+        f"{count} crank-rockers at {ANGLES} angles, {rounds} rounds in turn; us of processor time a design",
+        *table(("", "median", "min", "max", "ns a sample"), rows),
+        f"two threads: {one / two:.2f} times faster ({one:.2f} s and {two:.2f} s by the clock, q, qd, qdd)",
+    ]
+
+
+def closed_form(u: Any, g: float, a: float, b: float, c: float) -> tuple[Any, Any]:
+    """Return the angles of coupler and rocker of the open crank-rocker."""
+    dx, dy = g - a * np.cos(u), -a * np.sin(u)
+    square = dx * dx + dy * dy
+    e = 0.5 + 0.5 * (b * b - c * c) / square
+    h = np.sqrt(b * b / square - e * e)
+    qx, qy = e * dx - h * dy, e * dy + h * dx
+    return np.arctan2(qy, qx), np.arctan2(qy - dy, qx - dx)
+
+
+def _loop_closure(z: FloatArray, u: float, g: float, a: float, b: float, c: float) -> list[float]:
+    return [
+        a * np.cos(u) + b * np.cos(z[0]) - g - c * np.cos(z[1]),
+        a * np.sin(u) + b * np.sin(z[0]) - c * np.sin(z[1]),
+    ]
+
+
+def _numba(angles: FloatArray, lengths: dict[str, FloatArray]) -> Callable[[], object]:
+    if find_spec("numba") is None:
+        return lambda: None
+    import numba
+
+    one: Any = numba.njit(closed_form)
+
+    def all_of(u: FloatArray, g: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, out: FloatArray) -> None:
+        for k in range(len(g)):
+            for i in range(len(u)):
+                out[k, 0, i], out[k, 1, i] = one(u[i], g[k], a[k], b[k], c[k])
+
+    loop: Any = numba.njit(all_of)
+    out = np.empty((len(lengths["crank_link"]), 2, len(angles)))
+    return lambda: loop(angles, *lengths.values(), out)
