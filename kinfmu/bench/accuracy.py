@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
@@ -17,7 +16,7 @@ from kinfmu.errors import MissingPackageError
 MECHANISMS = ("crank_rocker", "slider_crank", "stephenson_six_bar", "jansen_leg", "excavator")
 ROUNDS = 7
 
-Tell = Callable[[str], None]  # what has just been done, one step of `steps` a call
+Done = Callable[[], None]  # called after each of `steps`
 
 
 class Measured(NamedTuple):
@@ -36,7 +35,7 @@ class Measured(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The largest of the three; NaN if there is one."""
+        """The largest of the three; NaN if one is NaN."""
         return max(self.errors, key=lambda error: (math.isnan(error), error))
 
 
@@ -50,10 +49,10 @@ class Result(NamedTuple):
 def measure(
     mechanisms: Sequence[str] = MECHANISMS,
     rounds: int = ROUNDS,
-    tell: Tell = lambda _: None,
+    done: Done = lambda: None,
     engines: Sequence[Engine] = ENGINES,
 ) -> Result:
-    """Errors of one whole sweep of every sampler; then times, all samplers of a mechanism once a round."""
+    """Measure errors in one whole sweep of every sampler; then times, all samplers of a mechanism once a round."""
     measured: list[Measured] = []
     absent: dict[str, None] = {}
     for name in mechanisms:
@@ -61,17 +60,15 @@ def measure(
         samplers: list[tuple[Engine, Setting, Sampler]] = []
         for engine in engines:
             for setting in engine.settings:
-                tell(f"{name}: {engine.name}")
+                done()
                 sampler = prepared(engine, case, setting, absent)
                 if sampler is not None:
                     samplers.append((engine, setting, sampler))
         errors = []
-        for engine, _, sampler in samplers:
-            tell(f"{name}: {engine.name}, errors")
+        for _, _, sampler in samplers:
+            done()
             errors.append(largest(case, sampler))
-        times = samples_in_turn(
-            [quietly(sampler) for _, _, sampler in samplers], rounds, len(case.t), each=partial(tell, name)
-        )
+        times = samples_in_turn([quietly(sampler) for _, _, sampler in samplers], rounds, len(case.t), each=done)
         measured += [
             Measured(name, engine.name, setting, setting == engine.usual, per_lap(engine, microseconds), error)
             for (engine, setting, _), microseconds, error in zip(samplers, times, errors, strict=True)
@@ -80,12 +77,12 @@ def measure(
 
 
 def steps(mechanisms: Sequence[str] = MECHANISMS, rounds: int = ROUNDS, engines: Sequence[Engine] = ENGINES) -> int:
-    """How often `measure` tells something, at most."""
+    """Return how often `measure` calls `done`, at most."""
     return len(mechanisms) * (rounds + 2 * sum(len(engine.settings) for engine in engines))
 
 
 def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, None]) -> Sampler | None:
-    """A sampler to be measured; None if there is none, with a line in `absent` if a package is missing."""
+    """Return a sampler to be measured; None if there is none, with a line in `absent` if a package is missing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other people's packages
@@ -96,12 +93,12 @@ def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, Non
 
 
 def per_lap(engine: Engine, microseconds: Sequence[float]) -> Spread:
-    """What a sample takes, of an engine whose samplers take each several times in a call."""
+    """Return the time of a sample; an engine may take each sample several times in a call."""
     return spread([value / engine.laps for value in microseconds])
 
 
 def quietly(sampler: Sampler) -> Sampler:
-    """The same sampler without warnings of other people's packages on stderr, such as those of a singular matrix."""
+    """Return the sampler without warnings of other people's packages on stderr, such as those of a singular matrix."""
 
     def take(n: int) -> Sequence[Sequence[float]]:
         with warnings.catch_warnings():
@@ -112,6 +109,6 @@ def quietly(sampler: Sampler) -> Sampler:
 
 
 def largest(case: Case, sampler: Sampler) -> tuple[float, float, float]:
-    """Largest error of q, qd, qdd over a whole sweep."""
+    """Return the largest error of q, qd, qdd over a whole sweep."""
     q, qd, qdd = case.errors(quietly(sampler)(len(case.t))).max(axis=0).tolist()
     return q, qd, qdd

@@ -78,13 +78,13 @@ class Case:
         return np.array([known[name] for name in self.system.coordinates])
 
     def errors(self, rows: Motion) -> FloatArray:
-        """(k, 3) largest relative error of q, qd, qdd at each known sample; NaN where there are no numbers."""
+        """Return the largest relative error of q, qd, qdd at each known sample, (k, 3); NaN without numbers."""
         found = np.array([rows[k] for k in self.known], dtype=float).reshape(self.exact.shape)
         return np.asarray((np.abs(found - self.exact) / self.scale).max(axis=2))
 
 
 def of_gallery(name: str) -> Case:
-    """The run of a mechanism of the gallery between the first and the last sample of its reference.csv.
+    """Return the run of a mechanism of the gallery between the first and the last sample of its reference.csv.
 
     The reference holds closed forms in 50 digits, written with 20; errors are relative to each column's largest
     magnitude.
@@ -109,7 +109,7 @@ def of_gallery(name: str) -> Case:
 def along_driver(
     name: str, plan: SolvePlan, u: Sequence[float], known: Sequence[int], closed_form: Callable[[float], FloatArray]
 ) -> Case:
-    """Samples of the only driver's value at speed 1; closed_form: (3, m) q, q', q'' at a value of the driver.
+    """Return samples of the only driver's value at speed 1; closed_form: (3, m) q, q', q'' at a value of the driver.
 
     Errors are absolute, in radians and the mechanism's unit of length.
     """
@@ -121,7 +121,7 @@ def along_driver(
 
 
 def _scale(names: Sequence[CoordinateName], exact: FloatArray) -> FloatArray:
-    """(3, m) the largest magnitude of each column; where it is zero all along that of its kind, else 1."""
+    """Return the largest magnitude of each column, (3, m); where it is zero all along that of its kind, else 1."""
     largest: FloatArray = np.abs(exact).max(axis=0)
     angles = np.array([name.is_angle for name in names])
     for order in range(3):

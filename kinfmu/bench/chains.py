@@ -22,7 +22,7 @@ FIRST_LOOP = ("bar_1.phi",)
 
 
 def run(rounds: int = ROUNDS) -> str:
-    """A table: seconds to compile and microseconds a sample, for all outputs and for one output of the first loop."""
+    """Return a table: seconds to compile, and microseconds a sample for all outputs and for one of the first loop."""
     whole, compiled = zip(*(_ready(fourbar_chain(n)) for n in LOOPS), strict=True)
     first, _ = zip(*(_ready(fourbar_chain(n), FIRST_LOOP) for n in LOOPS), strict=True)
     times = samples_in_turn([*whole, *first], rounds, MOST)

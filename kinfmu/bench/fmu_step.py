@@ -22,7 +22,7 @@ ROUNDS = 60
 
 
 def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
-    """A table: processor time of a step (set 1, step, get 15) of the mechanism's FMU and of the toy, their ratio."""
+    """Return a table: processor time of a step (set 1, step, get 15) of the mechanism's FMU and of the toy."""
     with tempfile.TemporaryDirectory(prefix="kinfmu_bench_") as folder:
         ours = build(mechanism, Path(folder) / "ours.fmu", flavour="python", drive="inputs")
         toy = _toy(Path(folder))

@@ -15,7 +15,7 @@ STATEMENTS = ("pass", "import kinfmu")
 
 
 def run(rounds: int = ROUNDS) -> str:
-    """A table: milliseconds of a whole process, and of the differences round by round."""
+    """Return a table: milliseconds of a whole process, and of the differences round by round."""
     bare, ours = ([1e3 * value for value in seconds] for seconds in in_turn([_process(s) for s in STATEMENTS], rounds))
     differences = [b - a for a, b in zip(bare, ours, strict=True)]
     measured = zip((*STATEMENTS, "difference"), (bare, ours, differences), strict=True)

@@ -47,9 +47,9 @@ class LogTask(NamedTuple):
 
 
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, steps: int = STEPS) -> str:
-    """A table: rows a second by the clock; processor time a row and how often it goes into the package mcap's; size.
+    """Return a table of writing and reading records, and one of the steps of an FMU, alone and with their record.
 
-    Below it the processor time of a step of the FMU, alone and with its record.
+    Of records: rows a second by the clock; processor time a row, and how often it goes into the package mcap's; size.
     """
     long_run = fourbar(samples)
     processor: dict[str, list[float]] = {}

@@ -28,7 +28,7 @@ _WORDS = {2: "Real", 3: "Float64"}
 
 
 def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
-    """A table: processor time of a step (set 1, step, get 15) of the mechanism's native FMU and of the closed forms.
+    """Return a table: processor time of a step (set 1, step, get 15) of the native FMU and of closed forms.
 
     In both versions of FMI, with their ratio and what it takes to instantiate the FMU.
     """

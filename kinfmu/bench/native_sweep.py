@@ -36,7 +36,7 @@ PYLINKAGE = "pylinkage, by numba: points, not angles"
 
 
 def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
-    """A table: nanoseconds of processor time a sample, and how often the closed form's."""
+    """Return a table: nanoseconds of processor time a sample, and how often the closed form's."""
     u = np.linspace(0.0, np.pi / 180.0 * samples, samples, endpoint=False)
     driven = (u[:, None].copy(), np.ones((samples, 1)), np.zeros((samples, 1)))
     crank_rocker, fourbar = (Library(compile_plan(load(name), FOURBAR)) for name in ("crank_rocker", "fourbar"))

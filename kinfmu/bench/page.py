@@ -82,12 +82,12 @@ def _processor() -> str:
 
 
 def parts(measured: Sequence[Measured], near: Sequence[Near], rounds: int) -> dict[str, str]:
-    """The generated parts of PAGE by name."""
+    """Return the generated parts of PAGE by name."""
     return dict(zip(PARTS, (conditions(rounds), engines_table(measured), singular_table(near)), strict=True))
 
 
 def engines_table(measured: Sequence[Measured]) -> str:
-    """Every engine in its usual setting, one column a mechanism: time and error."""
+    """Return a table of every engine in its usual setting, one column a mechanism: time and error."""
     cases = list(dict.fromkeys(one.case for one in measured))
     lines = [f"| | {' | '.join(_titled(case) for case in cases)} |", f"|---|{'---|' * len(cases)}"]
     usual = {(one.engine, one.case): one for one in measured if one.is_usual}
@@ -107,7 +107,7 @@ def _titled(case: str) -> str:
 
 
 def settings_page(measured: Sequence[Measured], rounds: int) -> str:
-    """A page with every measurement."""
+    """Return a page with every measurement."""
     parts = [
         "# Run time against error: every engine in every setting",
         f"Written by `kinfmu bench`; [accuracy.md](accuracy.md) explains it. {conditions(rounds)} Errors are "
@@ -134,7 +134,7 @@ def _row(one: Measured) -> tuple[str, ...]:
 
 
 def row_head(engine: str, setting: Setting, *, is_usual: bool) -> tuple[str, str, str, str]:
-    """The cells that say what was measured: the usual setting of an engine is bold."""
+    """Return the cells that state what was measured: the usual setting of an engine is bold."""
     name = f"**{engine}**" if is_usual else engine
     if engine == "pylinkage":
         return name, "", "closed forms", ""
@@ -142,7 +142,7 @@ def row_head(engine: str, setting: Setting, *, is_usual: bool) -> tuple[str, str
 
 
 def singular_table(near: Sequence[Near]) -> str:
-    """Error of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
+    """Return tables of the errors of q, qd, qdd toward a singular point, at it and beyond, one line an engine."""
     shown = [min(range(len(DISTANCES)), key=lambda k: abs(math.log(DISTANCES[k] / d))) for d in SHOWN]
     heads = [*(f"{d:.0e}" for d in SHOWN), "at it", f"{SHOWN[-1]:.0e} beyond", f"{SHOWN[0]:.0e} beyond", "us a sample"]
     parts = []
@@ -157,12 +157,12 @@ def singular_table(near: Sequence[Near]) -> str:
 
 
 def duration(microseconds: float) -> str:
-    """Three digits: '4.52', '45.2', '1610'."""
+    """Return three digits: '4.52', '45.2', '1610'."""
     return f"{microseconds:.3g}" if microseconds < 1000.0 else f"{microseconds:.0f}"
 
 
 def number(error: float) -> str:
-    """'1e-15', '0', or a dash where there was no number."""
+    """Return '1e-15', '0', or a dash where there was no number."""
     if math.isnan(error):
         return "-"
     return "0" if error == 0.0 else f"{error:.0e}"

@@ -27,7 +27,7 @@ class Spread(NamedTuple):
 
 
 def spread(measured: Sequence[float]) -> Spread:
-    """Median, range and quartiles of at least one number."""
+    """Return median, range and quartiles of at least one number."""
     lower, upper = statistics.quantiles(measured, n=4)[::2] if len(measured) > 1 else (measured[0], measured[0])
     return Spread(statistics.median(measured), min(measured), max(measured), lower, upper)
 
@@ -48,7 +48,7 @@ def in_turn(
     clock: Callable[[], float] = time.perf_counter,
     each: Callable[[], None] | None = None,
 ) -> list[list[float]]:
-    """Seconds that each way takes, (ways, rounds), after a round that warms up. each: called after every round."""
+    """Return the seconds that each way takes, (ways, rounds), after one to warm up; call `each` after every round."""
     measured: list[list[float]] = [[] for _ in ways]
     with _garbage_set_aside():
         for way in ways:
@@ -70,7 +70,7 @@ def samples_in_turn(
     fewest: int = 5,
     each: Callable[[], None] | None = None,
 ) -> list[list[float]]:
-    """Microseconds of processor time a sample of each way, (ways, rounds).
+    """Return microseconds of processor time a sample of each way, (ways, rounds).
 
     A way takes its first n samples, from `fewest` to `most`, and again, so that a SLICE is filled.
     """

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinfmu.bench.accuracy import Tell, per_lap, prepared, quietly
+from kinfmu.bench.accuracy import Done, per_lap, prepared, quietly
 from kinfmu.bench.case import Case, along_driver
 from kinfmu.bench.engine import Engine, Sampler
 from kinfmu.bench.engines import ENGINES
@@ -39,7 +39,7 @@ class Near(NamedTuple):
 
 
 def case_of(point: SingularCase) -> Case:
-    """The path from the start past the point: steps of STEP, then the DISTANCES before, the point, those beyond."""
+    """Return the path from the start past the point: steps of STEP, the DISTANCES before, the point, those beyond."""
     first, last = point.start, point.centre - 2.0 * DISTANCES[0]
     steps = np.linspace(first, last, math.ceil((last - first) / STEP) + 1).tolist()
     before = [point.centre - d for d in DISTANCES]
@@ -50,9 +50,9 @@ def case_of(point: SingularCase) -> Case:
 
 
 def measure(
-    rounds: int = ROUNDS, tell: Tell = lambda _: None, engines: Sequence[Engine] = ENGINES
+    rounds: int = ROUNDS, done: Done = lambda: None, engines: Sequence[Engine] = ENGINES
 ) -> tuple[tuple[Near, ...], tuple[str, ...]]:
-    """Every engine in its usual setting past every point; and a line for each engine that is not installed."""
+    """Take every engine past every point in its usual setting; also return a line for each that is not installed."""
     found: list[Near] = []
     absent: dict[str, None] = {}
     for point in POINTS:
@@ -68,9 +68,9 @@ def measure(
                 samplers.append((engine, quietly(sampler)))
         k = len(DISTANCES)
         errors = []
-        for engine, sampler in samplers:
+        for _, sampler in samplers:
             errors.append(case.errors(sampler(len(case.t))))
-            tell(f"{point.title}: {engine.name}")
+            done()
         times = samples_in_turn([_whole(sampler, len(case.t)) for _, sampler in samplers], rounds, 1, fewest=1)
         for (engine, _), error, seconds in zip(samplers, errors, times, strict=True):
             microseconds = per_lap(engine, [value / len(case.t) for value in seconds])
@@ -84,5 +84,5 @@ def _whole(sampler: Sampler, n: int) -> Callable[[int], object]:
 
 
 def steps(engines: Sequence[Engine] = ENGINES) -> int:
-    """How often `measure` tells something, at most."""
+    """Return how often `measure` calls `done`, at most."""
     return len(POINTS) * len(engines)

@@ -23,7 +23,7 @@ DEGREES = np.arange(5.0, 176.0)  # away from the singular points, where the read
 
 
 def run(rounds: int = ROUNDS) -> str:
-    """A table: microseconds a sample (median and spread over rounds) and largest error of q, qd, qdd."""
+    """Return a table: microseconds a sample (median and spread over rounds) and largest error of q, qd, qdd."""
     u = np.radians(DEGREES)
     ways = {
         "readable reference, 9 coordinates, warm start": _reference(u),

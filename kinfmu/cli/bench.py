@@ -108,7 +108,7 @@ def default_folder() -> Path:
 
 def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) -> None:
     """Measure, print the short tables, write all tables and charts."""
-    from kinfmu.bench import accuracy, page, pictures, singular
+    from kinfmu.bench import accuracy, charts, page, singular
 
     mechanisms = mechanisms or accuracy.MECHANISMS
     rounds = given.get("rounds", accuracy.ROUNDS)
@@ -116,7 +116,7 @@ def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) 
     with Progress("measuring", 1) as show:
         done, all_steps = count(1), accuracy.steps(mechanisms, rounds) + singular.steps()
 
-        def advance(_: str) -> None:
+        def advance() -> None:
             show(min(next(done), all_steps), all_steps)
 
         measured, absent = accuracy.measure(mechanisms, rounds, advance)
@@ -127,7 +127,7 @@ def _accuracy(mechanisms: tuple[str, ...], given: dict[str, int], folder: Path) 
     click.echo("\n\n".join(parts.values()))
     written = list(page.write(folder, parts, page.settings_page(measured, rounds)))
     try:
-        written += [*pictures.draw_work_precision(folder, measured), *pictures.draw_singular(folder, near)]
+        written += charts.draw(folder, measured, near)
     except MissingPackageError as error:
         click.echo(f"left out: {error}", err=True)
     click.echo(f"\nwritten: {listed(map(str, written))}")

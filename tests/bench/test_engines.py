@@ -11,6 +11,7 @@ import pytest
 from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
+from kinfmu.bench.charts import LOOKS
 from kinfmu.bench.engine import Engine, Setting
 from kinfmu.bench.engines import (
     CASADI,
@@ -23,7 +24,6 @@ from kinfmu.bench.engines import (
     READABLE,
     SHIPPED,
 )
-from kinfmu.bench.pictures import LOOKS
 from kinfmu.bench.singular_points import POINTS, exact_fourbar
 from kinfmu.equations.reference import solve_reference
 from kinfmu.errors import CompilerError, MissingPackageError

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from kinfmu.bench.accuracy import MECHANISMS
+from kinfmu.bench.charts import LOOKS, NEAR_SINGULAR, SUFFIXES, WORK_PRECISION
 from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.page import PARTS, SETTINGS_PAGE, begin, end, row_head
-from kinfmu.bench.pictures import LOOKS, NEAR_SINGULAR, SUFFIXES, WORK_PRECISION
 from kinfmu.bench.singular_points import POINTS
 from kinfmu.cli import main
 from kinfmu.gallery import load

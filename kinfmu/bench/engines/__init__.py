@@ -1,6 +1,6 @@
 """Engines that the bench measures side by side: one a file.
 
-A new one is a file, a line here and a look in bench/pictures.py; tables and charts pick it up.
+A new one is a file, a line here and a look in bench/charts.py; tables and charts pick it up.
 """
 
 from __future__ import annotations
