@@ -178,10 +178,14 @@ class Track:
         rates, accelerations = (rows.reshape(flat.shape) for rows in (self.rate, self.acceleration))
         known = self.is_known.reshape(-1)
         h = np.diff(self.x)
-        k = np.argmax(np.where(known[:, None], flat, 0.0), axis=1)
+        k = np.argmax(flat, axis=1)  # of unknown samples the first
         value, x = np.take_along_axis(flat, k[:, None], 1)[:, 0].copy(), self.x[k]
-        design, place = np.nonzero(self._may_peak(flat, rates, accelerations, h) & known[:, None])
+        design, place = np.nonzero(self._may_peak(rates, accelerations) & known[:, None])
         low, high = ([rows[design, place + side] for rows in (flat, rates, accelerations)] for side in (0, 1))
+        reach = np.maximum(low[0], high[0]) + h[place] * np.maximum(np.abs(low[1]), np.abs(high[1]))
+        can_win = reach >= value[design]  # most intervals end far below the largest sample
+        design, place = design[can_win], place[can_win]
+        low, high = ([row[can_win] for row in side] for side in (low, high))
         c = _quintic(low, high, h[place])
         c1 = _derived(c)
         for begin, end in _peak_brackets(c):
@@ -205,19 +209,19 @@ class Track:
         return Extreme(np.where(is_low, -low.value, high.value), np.where(is_low, low.x, high.x))
 
     @staticmethod
-    def _may_peak(f: FloatArray, v: FloatArray, a: FloatArray, h: FloatArray) -> NDArray[np.bool_]:
+    def _may_peak(v: FloatArray, a: FloatArray) -> NDArray[np.bool_]:
         """Return (designs, n - 1), True for intervals in which the polynomial may have a maximum.
 
         Its slope changes sign from plus to minus between the ends, or dips below 0 between two positive (rises above it
-        between two negative) ones; and it can exceed the largest sample.
+        between two negative) ones.
         """
-        left, right = v[:, :-1], v[:, 1:]
-        crosses = (left > 0.0) & (right < 0.0)
-        dips = (left * right >= 0.0) & (a[:, :-1] * left <= 0.0) & (a[:, 1:] * right >= 0.0)
-        with np.errstate(invalid="ignore"):
-            reach = np.maximum(f[:, :-1], f[:, 1:]) + h * np.maximum(np.abs(left), np.abs(right))
-            can_be: NDArray[np.bool_] = (crosses | dips) & (reach >= np.max(f, axis=1, keepdims=True))
-            return can_be
+        rises, falls, bends_up, bends_down = v > 0.0, v < 0.0, a > 0.0, a < 0.0
+        left, right = np.s_[:, :-1], np.s_[:, 1:]
+        crosses = rises[left] & falls[right]
+        dips = ~(falls[left] | falls[right] | bends_up[left] | bends_down[right]) & (bends_down[left] | bends_up[right])
+        tops = ~(rises[left] | rises[right] | bends_down[left] | bends_up[right]) & (bends_up[left] | bends_down[right])
+        may_peak: NDArray[np.bool_] = crosses | dips | tops
+        return may_peak
 
     def crossings(self, level: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return where the quantity takes a value.
