@@ -97,33 +97,32 @@ class Track:
     def _third_and_fourth(self) -> tuple[FloatArray, FloatArray]:
         """Return the third and fourth derivative at the samples.
 
-            f(x_0 + d) = f_0 + v_0 d + a_0 d^2/2 + d^3 g(d),   f''' = 6 g(0),   f'''' = 24 g'(0)
+            f(x_0 + d) = f_0 + v_0 d + a_0 d^2/2 + d^3 g(d):   6 g(0) and 24 g'(0)
 
-        g is the polynomial of degree 5 through two other samples: both neighbours, at an end the next two.
+        g is the polynomial of degree 5 through two other samples: both neighbours, at an end the next two. Its values
+        are sums of the samples' numbers with weights that depend on x only.
         """
         n = len(self.x)
         near, far = np.arange(-1, n - 1), np.arange(1, n + 1)
+        near_wraps, far_wraps = np.zeros(n), np.zeros(n)
         if self.is_closed:
             near[0], far[-1] = n - 2, 1
+            near_wraps[0], far_wraps[-1] = -1.0, 1.0
         else:
             near[0], far[-1] = 2, n - 3
         turn = self.value[..., -1:] - self.value[..., :1]  # of an angle that goes round
-        pairs = []
-        for other in (near, far):
-            wraps = np.zeros(n)
+        data, distances = [self.rate, self.acceleration], []
+        for other, wraps in ((near, near_wraps), (far, far_wraps)):
+            distances.append(self.x[other] - self.x + wraps * self.span)
+            change = self.value[..., other] - self.value
             if self.is_closed:
-                wraps[0], wraps[-1] = (-1.0, 0.0) if other is near else (0.0, 1.0)
-            d = self.x[other] - self.x + wraps * self.span
-            f = self.value[..., other] + wraps * turn - self.value
-            g = (f - self.rate * d - 0.5 * self.acceleration * d**2) / d**3
-            g1 = (self.rate[..., other] - self.rate - self.acceleration * d - 3.0 * d**2 * g) / d**3
-            g2 = (self.acceleration[..., other] - self.acceleration - 6.0 * d * g - 6.0 * d**2 * g1) / d**3
-            pairs.append((d, g, g1, g2))
-        (d_a, *at_a), (d_b, *at_b) = pairs
-        h = d_b - d_a
-        c = _quintic(at_a, at_b, h)
-        s = -d_a / h
-        return 6.0 * _polynomial(c, s), 24.0 * _polynomial(_derived(c), s) / h
+                change += wraps * turn
+            data += [change, self.rate[..., other], self.acceleration[..., other]]
+        third, fourth = (
+            np.asarray(sum(weight * row for weight, row in zip(weights, data, strict=True)))
+            for weights in _weights(distances[0], distances[1])
+        )
+        return third, fourth
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return value, rate and acceleration at arguments.
@@ -265,6 +264,23 @@ class Track:
         start, stop = np.where(start == -np.inf, self.x[0], start), np.where(stop == np.inf, self.x[-1], stop)
         known, shape = np.isfinite(top), highest.x.shape
         return tuple(np.where(known, one, np.nan).reshape(shape) for one in (start, stop))  # type: ignore[return-value]
+
+
+def _weights(d_a: FloatArray, d_b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the weights (8, n) of the third and of the fourth derivative.
+
+    They belong to rate and acceleration of a sample, then to change, rate and acceleration of two others at the
+    distances d_a and d_b.
+    """
+    v, a, f_a, v_a, a_a, f_b, v_b, a_b = np.eye(8)[:, :, None]
+    sides = []
+    for d, f_d, v_d, a_d in ((d_a, f_a, v_a, a_a), (d_b, f_b, v_b, a_b)):
+        g = (f_d - v * d - 0.5 * a * d**2) / d**3
+        g1 = (v_d - v - a * d - 3.0 * d**2 * g) / d**3
+        sides.append([g, g1, (a_d - a - 6.0 * d * g - 6.0 * d**2 * g1) / d**3])
+    h = d_b - d_a
+    c = _quintic(sides[0], sides[1], h)
+    return 6.0 * _polynomial(c, -d_a / h), 24.0 * _polynomial(_derived(c), -d_a / h) / h
 
 
 def _quintic(low: list[FloatArray], high: list[FloatArray], h: FloatArray) -> FloatArray:
