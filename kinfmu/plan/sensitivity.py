@@ -46,8 +46,8 @@ Step = Assignment | LinearSolve
 class SensitivitySteps:
     """What is computed for the sensitivities of some outputs, in order.
 
-    Symbols that no step gives are unknowns and their rates, driver values and speeds, parameters, law constants and
-    `time`, under their contract names.
+    Symbols that no step gives are unknowns and their rates, driver values and speeds, parameters and `time`, under
+    their contract names, and law constants under that of `law_symbol`.
 
     Attributes:
         steps: Assignments and linear solves.
@@ -120,13 +120,14 @@ class _Tracing:
         self.graph = Graph()
         self.steps: list[Step] = []
         self._copies: dict[Node, Node] = {}
+        self._constants = {constant.name for constant in plan.law_constants}
         written = plan.mechanism.parameters
         own = {parameter.name: self.graph.symbol(parameter_symbol(parameter.name)) for parameter in plan.parameters}
         one = self.graph.constant(1.0)
         self._changes: list[dict[Node, Node]] = []
         for name in parameters:
             if name not in own:  # a law constant
-                self._changes.append({self.graph.symbol(name): one})
+                self._changes.append({self.graph.symbol(law_symbol(name)): one})
                 continue
             free = {key: node for key, node in own.items() if key in (name, *given) or not written[key].expression}
             found = parameter_values(written, free)
@@ -140,7 +141,10 @@ class _Tracing:
         """Return nodes of the plan as nodes of this graph."""
         for node in reachable(nodes):
             if node not in self._copies:
-                self._copies[node] = self.graph.copy(node, *(self._copies[arg] for arg in node.args))
+                if node.op == "symbol" and node.name in self._constants:
+                    self._copies[node] = self.graph.symbol(law_symbol(node.name))
+                else:
+                    self._copies[node] = self.graph.copy(node, *(self._copies[arg] for arg in node.args))
         return [self._copies[node] for node in nodes]
 
     def by_parameter(self, nodes: Sequence[Node]) -> list[list[Node]]:
@@ -220,6 +224,11 @@ class _Tracing:
         return [[(q * b - s * a) * per_determinant, (r * a - p * b) * per_determinant] for a, b in columns]
 
 
+def law_symbol(name: str) -> str:
+    """Return the name of a law constant's symbol: crank.speed and the input crank_speed are two numbers in code."""
+    return f"{name}.law"
+
+
 def _derivative_name(name: str, number: int) -> str:
     """Return the name of a symbol's derivative with respect to a parameter, by its number."""
     return f"{name}.by{number}"
@@ -259,4 +268,4 @@ def scale_of(plan: SolvePlan, name: str) -> float:
     return plan.size if kinds.get(name) == "length" else 1.0
 
 
-__all__ = ["Assignment", "LinearSolve", "SensitivitySteps", "Step", "scale_of", "sensitivity_steps"]
+__all__ = ["Assignment", "LinearSolve", "SensitivitySteps", "Step", "law_symbol", "scale_of", "sensitivity_steps"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinfmu.codegen.c.sensitivity import is_printable, load_native_sensitivity
 from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
-from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
+from kinfmu.plan.sensitivity import law_symbol, scale_of, sensitivity_steps
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.solver.python.status import Status
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 _STAGES_KEPT = 16
+
+Native = Callable[[Sequence[FloatArray], FloatArray], None]  # fills results (rows, n) from arrays (n,) or (1,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ class SensitivityModel:
         self._model = model
         self._poses = _model_of_unknowns(model)
         self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
+        self._native = lru_cache(maxsize=_STAGES_KEPT)(_native_stage)
 
     def solve(
         self,
@@ -103,9 +107,12 @@ class SensitivityModel:
         written = [parameter.value for parameter in plan.parameters]
         for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
             given[parameter_symbol(parameter.name)] = value
-        given |= dict(zip((constant.name for constant in plan.law_constants), setting.constants, strict=True))
+        given |= dict(
+            zip((law_symbol(constant.name) for constant in plan.law_constants), setting.constants, strict=True)
+        )
         stage, gap_names = self._stage(names, chosen, by_law, frozenset(parameters or ()))
-        return _evaluated(plan, stage, gap_names, names, chosen, run, given)
+        native = self._native(stage) if run.info["engine"] == "native" else None
+        return _evaluated(plan, stage, native, gap_names, names, chosen, run, given)
 
     def _chosen(self, wrt: Sequence[str] | None, *, by_law: bool) -> tuple[str, ...]:
         """Return the names of the parameters."""
@@ -129,6 +136,16 @@ class SensitivityModel:
     ) -> tuple[SensitivityStage, tuple[str, ...]]:
         steps = sensitivity_steps(self._model.plan, outputs, parameters, by_law=by_law, given=given)
         return load_sensitivity(steps), steps.gap_names
+
+
+def _native_stage(stage: SensitivityStage) -> Native | None:
+    """Return the stage as compiled C; None where it stays in Python."""
+    if not is_printable(stage):
+        return None
+    try:
+        return load_native_sensitivity(stage)
+    except CompilerError:  # the library of the model was found in the cache
+        return None
 
 
 def _model_of_unknowns(model: Model) -> Model:
@@ -157,6 +174,7 @@ def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tup
 def _evaluated(
     plan: SolvePlan,
     stage: SensitivityStage,
+    native: Native | None,
     gap_names: Sequence[str],
     outputs: tuple[str, ...],
     parameters: tuple[str, ...],
@@ -168,46 +186,54 @@ def _evaluated(
     n, m, p, rows = len(good), len(outputs), len(parameters), len(gap_names)
     shapes = ((m,), (m,), (m, p), (m, p), (p, rows))
     ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)])
-    results = np.zeros((int(ends[-1]), n))
+    is_whole = n == len(run.t)
     numbers = [given[name] for name in stage.given]
-    results[list(stage.places)] = _results(stage, numbers, good)
+    if not is_whole:
+        numbers = [number[good] if isinstance(number, np.ndarray) else number for number in numbers]
+    results = _results(stage, native, numbers, (int(ends[-1]), n))
     tables = [
         np.moveaxis(results[a:b].reshape(*shape, n), -1, 0) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)
     ]
     *tables, gaps = tables
     refused = _refused(plan, parameters, gap_names, gaps, run.status[good])
-    for table in tables:
-        table[~np.isfinite(table)] = np.nan
+    if not np.isfinite(results.sum()):
+        results[~np.isfinite(results)] = np.nan
     for name in refused:
         for table in tables[2:]:
             table[:, :, parameters.index(name)] = np.nan
-    whole = [np.full((len(run.t), *table.shape[1:]), np.nan) for table in tables]
-    for there, table in zip(whole, tables, strict=True):
-        there[good] = table
-    values, rates, values_by, rates_by = whole
+    if not is_whole:
+        whole = [np.full((len(run.t), *table.shape[1:]), np.nan) for table in tables]
+        for there, table in zip(whole, tables, strict=True):
+            there[good] = table
+        tables = whole
+    values, rates, values_by, rates_by = tables
     return Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
 
 
-def _results(stage: SensitivityStage, numbers: Sequence[FloatArray | float], good: IntArray) -> FloatArray:
-    """Return what a stage returns at good samples, (places, n); not finite where a block is singular."""
-    table = np.empty((len(stage.places), len(good)))
-    if len(good) <= stage.few:
-        columns = [
-            number[good].tolist() if isinstance(number, np.ndarray) else [number] * len(good) for number in numbers
-        ]
-        for k, given in enumerate(zip(*columns, strict=True)):
+def _results(
+    stage: SensitivityStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
+) -> FloatArray:
+    """Return all results of a stage, (rows, n); not finite where a block is singular. numbers: arrays (n,), or one."""
+    results, n = np.zeros(shape), shape[1]
+    if native is not None:
+        native([number if isinstance(number, np.ndarray) else np.array([number]) for number in numbers], results)
+    elif n <= stage.few:
+        columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
+        rows = []
+        for given in zip(*columns, strict=True):
             try:
-                table[:, k] = stage.of_sample(given)
+                rows.append(stage.of_sample(given))
             except (ArithmeticError, ValueError):
-                table[:, k] = np.nan
-        return table
-    with np.errstate(all="ignore"):
-        for start in range(0, len(good), AT_ONCE):
-            part = good[start : start + AT_ONCE]
-            own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
-            for row, result in zip(table, stage.of_samples(own), strict=True):
-                row[start : start + AT_ONCE] = result
-    return table
+                rows.append((np.nan,) * len(stage.places))
+        results[list(stage.places)] = np.array(rows, dtype=float).reshape(n, len(stage.places)).T
+    else:
+        with np.errstate(all="ignore"):
+            for start in range(0, n, AT_ONCE):
+                part = slice(start, start + AT_ONCE)
+                own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
+                for place, result in zip(stage.places, stage.of_samples(own), strict=True):
+                    results[place, part] = result
+    return results
 
 
 def _refused(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -25,20 +27,31 @@ Fill = Callable[[Sequence[Any]], tuple[Any, ...]]
 Entries = Sequence[Sequence[Any]]
 
 
-class SensitivityStage(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SensitivityStage:
     """A compiled sensitivity stage.
 
-    given: names of the symbols whose values the functions take, in this order; places: of the returned values in the
-    row of all results, where the others are 0; text: the source; of_sample: for numbers; of_samples: for arrays (n,);
-    few: up to so many samples are faster one by one.
+    Attributes:
+        given: Names of the symbols whose values the functions take, in this order.
+        steps: What is computed.
+        text: The source.
+        of_sample: For numbers.
+        of_samples: For arrays (n,).
+        few: Up to so many samples are faster one by one.
+
     """
 
     given: tuple[str, ...]
-    places: tuple[int, ...]
+    steps: SensitivitySteps
     text: str
     of_sample: Fill
     of_samples: Fill
     few: int
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        """Places of the returned values in the row of all results, where the others are 0."""
+        return tuple(k for k, node in enumerate(self.steps.results) if node.constant != 0.0)
 
 
 def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
@@ -49,7 +62,7 @@ def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
     given = tuple(symbol.name for symbol in symbols(roots) if symbol.name not in made)
     data = dict.fromkeys(node.curve[0] for node in nodes if node.op == "curve")
     curves = {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
-    text = _text(steps, given, curves, _used_again(nodes, roots))
+    text = _text(steps, given, curves)
     code = compile(text, "<sensitivity stage>", "exec")
     constants = {name: one for one, name in curves.items()}
 
@@ -59,14 +72,23 @@ def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
         fill: Fill = namespace["sensitivities"]
         return fill
 
-    places = tuple(k for k, node in enumerate(steps.results) if node.constant != 0.0)
     few = FEW if all(isinstance(step, Assignment) for step in steps.steps) else FEW_WITH_SOLVES
-    return SensitivityStage(given, places, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
+    return SensitivityStage(given, steps, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
 
 
-def _text(steps: SensitivitySteps, given: Sequence[str], curves: Mapping[CurveData, str], keep: set[Node]) -> str:
+def stage_lines(
+    steps: SensitivitySteps,
+    given: Sequence[str],
+    curves: Mapping[CurveData, str],
+    solve: Callable[[Entries, Entries, Sequence[str]], list[str]],
+) -> tuple[list[str], list[str]]:
+    """Return the statements of a stage, in Python or in C without their ends, and expressions of its results.
+
+    solve: gives statements for columns of J, columns b and the names of the solutions.
+    """
+    roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
     made = [name for step in steps.steps for name in _names(step)]
-    writer = Writer(Names((*given, *made), curves), (), keep)
+    writer = Writer(Names((*given, *made), curves), (), _used_again(reachable(roots), roots))
     lines = []
     for step in steps.steps:
         lines += writer.statements(_nodes(step))
@@ -74,18 +96,23 @@ def _text(steps: SensitivitySteps, given: Sequence[str], curves: Mapping[CurveDa
             lines.append(f"{identifier(step.name)} = {writer.expression(step.node)}")
         else:
             rows, columns = ([[writer.expression(node) for node in row] for row in part] for part in step[:2])
-            solved = tupled(map(identifier, _names(step)))
-            lines.append(f"{solved} = solutions({matrix(rows)}, {matrix(columns)})")
+            lines += solve(rows, columns, [identifier(name) for name in _names(step)])
     results = [node for node in steps.results if node.constant != 0.0]
-    lines += writer.statements(results)
-    returned = tupled(writer.expression(node) for node in results)
+    return lines + writer.statements(results), [writer.expression(node) for node in results]
+
+
+def _text(steps: SensitivitySteps, given: Sequence[str], curves: Mapping[CurveData, str]) -> str:
+    def solve(rows: Entries, columns: Entries, names: Sequence[str]) -> list[str]:
+        return [f"{tupled(names)} = solutions({matrix(rows)}, {matrix(columns)})"]
+
+    lines, results = stage_lines(steps, given, curves, solve)
     return "\n".join(
         [
             "def sensitivities(given):",
             '    """Return outputs and their derivatives with respect to parameters, without those that are 0."""',
             *unpacking(map(identifier, given), "given"),
             *indented(lines),
-            f"    return {returned}",
+            f"    return {tupled(results)}",
             "",
         ]
     )
