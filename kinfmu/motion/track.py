@@ -239,7 +239,12 @@ class Track:
         design, place = np.nonzero((is_above[:, 1:] != is_above[:, :-1]) & self.is_known.reshape(-1)[:, None])
         low, high = ([rows[design, place + side] for rows in (flat, rates, accelerations)] for side in (0, 1))
         s = _root(_quintic(low, high, h[place]), np.zeros(len(design)), np.ones(len(design)))
-        return design, self.x[place] + s * h[place]
+        x = self.x[place] + s * h[place]
+        if self.is_closed:  # a crossing at the end itself is hidden where rounding puts its two samples on other sides
+            is_equal = np.abs(flat[:, -1] - flat[:, 0]) <= _NEAR * np.ptp(flat, axis=1)
+            hidden = np.flatnonzero(is_equal & (is_above[:, -1] != is_above[:, 0]))
+            design, x = np.append(design, hidden), np.append(x, np.full(len(hidden), self.x[-1]))
+        return design, x
 
     def stay(self, band: float) -> tuple[FloatArray, FloatArray]:
         """Return where the quantity enters and leaves the band below its maximum, around the place of the maximum.

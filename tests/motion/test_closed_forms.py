@@ -139,6 +139,20 @@ def test_pressure_angle_of_an_eccentric_cam() -> None:
     assert abs(math.sin(found.at[0])) == pytest.approx(1.0, **EXACT)
 
 
+def test_pressure_angle_of_an_eccentric_cam_with_a_swinging_follower() -> None:
+    """The four-bar in its place has the normal of the cam as coupler: 90 degrees minus the transmission angle."""
+    reading = PressureAngle("alpha", cam="crank", follower="rocker.Q", pivot="rocker.C")
+    found = measured("crank_rocker", reading)["alpha"]
+    assert found.value == pytest.approx(0.5 * math.pi - math.acos((2.0 * 50.0**2 - 20.0**2) / 5000.0), **EXACT)
+
+
+@pytest.mark.parametrize("band", [40.0 * (1.0 - math.cos(0.2003)) + shift for shift in (-1e-14, 0.0, 1e-14)])
+@pytest.mark.parametrize("side", [-0.2003, 0.2003])
+def test_a_dwell_that_begins_or_ends_where_the_motion_closes(band: float, side: float) -> None:
+    run = kinfmu.solve(kinfmu.load("scotch_yoke"), crank_angle=TURN + side)
+    assert kinfmu.measure(run, [Dwell("top", "yoke.x", band)])["top"].value == pytest.approx(2.0 * 0.2003, **EXACT)
+
+
 def test_velocity_ratio_and_mechanical_advantage() -> None:
     low = VelocityRatio("low", "yoke.x", extreme="minimum")
     yoke = measured("scotch_yoke", low, MechanicalAdvantage("ma", "yoke.x"))

@@ -126,6 +126,14 @@ def test_two_extremes_between_two_samples_are_both_seen() -> None:
     assert track.part(0.6, 1.0).minimum() == pytest.approx((curve(0.9), 0.9), abs=1e-14)
 
 
+def test_a_crossing_at_the_end_of_a_closed_motion_is_seen_despite_rounding() -> None:
+    value = np.cos(TURN + 0.2003)
+    value[[0, -1]] = math.cos(0.2003) + np.array([-1e-13, 1e-13])
+    track = Track(TURN, value, -np.sin(TURN + 0.2003), -np.cos(TURN + 0.2003), is_closed=True)
+    start, stop = track.stay(1.0 - math.cos(0.2003))
+    assert float(stop - start) == pytest.approx(2.0 * 0.2003, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("readings", "message"),
     [
