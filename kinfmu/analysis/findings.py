@@ -146,7 +146,7 @@ def _row(row: DependentRow) -> dict[str, Any]:
         "name": row.row.owner,
         "row": row.row.name,
         "implied_by": list(row.implied_by_joints),
-        "implied_by_rows": list(row.implied_by),
+        "implied_by_rows": [implying.name for implying in row.implied_by],
         "gap": row.gap,
         "tolerance": row.tolerance,
     }

@@ -165,7 +165,7 @@ def _form(unit: _Unit) -> _Form:
             lines.append((node.op, node.value, *(number[arg] for arg in node.args)))
     lines += [tuple(number[node] for node in group) for group in roots]
     for block in unit:
-        rows = tuple(name.rpartition(".")[2] for name in (*block.row_names, *block.assigned_by))
+        rows = tuple(row.label for row in (*block.rows, *block.assigned_by))
         lines.append(
             (tuple(own[name] for name in block.coordinates), len(block.unknowns), block.row_scales, block.usual, rows)
         )
@@ -207,8 +207,8 @@ def _renamed(block: Block, names: dict[CoordinateName, CoordinateName], new: dic
     return Block(
         assigned=tuple((names[name], tuple(new[node] for node in motion)) for name, motion in block.assigned),  # type: ignore[misc]
         unknowns=tuple(names[name] for name in block.unknowns),
-        row_names=tuple(name.rpartition(".")[2] for name in block.row_names),
-        assigned_by=tuple(name.rpartition(".")[2] for name in block.assigned_by),
+        rows=tuple(row._replace(owner="") for row in block.rows),
+        assigned_by=tuple(row._replace(owner="") for row in block.assigned_by),
         row_scales=block.row_scales,
         residuals=tuple(new[node] for node in block.residuals),
         jacobian=tuple(tuple(new[node] for node in row) for row in block.jacobian),

@@ -86,10 +86,10 @@ def distance_rows(plan: SolvePlan, solved: Sequence[Block]) -> tuple[DistanceRow
     for number, driver in enumerate(plan.mechanism.drivers):
         measure = driver.measured()
         if isinstance(measure, DistanceBetween):
-            name = f"{driver.name}.{driver.noun}"
             found += [
-                DistanceRow(number, k, block.row_names.index(name), measure.scale(plan.size) * plan.size)
+                DistanceRow(number, k, place, measure.scale(plan.size) * plan.size)
                 for k, block in enumerate(solved)
-                if name in block.row_names
+                for place, row in enumerate(block.rows)
+                if (row.owner, row.label) == (driver.name, driver.noun)
             ]
     return tuple(found)

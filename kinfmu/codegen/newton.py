@@ -70,7 +70,7 @@ def outright(writer: Writer, block: Block) -> Iterator[tuple[list[str], str]]:
     for (name, motion), row in zip(block.assigned, block.assigned_by, strict=True):
         lines = writer.statements([motion[0]])
         given = writer.expression(motion[0])
-        yield lines if given == identifier(name) else [*lines, f"{identifier(name)} = {given}"], row
+        yield lines if given == identifier(name) else [*lines, f"{identifier(name)} = {given}"], row.name
 
 
 def before_newton(writer: Writer, block: Block, turned: Iterable[Node] = ()) -> list[str]:

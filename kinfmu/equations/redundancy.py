@@ -23,7 +23,7 @@ _SAMPLES = 6
 class DependentRow:
     """A row of Phi_K whose gradient is a combination of the others' at every pose of the motion that they leave.
 
-    implied_by: names of the rows in that combination; any of them could be set aside in its place. gap: by how much the
+    implied_by: the rows in that combination; any of them could be set aside in its place. gap: by how much the
     row is open there, as a length or in radians, the median of the poses, as rounding counts for more where the others
     are nearly singular: 0 (within the tolerance) makes it redundant, anything else inconsistent. tolerance: CONSISTENT
     of the bar that a distance is, or of the shorter of the bodies that a pin joins, else of the mechanism's size; in
@@ -32,7 +32,7 @@ class DependentRow:
 
     row: Row
     index: int
-    implied_by: tuple[str, ...]
+    implied_by: tuple[Row, ...]
     gap: float
     tolerance: float
     is_consistent: bool
@@ -40,7 +40,7 @@ class DependentRow:
     @property
     def implied_by_joints(self) -> tuple[str, ...]:
         """Names of the joints to which the implying rows belong, without its own."""
-        owners = dict.fromkeys(name.rpartition(".")[0] for name in self.implied_by)
+        owners = dict.fromkeys(row.owner for row in self.implied_by)
         return tuple(owner for owner in owners if owner != self.row.owner)
 
 
@@ -148,12 +148,12 @@ def _in_span(system: System, pose: FloatArray, index: int, others: Sequence[int]
     return bool(np.linalg.norm(outside) <= _IN_SPAN * max(1.0, float(np.linalg.norm(gradient))))
 
 
-def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others: Sequence[int]) -> tuple[str, ...]:
-    """Return the names of the other rows that have a weight in the combination at any of the poses."""
+def _implied_by(system: System, poses: Sequence[FloatArray], index: int, others: Sequence[int]) -> tuple[Row, ...]:
+    """Return the other rows that have a weight in the combination at any of the poses."""
     used = np.zeros(len(others), dtype=bool)
     for pose in poses:
         used |= np.abs(_combination(system, pose, index, others)[0]) > 1e-6
-    return tuple(system.rows[k].name for k, is_used in zip(others, used, strict=True) if is_used)
+    return tuple(system.rows[k] for k, is_used in zip(others, used, strict=True) if is_used)
 
 
 def _combination(

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Row(NamedTuple):
-    """One scalar constraint equation: row `label` of the joint or driver `owner`."""
+    """One scalar constraint equation: row `label` of the joint or driver `owner`; '' if rows of several share it."""
 
     owner: str
     label: str
@@ -30,7 +30,7 @@ class Row(NamedTuple):
 
     @property
     def name(self) -> str:
-        return f"{self.owner}.{self.label}"
+        return f"{self.owner}.{self.label}" if self.owner else self.label
 
 
 class Member(NamedTuple):

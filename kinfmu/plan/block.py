@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.equations.graph import Node, evaluate, symbols
-from kinfmu.equations.system import System
+from kinfmu.equations.system import Row, System
 from kinfmu.plan.companions import BlockStructure
 from kinfmu.plan.structure import RowTracer, given_value
 from kinfmu.plan.trace import Tracer, is_parameter
@@ -34,8 +34,8 @@ class Block:
 
     assigned: tuple[tuple[CoordinateName, tuple[Node, Node, Node]], ...]
     unknowns: tuple[CoordinateName, ...]
-    row_names: tuple[str, ...]
-    assigned_by: tuple[str, ...]  # row that gives each assigned coordinate
+    rows: tuple[Row, ...]
+    assigned_by: tuple[Row, ...]  # row that gives each assigned coordinate
     row_scales: tuple[float, ...]
     residuals: tuple[Node, ...]
     jacobian: tuple[tuple[Node, ...], ...]
@@ -47,6 +47,10 @@ class Block:
     @property
     def coordinates(self) -> tuple[CoordinateName, ...]:
         return (*(name for name, _ in self.assigned), *self.unknowns)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        return tuple(row.name for row in self.rows)
 
     @property
     def entries(self) -> tuple[Node, ...]:
@@ -121,8 +125,8 @@ def build_block(
     return Block(
         assigned=tuple(assigned),
         unknowns=structure.unknowns,
-        row_names=tuple(system.rows[index].name for index in solved),
-        assigned_by=tuple(system.rows[index].name for _, index in structure.assigned),
+        rows=tuple(system.rows[index] for index in solved),
+        assigned_by=tuple(system.rows[index] for _, index in structure.assigned),
         row_scales=scales,
         residuals=tuple(residuals),
         jacobian=jacobian,
