@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engine import Engine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, Sampler, Setting
 from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.rounds import Spread, samples_in_turn, spread
 from kinfmu.errors import MissingPackageError
@@ -50,14 +50,14 @@ def measure(
     mechanisms: Sequence[str] = MECHANISMS,
     rounds: int = ROUNDS,
     done: Done = lambda: None,
-    engines: Sequence[Engine] = ENGINES,
+    engines: Sequence[BenchEngine] = ENGINES,
 ) -> Result:
     """Measure errors in one whole sweep of every sampler; then times, all samplers of a mechanism once a round."""
     measured: list[Measured] = []
     absent: dict[str, None] = {}
     for name in mechanisms:
         case = of_gallery(name)
-        samplers: list[tuple[Engine, Setting, Sampler]] = []
+        samplers: list[tuple[BenchEngine, Setting, Sampler]] = []
         for engine in engines:
             for setting in engine.settings:
                 done()
@@ -76,12 +76,14 @@ def measure(
     return Result(tuple(measured), tuple(absent))
 
 
-def steps(mechanisms: Sequence[str] = MECHANISMS, rounds: int = ROUNDS, engines: Sequence[Engine] = ENGINES) -> int:
+def steps(
+    mechanisms: Sequence[str] = MECHANISMS, rounds: int = ROUNDS, engines: Sequence[BenchEngine] = ENGINES
+) -> int:
     """Return how often `measure` calls `done`, at most."""
     return len(mechanisms) * (rounds + 2 * sum(len(engine.settings) for engine in engines))
 
 
-def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, None]) -> Sampler | None:
+def prepared(engine: BenchEngine, case: Case, setting: Setting, absent: dict[str, None]) -> Sampler | None:
     """Return a sampler to be measured; None if there is none, with a line in `absent` if a package is missing."""
     try:
         with warnings.catch_warnings():
@@ -92,7 +94,7 @@ def prepared(engine: Engine, case: Case, setting: Setting, absent: dict[str, Non
         return None
 
 
-def per_lap(engine: Engine, microseconds: Sequence[float]) -> Spread:
+def per_lap(engine: BenchEngine, microseconds: Sequence[float]) -> Spread:
     """Return the time of a sample; an engine may take each sample several times in a call."""
     return spread([value / engine.laps for value in microseconds])
 

@@ -58,7 +58,7 @@ def newton(
 
 
 @dataclass(frozen=True)
-class Engine:
+class BenchEngine:
     """Something that solves the samples of a case, in one or more settings.
 
     name: in tables and charts; sampler: makes a function that takes samples, ready to be timed, or None if the engine

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.bench.accuracy import Done, per_lap, prepared, quietly
 from kinfmu.bench.case import Case, along_driver
-from kinfmu.bench.engine import Engine, Sampler
+from kinfmu.bench.engine import BenchEngine, Sampler
 from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.rounds import Spread, samples_in_turn
 from kinfmu.bench.singular_points import POINTS, SingularCase
@@ -50,7 +50,7 @@ def case_of(point: SingularCase) -> Case:
 
 
 def measure(
-    rounds: int = ROUNDS, done: Done = lambda: None, engines: Sequence[Engine] = ENGINES
+    rounds: int = ROUNDS, done: Done = lambda: None, engines: Sequence[BenchEngine] = ENGINES
 ) -> tuple[tuple[Near, ...], tuple[str, ...]]:
     """Take every engine past every point in its usual setting; also return a line for each that is not installed."""
     found: list[Near] = []
@@ -61,7 +61,7 @@ def measure(
         except MissingPackageError as missing:
             absent[f"{point.title}: {missing}"] = None
             continue
-        samplers: list[tuple[Engine, Sampler]] = []
+        samplers: list[tuple[BenchEngine, Sampler]] = []
         for engine in engines:
             sampler = prepared(engine, case, engine.usual, absent)
             if sampler is not None:
@@ -83,6 +83,6 @@ def _whole(sampler: Sampler, n: int) -> Callable[[int], object]:
     return lambda _: sampler(n)
 
 
-def steps(engines: Sequence[Engine] = ENGINES) -> int:
+def steps(engines: Sequence[BenchEngine] = ENGINES) -> int:
     """Return how often `measure` calls `done`, at most."""
     return len(POINTS) * len(engines)

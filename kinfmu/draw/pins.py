@@ -65,7 +65,7 @@ class Pin(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Path(Mark):
+class PathMark(Mark):
     """The path of a point of interest over the run: points (n, 2), NaN in gaps."""
 
     points: FloatArray
@@ -83,7 +83,7 @@ def paths(shown: Instant) -> list[Mark]:
     """Return the paths of the points of interest."""
     first = len(shown.mechanism.moving_bodies)
     return [
-        Path(shown.track(point)[1:], palette.body(first + index))
+        PathMark(shown.track(point)[1:], palette.body(first + index))
         for index, point in enumerate(shown.mechanism.points.values())
         if len(shown.track(point)) > 1
     ]

@@ -43,14 +43,14 @@ class Assembled(NamedTuple):
     margin: float
 
 
-class Assembly(NamedTuple):
+class AssembledStart(NamedTuple):
     """Where a mechanism starts: the rough pose and driver values, and the closed pose found from them (None: none)."""
 
     start: StartValues
     pose: Assembled | None
 
 
-def find_assembly(system: System) -> Assembly:
+def find_assembly(system: System) -> AssembledStart:
     """Return the start values of a mechanism and its assembled pose.
 
     The start poses' driver values are tried first (driven angles moved by whole turns to the start of the laws). From
@@ -71,20 +71,22 @@ def find_assembly(system: System) -> Assembly:
     given, law = start_from_poses(system), law_targets(system)
     found = _assembled(system, given)
     if not given.is_followed or len(system.coordinates) > MOST_DENSE:
-        return Assembly(given, found)
+        return AssembledStart(given, found)
     if found is not None:
         q, u = followed(system, found.q, found.u, law)
         if np.array_equal(u, law):
             if not SINGULAR < margin(system, q) <= comfortable(system):
-                return Assembly(given, found)
+                return AssembledStart(given, found)
             # Between two limits close to each other the last step may skip what no pose closes.
             near = StartValues(q, law, is_followed=True)
-            return Assembly(near, _assembled(system, near))
+            return AssembledStart(near, _assembled(system, near))
     if found is None and len(system.rows) > len(system.coordinates):
-        return Assembly(given, None)  # contradictory joints may close at isolated poses by chance
+        return AssembledStart(given, None)  # contradictory joints may close at isolated poses by chance
     moved = StartValues(with_angles(system, given.q, law - given.u), law, is_followed=True, is_moved=True)
     there = _assembled(system, moved)
-    return Assembly(moved, there) if there is not None and there.margin > SINGULAR else Assembly(given, found)
+    return (
+        AssembledStart(moved, there) if there is not None and there.margin > SINGULAR else AssembledStart(given, found)
+    )
 
 
 def start_values(system: System) -> StartValues:

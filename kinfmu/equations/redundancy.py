@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinfmu.equations.assembly import Assembly, comfortable, find_assembly
+from kinfmu.equations.assembly import AssembledStart, comfortable, find_assembly
 from kinfmu.equations.closing import dependent_rows, motion_samples
 from kinfmu.equations.part import Part
 from kinfmu.equations.system import FloatArray, Row, System, length_of
@@ -55,7 +55,7 @@ class Redundancy:
     mobility: int
     kept: tuple[int, ...]
     dependent: tuple[DependentRow, ...]
-    assembly: Assembly
+    assembly: AssembledStart
 
     @property
     def redundant(self) -> tuple[DependentRow, ...]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 
 Array = NDArray[np.float64]
-Row = tuple[float, ...]
+Numbers = tuple[float, ...]
 
 ENTRY = "resources/slavemodule.txt"  # in a python FMU
 ROWS = 1024  # samples computed at once: their arrays stay in the cache
@@ -43,7 +43,7 @@ class BlockEstimates:
 
     """
 
-    def __init__(self, folder: Path, parameters: Row) -> None:
+    def __init__(self, folder: Path, parameters: Numbers) -> None:
         package = (folder / ENTRY).read_text().strip().removesuffix("_slave")
         names = [f"{package}.solver.{name}" for name in ("model", "estimate", "worst_case_step", "linear", "pose")]
         model, estimate, steps, linear, pose = (sys.modules[name] for name in names)
@@ -113,12 +113,12 @@ class BlockEstimates:
             pass
         return found
 
-    def _of_one(self, u: Row, ud: Row, udd: Row, z: Row) -> Row:
+    def _of_one(self, u: Numbers, ud: Numbers, udd: Numbers, z: Numbers) -> Numbers:
         pose = self._pose(u, self._evaluated(self._model, u, z))
         return self._estimate.margin_of(self._model, pose), *self._estimate.estimated_errors(self._model, pose, ud, udd)
 
 
-def block_estimates(folder: Path, parameters: Row) -> BlockEstimates | None:
+def block_estimates(folder: Path, parameters: Numbers) -> BlockEstimates | None:
     """Return the estimates of an unpacked FMU that runs in this process, or None if they must be read from the FMU."""
     try:
         return BlockEstimates(folder, parameters)

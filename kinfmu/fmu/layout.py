@@ -51,8 +51,8 @@ class Places:
         return ""
 
 
-Row = tuple[float, ...]
-Reader = Callable[[], Row]  # reads the variables of a part
+Numbers = tuple[float, ...]
+Reader = Callable[[], Numbers]  # reads the variables of a part
 
 NOT_A_NUMBER = math.nan
 MOTION = "values", "rates", "accelerations"  # parts that the reader "motion" reads together
@@ -63,7 +63,7 @@ class Fetch(NamedTuple):
 
     read: Reader
     others: tuple[Reader, ...]
-    pick: Callable[[Row], Sequence[float]] | None  # None: all of them
+    pick: Callable[[Numbers], Sequence[float]] | None  # None: all of them
 
 
 def plan_fetch(references: Places, vrs: Sequence[int], reader: Callable[[str], Reader]) -> Fetch:
@@ -99,11 +99,11 @@ def _joined(names: list[str]) -> list[str]:
     return names
 
 
-def _no_number() -> Row:
+def _no_number() -> Numbers:
     return (NOT_A_NUMBER,)
 
 
-def _picker(indices: list[int], width: int) -> Callable[[Row], Sequence[float]] | None:
+def _picker(indices: list[int], width: int) -> Callable[[Numbers], Sequence[float]] | None:
     """Return what picks places of a row of that width: a slice for neighbours, None for the whole row."""
     if indices == list(range(width)):
         return None

@@ -12,7 +12,7 @@ import numpy as np
 from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
 from kinfmu.fmu.layout import UNKNOWN_ERROR
-from kinfmu.fmu.slaves import Slave
+from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
@@ -86,7 +86,7 @@ class Samples:
         """Return the first message of level error, or an empty text."""
         return next((event.text for event in self._events if event.level == "error"), "")
 
-    def read_fixed(self, slave: Slave) -> None:
+    def read_fixed(self, slave: LoadedSlave) -> None:
         """Read the fixed coordinates: constants, and those that follow from the parameters."""
         names = [variable.name for variable in self._interface.part("fixed")]
         values = slave.get([slave.references[name] for name in names]) if names else []
@@ -94,7 +94,7 @@ class Samples:
 
     def begin(
         self,
-        slave: Slave,
+        slave: LoadedSlave,
         channels: Sequence[str] | None,
         sink: Sink | None,
         estimates: Callable[[], BlockEstimates | None] = lambda: None,
@@ -154,7 +154,7 @@ class Samples:
             found = self._estimates(u, ud, udd, known[:, self._unknowns])
             self._reals[rows, -len(self._estimated_columns) :] = found[:, self._estimated_columns]
 
-    def read(self, t: float, slave: Slave, *, is_kept: bool = True) -> bool:
+    def read(self, t: float, slave: LoadedSlave, *, is_kept: bool = True) -> bool:
         """Read a sample, if it is to be kept; return False if it holds no numbers except the driver values."""
         status, iterations = slave.counts()
         good = status <= LAST_GOOD

@@ -24,7 +24,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.input_table import InputTable, input_notes, input_table, undriven
 from kinfmu.fmu.interface import Interface, Variable
 from kinfmu.fmu.samples import DISCARD, ERROR, Samples
-from kinfmu.fmu.slaves import Slave, slave
+from kinfmu.fmu.slaves import LoadedSlave, slave
 from kinfmu.fmu.unpacked import DESCRIPTION, LARGEST_DESCRIPTION, MECHANISM, text_in, unpacked
 from kinfmu.mechanism import Mechanism, RunSettings, toml_file
 from kinfmu.mechanism.settings import Settable, read_tolerance
@@ -215,7 +215,10 @@ def _time_drives(interface: Interface, parameters: Mapping[str, float | bool | s
 
 
 def _initialize(
-    slave: Slave, parameters: Mapping[str, float | bool | str], t: NDArray[np.float64], complaint: Callable[[], str]
+    slave: LoadedSlave,
+    parameters: Mapping[str, float | bool | str],
+    t: NDArray[np.float64],
+    complaint: Callable[[], str],
 ) -> None:
     """Set the parameters and initialize; raise an FmuError for refused parameters and for those with no solution.
 
@@ -260,7 +263,7 @@ def _estimates(
 
 
 def _step_through(
-    slave: Slave,
+    slave: LoadedSlave,
     samples: Samples,
     t: NDArray[np.float64],
     kept: NDArray[np.int64],

@@ -19,7 +19,7 @@ from typing import Any
 from pythonfmu.enums import Fmi2Status
 
 from kinfmu.fmu.estimated_rates import KEPT
-from kinfmu.fmu.layout import Row
+from kinfmu.fmu.layout import Numbers
 from kinfmu.fmu.slave_outputs import LAST_GOOD
 from kinfmu.fmu.slave_settings import SlaveSettings
 from kinfmu.solver.python import Pose, UnsolvableModel, with_parameters
@@ -34,7 +34,7 @@ PLAIN = (  # attributes, without the underscore, that are a number or a truth va
 )
 
 
-def _numbers(values: Sequence[float], like: Sequence[float]) -> Row:
+def _numbers(values: Sequence[float], like: Sequence[float]) -> Numbers:
     """Return as many numbers as there are in `like`; raise a ValueError or TypeError for anything else."""
     return tuple([float(value) for value, _ in zip(values, like, strict=True)])
 

@@ -10,7 +10,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from kinfmu.fmu.estimated_rates import LARGEST, Sample, errors_of_estimated_rates, estimated_rates
-from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Places, Row, plan_fetch
+from kinfmu.fmu.layout import NOT_A_NUMBER, UNKNOWN_ERROR, Fetch, Layout, Numbers, Places, plan_fetch
 from kinfmu.solver.python import Pose, Status, UnsolvableModel, with_parameters
 
 LAST_GOOD = int(Status.BRIDGED)  # compared in every read: faster than `Pose.good`
@@ -29,11 +29,11 @@ class Shown:
     def __init__(self, pose: Pose, stale: bool) -> None:
         self.pose = pose
         self.stale = stale
-        self.drive: tuple[Row, Row, Row] | None = None
-        self.values: Row | None = None
-        self.rates: Row | None = None
-        self.accelerations: Row | None = None
-        self.errors: Row | None = None
+        self.drive: tuple[Numbers, Numbers, Numbers] | None = None
+        self.values: Numbers | None = None
+        self.rates: Numbers | None = None
+        self.accelerations: Numbers | None = None
+        self.errors: Numbers | None = None
 
 
 class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no types
@@ -47,8 +47,8 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
         parts = {part.name: part for part in self.layout.parts}
         self._inputs: list[float] = list(parts["inputs"].starts)  # value, speed, acceleration of each driver
         self._input_starts = list(self._inputs)
-        self._constants: Row = parts["constants"].starts
-        self._parameters: Row = parts["parameters"].starts
+        self._constants: Numbers = parts["constants"].starts
+        self._parameters: Numbers = parts["parameters"].starts
         self._tolerance: float = parts["tolerance"].starts[0]
         self._driven_by_time: bool = parts["drive"].starts[0]
         self._rates: int = parts["rate_source"].starts[0]
@@ -56,7 +56,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
         self._fetches: dict[tuple[int, ...], Fetch] = {}
         self._last_read: list[int] = []  # value references of the last get_real
         self._last_fetch = self._plan_fetch(())
-        self._motion_drive: tuple[Row, Row, Row] = ((), (), ())  # u, ud, udd of `_motion`
+        self._motion_drive: tuple[Numbers, Numbers, Numbers] = ((), (), ())  # u, ud, udd of `_motion`
         self._last_counted: list[int] = []  # of the last get_integer, and what it reads of a pose
         self._counted: list[str] = []
         self._solver = with_parameters(self.model, self._parameters, self._tolerance)
@@ -73,7 +73,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
         self._stray_reported = False  # the host was warned that inputs have no effect
 
         self._committed: Pose = self._solver.anchor
-        self._committed_inputs: Row = tuple(self._inputs)
+        self._committed_inputs: Numbers = tuple(self._inputs)
         self._history: tuple[Sample, ...] = ()  # the last commits, KEPT at most, oldest first
 
         self._forget()
@@ -84,9 +84,9 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
         """Clear the cache, since driver values may have changed: the next get solves."""
         self._pose: Pose | None = None
         self._shown: Shown | None = None
-        self._motion: Row | None = None  # values, rates and accelerations in one row, which most hosts read
+        self._motion: Numbers | None = None  # values, rates and accelerations in one row, which most hosts read
 
-    def _driven(self) -> tuple[Row, Row, Row]:
+    def _driven(self) -> tuple[Numbers, Numbers, Numbers]:
         """Return the requested u, ud, udd: by the law at the current time, or by the inputs."""
         if self._driven_by_time:
             return self._solver.model.drive(self._time, self._constants)  # type: ignore[no-any-return]
@@ -95,7 +95,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             return self._by_inputs(self._inputs, t, u)
         return u, *estimated_rates(self._history, t, u)
 
-    def _law(self, t: float) -> Row:
+    def _law(self, t: float) -> Numbers:
         """Return u by the laws, or NaN if a rate exceeds LARGEST: there is no pose then."""
         u, ud, udd = self._solver.model.drive(t, self._constants)
         for rate in ud + udd:
@@ -110,7 +110,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             return self._time, self._wanted()
         return history[-1]  # no set since the commit: the committed sample, at the time of its doStep
 
-    def _by_inputs(self, inputs: Sequence[float], t: float, u: Row) -> tuple[Row, Row, Row]:
+    def _by_inputs(self, inputs: Sequence[float], t: float, u: Numbers) -> tuple[Numbers, Numbers, Numbers]:
         """Return u, ud, udd at time t, with estimates for rates that are not wired."""
         wired = self._wired
         if not wired:
@@ -122,7 +122,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
         udd = tuple([inputs[k] if k in wired else udd[k // 3] for k in range(2, len(inputs), 3)])
         return u, ud, udd
 
-    def _committed_drive(self) -> tuple[Row, Row, Row]:
+    def _committed_drive(self) -> tuple[Numbers, Numbers, Numbers]:
         """Return u, ud, udd at the last commit, of the last good values; before it, those of the anchor at rest."""
         if not self._history:
             rest = (0.0,) * len(self._committed.u)
@@ -132,7 +132,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             return self._solver.model.drive(t, self._constants)  # type: ignore[no-any-return]
         return self._by_inputs(self._committed_inputs, t, u)
 
-    def _wanted(self) -> Row:
+    def _wanted(self) -> Numbers:
         """Return u by the inputs."""
         inputs = self._inputs
         return (inputs[0],) if len(inputs) == 3 else tuple(inputs[::3])  # most mechanisms have one driver: no slice
@@ -156,7 +156,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             shown = self._shown = Shown(self._committed if stale else pose, stale)
         return shown
 
-    def _drive(self, shown: Shown) -> tuple[Row, Row, Row]:
+    def _drive(self, shown: Shown) -> tuple[Numbers, Numbers, Numbers]:
         """Return u, ud, udd of the shown pose."""
         drive = shown.drive
         if drive is None:
@@ -169,29 +169,29 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
 
     # Parts of the list of variables, each computed when it is first read
 
-    def _read_inputs(self) -> Row:
+    def _read_inputs(self) -> Numbers:
         return tuple(self._inputs)
 
-    def _read_values(self) -> Row:
+    def _read_values(self) -> Numbers:
         shown = self._look()
         if shown.values is None:
             shown.values = self._solver.outputs(shown.pose)
         return shown.values
 
-    def _read_rates(self) -> Row:
+    def _read_rates(self) -> Numbers:
         shown = self._look()
         if shown.rates is None:
             shown.rates = self._solver.rates(shown.pose, self._drive(shown)[1])
         return shown.rates
 
-    def _read_accelerations(self) -> Row:
+    def _read_accelerations(self) -> Numbers:
         shown = self._look()
         if shown.accelerations is None:
             _, ud, udd = self._drive(shown)
             shown.accelerations = self._solver.accelerations(shown.pose, ud, udd)
         return shown.accelerations
 
-    def _read_motion(self) -> Row:
+    def _read_motion(self) -> Numbers:
         """Return values, rates and accelerations in one row: common subexpressions are computed once."""
         row = self._motion
         if row is None:
@@ -209,13 +209,13 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             self._motion = row
         return row
 
-    def _read_residual(self) -> Row:
+    def _read_residual(self) -> Numbers:
         return (self._requested().residual,)
 
-    def _read_margin(self) -> Row:
+    def _read_margin(self) -> Numbers:
         return (self._solver.margin(self._requested()),)  # not computed with the pose: it takes longer than a pose
 
-    def _read_errors(self) -> Row:
+    def _read_errors(self) -> Numbers:
         shown = self._look()
         if shown.errors is None:
             _, ud, udd = self._drive(shown)
@@ -224,7 +224,7 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             shown.errors = tuple([min(error, UNKNOWN_ERROR) for error in errors])
         return shown.errors
 
-    def _errors_of_drive(self) -> tuple[Row, Row]:
+    def _errors_of_drive(self) -> tuple[Numbers, Numbers]:
         """Return the errors of ud and udd: those of estimates from samples; inputs have none."""
         speeds, accelerations = errors_of_estimated_rates(self._history, *self._moment())
         wired = self._wired
@@ -233,26 +233,26 @@ class SlaveOutputs(Fmi2Slave):  # type: ignore[misc]  # pythonfmu carries no typ
             tuple([0.0 if 3 * k + 2 in wired else error for k, error in enumerate(accelerations)]),
         )
 
-    def _read_watch(self) -> Row:
+    def _read_watch(self) -> Numbers:
         return self._solver.watch(self._look().pose)
 
-    def _read_driven(self) -> Row:
+    def _read_driven(self) -> Numbers:
         shown = self._look()
         drive = self._driven() if shown.stale else self._drive(shown)
         if len(drive[0]) == 1:
             return drive[0] + drive[1] + drive[2]
         return tuple(value for driver in zip(*drive, strict=True) for value in driver)
 
-    def _read_constants(self) -> Row:
+    def _read_constants(self) -> Numbers:
         return self._constants
 
-    def _read_tolerance(self) -> Row:
+    def _read_tolerance(self) -> Numbers:
         return (self._tolerance,)
 
-    def _read_parameters(self) -> Row:
+    def _read_parameters(self) -> Numbers:
         return self._parameters
 
-    def _read_fixed(self) -> Row:
+    def _read_fixed(self) -> Numbers:
         self._requested()  # binds parameters
         return tuple(self._solver.model.FIXED.values())
 

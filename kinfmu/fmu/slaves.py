@@ -21,7 +21,7 @@ DISCARD = 2  # fmi2Discard and fmi3Discard
 Log = Callable[[int, str], None]  # status and text of a message
 
 
-class Slave(ABC):
+class LoadedSlave(ABC):
     """A slave of an FMU unpacked into a folder; raises what fmpy raises.
 
     Calls that are made in every step go to the C functions directly: fmpy's methods take longer than a native step.
@@ -102,7 +102,7 @@ class Slave(ABC):
         raise FmuError(f"at t = {time:g} s: {FMICallException(function=self._do_step.name, status=status)}")
 
 
-class Slave2(Slave):
+class Slave2(LoadedSlave):
     """A slave of FMI 2.0."""
 
     _functions, _real, _enumeration, _has_value_count = "fmi2", "Real", "Integer", False
@@ -145,7 +145,7 @@ class Slave2(Slave):
         return self._counts[0], self._counts[1]
 
 
-class Slave3(Slave):
+class Slave3(LoadedSlave):
     """A slave of FMI 3.0."""
 
     _functions, _real, _enumeration, _has_value_count = "fmi3", "Float64", "Int64", True
@@ -181,7 +181,7 @@ _SLAVES: Mapping[str, type[Slave2 | Slave3]] = {"2.0": Slave2, "3.0": Slave3}
 
 
 @contextmanager
-def slave(about: Description, folder: Path, log: Log) -> Iterator[Slave]:
+def slave(about: Description, folder: Path, log: Log) -> Iterator[LoadedSlave]:
     """Start a slave of an FMU; at the end free it and restore `sys.path`.
 
     Args:

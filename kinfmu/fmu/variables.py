@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.fmu.estimated_rates import Rates
-from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, Part, Variable
+from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.trace import is_parameter
@@ -119,11 +119,11 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
         "rate_source": [_RATES],
         "message": [_MESSAGE],
     }
-    parts = [Part(name, tuple(variables)) for name, variables in lists.items()]
+    parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
     if has_time:
         tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}
-        parts = [Part(part.name, tuple(_in_fmi3(one, tunable) for one in part.variables)) for part in parts]
-        parts.append(Part("time", (_TIME,)))
+        parts = [InterfacePart(part.name, tuple(_in_fmi3(one, tunable) for one in part.variables)) for part in parts]
+        parts.append(InterfacePart("time", (_TIME,)))
     return Interface(
         mechanism.name, mechanism.title, mechanism.length_unit, mechanism.run, len(plan.coordinates), tuple(parts)
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError
-from kinfmu.laws.law import NEARLY, Constant, Frequency, Law, LawQuantity, Led, LedRate, Path, Phase
+from kinfmu.laws.law import NEARLY, Constant, ConstantPath, Frequency, Law, LawQuantity, Led, LedRate, Phase
 from kinfmu.measures.arithmetic import Value, sine_of_line
 
 HIGHEST_DEGREE = 20  # the value of a polynomial of a higher degree is mostly rounding error
@@ -47,10 +47,10 @@ class Polynomial(Law):
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", tuple(self.coefficients))
 
-    def numbers(self) -> dict[Path, Constant]:
+    def numbers(self) -> dict[ConstantPath, Constant]:
         return {(f"c{k}",): Constant(c, LawQuantity("led", k)) for k, c in enumerate(self.coefficients)}
 
-    def with_numbers(self, values: Mapping[Path, Any]) -> Polynomial:
+    def with_numbers(self, values: Mapping[ConstantPath, Any]) -> Polynomial:
         return Polynomial(tuple(values.get((f"c{k}",), c) for k, c in enumerate(self.coefficients)))
 
     def target(self, x: Value, **constants: Value) -> Value:

@@ -69,7 +69,7 @@ Duration = Annotated[float, LawQuantity("argument", is_positive=True)]
 Phase = Annotated[float, LawQuantity("angle")]
 Frequency = Annotated[float, LawQuantity("angle", 1)]
 
-Path = tuple[str | int, ...]
+ConstantPath = tuple[str | int, ...]
 TURN = 2.0 * math.pi  # [rad]
 NEARLY = 1e-9  # of a turn; a period may miss a turn by this much, because of rounding in degrees
 
@@ -100,11 +100,11 @@ class Law(ABC):
         """Return the arguments at which f, f' or f'' jumps, in plain arithmetic, with the constants given by name."""
         return Jumps()
 
-    def numbers(self) -> dict[Path, Constant]:
+    def numbers(self) -> dict[ConstantPath, Constant]:
         """Return every number of the law, by its path in the law's table; here the fields that are numbers."""
         return {(key,): Constant(getattr(self, key), said) for key, said in number_fields(type(self)).items()}
 
-    def with_numbers(self, values: Mapping[Path, Any]) -> Law:
+    def with_numbers(self, values: Mapping[ConstantPath, Any]) -> Law:
         """Return the law with other values of some numbers."""
         return replace(self, **{str(path[0]): value for path, value in values.items()})  # type: ignore[type-var]
 

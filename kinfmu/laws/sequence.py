@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, Jumps, Law, LawQuantity, Led, Path, jumping_breaks
+from kinfmu.laws.law import NEARLY, TURN, Argument, Constant, ConstantPath, Jumps, Law, LawQuantity, Led, jumping_breaks
 from kinfmu.laws.rise import RISES
 from kinfmu.measures.arithmetic import Value, curve, split_periods, sqrt
 
@@ -47,7 +47,7 @@ class MotionSequence(Law):
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", tuple(Segment(*segment) for segment in self.segments))
 
-    def numbers(self) -> dict[Path, Constant]:
+    def numbers(self) -> dict[ConstantPath, Constant]:
         found = super().numbers()
         for k, segment in enumerate(self.segments, start=1):
             if segment.law != DWELL:
@@ -55,7 +55,7 @@ class MotionSequence(Law):
             found[(f"duration_{k}",)] = Constant(segment.duration, _DURATION)
         return found
 
-    def with_numbers(self, values: Mapping[Path, Any]) -> MotionSequence:
+    def with_numbers(self, values: Mapping[ConstantPath, Any]) -> MotionSequence:
         segments = tuple(
             segment._replace(
                 rise=values.get((f"rise_{k}",), segment.rise),

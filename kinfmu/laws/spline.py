@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 from kinfmu.errors import MechanismError, listed, suggestion
-from kinfmu.laws.law import NEARLY, TURN, Constant, Jumps, Law, LawQuantity, Path, jumping_breaks
+from kinfmu.laws.law import NEARLY, TURN, Constant, ConstantPath, Jumps, Law, LawQuantity, jumping_breaks
 from kinfmu.measures.arithmetic import Value, curve, split_periods
 from kinfmu.measures.placement import Reference
 from kinfmu.solver.python.curve import CurveData, Piece
@@ -43,14 +43,14 @@ class Spline(Law):
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", tuple(_pair(point) for point in self.points))
 
-    def numbers(self) -> dict[Path, Constant]:
+    def numbers(self) -> dict[ConstantPath, Constant]:
         return {
             ("points", k, i): Constant(point[i], said)
             for k, point in enumerate(self.points)
             for i, said in enumerate((_X, _U))
         }
 
-    def with_numbers(self, values: Mapping[Path, Any]) -> Spline:
+    def with_numbers(self, values: Mapping[ConstantPath, Any]) -> Spline:
         points = tuple(
             tuple(values.get(("points", k, i), point[i]) for i in (0, 1)) for k, point in enumerate(self.points)
         )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kinfmu.equations.assembly import SINGULAR, Assembled, Assembly, closes_beside
+from kinfmu.equations.assembly import SINGULAR, Assembled, AssembledStart, closes_beside
 from kinfmu.equations.closing import branches, close, margin
 from kinfmu.equations.part import Part
 from kinfmu.equations.start_poses import StartValues
@@ -14,7 +14,7 @@ from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import AmbiguousStartError, AssemblyError, MobilityError, listed
 
 
-def find_anchor(system: System, assembly: Assembly) -> Assembled:
+def find_anchor(system: System, assembly: AssembledStart) -> Assembled:
     """Return the closed start pose, or a pose near it if it is singular.
 
     Args:

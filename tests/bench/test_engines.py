@@ -12,7 +12,7 @@ from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
 from kinfmu.bench.charts import LOOKS
-from kinfmu.bench.engine import Engine, Setting
+from kinfmu.bench.engine import BenchEngine, Setting
 from kinfmu.bench.engines import (
     CASADI,
     ENGINES,
@@ -39,7 +39,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 
 @pytest.mark.parametrize("engine", [SHIPPED, NATIVE, GENERATED, NUMPY_NEWTON, READABLE], ids=lambda engine: engine.name)
-def test_newton_to_round_off_agrees_with_the_50_digits(engine: Engine, case: Case) -> None:
+def test_newton_to_round_off_agrees_with_the_50_digits(engine: BenchEngine, case: Case) -> None:
     sampler = engine.sampler(case, engine.usual)
     assert sampler is not None
     assert max(largest(case, sampler)) <= ROUND_OFF
@@ -55,7 +55,7 @@ PEERS = [(CASADI, "casadi"), (PYLINKAGE, "pylinkage")]
 
 
 @pytest.mark.parametrize(("engine", "package"), PEERS, ids=["casadi", "pylinkage"])
-def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> None:
+def test_peers_agree_where_they_are_installed(engine: BenchEngine, package: str) -> None:
     pytest.importorskip(package)
     jansen = of_gallery("jansen_leg")
     absent: dict[str, None] = {}
@@ -69,7 +69,7 @@ def test_peers_agree_where_they_are_installed(engine: Engine, package: str) -> N
     ("engine", "package", "name"), [(CASADI, "casadi", "CasADi"), (PYLINKAGE, "pylinkage", "pylinkage")]
 )
 def test_a_peer_that_is_not_installed_is_reported_in_one_line(
-    engine: Engine, package: str, name: str, monkeypatch: pytest.MonkeyPatch
+    engine: BenchEngine, package: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     crank_rocker = of_gallery("crank_rocker")
@@ -190,7 +190,7 @@ def test_without_mpmath_it_is_reported_in_one_line(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("engine", [SHIPPED, NATIVE], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.title)
 def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
-    point: singular.Point, engine: Engine
+    point: singular.Point, engine: BenchEngine
 ) -> None:
     case = singular.case_of(point)
     sampler = engine.sampler(case, Setting())

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import Engine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, Sampler, Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.measures import arithmetic
 
@@ -62,7 +62,7 @@ def _step(casadi: Any, case: Case, tolerance: float) -> Any:
     return casadi.Function("step", [last, at, speed, more], [here, everything])
 
 
-CASADI = Engine(
+CASADI = BenchEngine(
     "CasADi",
     _sampler,
     settings=tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, Engine, Sampler, Setting, newton
+from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting, newton
 from kinfmu.bench.stopping import model_with
 
 
@@ -51,4 +51,4 @@ def _sampler(case: Case, setting: Setting) -> Sampler:
     return take
 
 
-GENERATED = Engine("generated Python", _sampler, newton())
+GENERATED = BenchEngine("generated Python", _sampler, newton())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import Engine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, Sampler, Setting
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.sweep.library import Library
 
@@ -33,4 +33,4 @@ def _sampler(case: Case, _setting: Setting) -> Sampler:
     return take
 
 
-NATIVE = Engine("kinfmu native", _sampler, laps=LAPS)
+NATIVE = BenchEngine("kinfmu native", _sampler, laps=LAPS)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.joints import Distance, Revolute, Translational
 from kinfmu.measures.placement import body_of
@@ -230,7 +230,7 @@ class _Equations:
         return rate, (w_j * w_j * a_j[0] - w_i * w_i * a_i[0], w_j * w_j * a_j[1] - w_i * w_i * a_i[1])
 
 
-NUMPY_NEWTON = Engine(
+NUMPY_NEWTON = BenchEngine(
     "numpy Newton",
     _sampler,
     settings=tuple(Setting(order, tolerance) for order in range(3) for tolerance in (1e-3, 1e-9, CLOSED)),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import Engine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, Sampler, Setting
 from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
 from kinfmu.units import CoordinateName
@@ -138,4 +138,4 @@ _LINKAGES: dict[str, Callable[[Case, float, float], tuple[dict[str, Any], Bodies
 }
 
 
-PYLINKAGE = Engine("pylinkage", _sampler, settings=(Setting(0),), usual=Setting(0))
+PYLINKAGE = BenchEngine("pylinkage", _sampler, settings=(Setting(0),), usual=Setting(0))

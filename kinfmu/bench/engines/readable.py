@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, ROUND_OFF, Engine, Sampler, Setting, newton
+from kinfmu.bench.engine import GAP, ROUND_OFF, BenchEngine, Sampler, Setting, newton
 from kinfmu.equations.reference import Solution
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import PoseError
@@ -74,7 +74,7 @@ def _predicted(last: Solution, h: float, order: int) -> FloatArray:
     return np.asarray(sum(terms[1 : order + 1], start=terms[0]))
 
 
-READABLE = Engine(
+READABLE = BenchEngine(
     "readable reference",
     _sampler,
     settings=newton(tolerances=(1e-3, 1e-9, ROUND_OFF), chord=(2,)),  # the slowest

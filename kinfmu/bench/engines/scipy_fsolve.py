@@ -12,7 +12,7 @@ from itertools import chain
 from typing import Any
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
@@ -62,7 +62,7 @@ def _sampler(case: Case, setting: Setting) -> Sampler:
     return take
 
 
-FSOLVE = Engine(
+FSOLVE = BenchEngine(
     "scipy fsolve",
     _sampler,
     settings=tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST)),

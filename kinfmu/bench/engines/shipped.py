@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, Engine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
 from kinfmu.codegen.python import load_model
 from kinfmu.solver.python import Solver
 
@@ -29,4 +29,4 @@ def _sampler(case: Case, _setting: Setting) -> Sampler:
     return take
 
 
-SHIPPED = Engine("kinfmu", _sampler)
+SHIPPED = BenchEngine("kinfmu", _sampler)
