@@ -103,7 +103,7 @@ class Mechanism:
 
     @property
     def own_parameters(self) -> tuple[str, ...]:
-        """Parameters that are numbers of their own; the others follow from them by expressions."""
+        """Parameters written as numbers; the others follow from them by expressions."""
         return tuple(name for name, parameter in self.parameters.items() if parameter.expression is None)
 
     @property

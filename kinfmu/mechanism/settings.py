@@ -59,7 +59,7 @@ class Settable:
 
     Attributes:
         parameters: All parameters.
-        constants: The law constants that are numbers of their own.
+        constants: The law constants that are not written as expressions.
         names: Names of both.
 
     """

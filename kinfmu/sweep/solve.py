@@ -80,6 +80,6 @@ def solve(
 
 @lru_cache(maxsize=MODELS_KEPT)
 def _model(mechanism: Mechanism, outputs: Sequence[str] | None, derived: Sequence[str], engine: str) -> Model:
-    """Return a model in which parameters that are numbers of their own, and those derived ones, are arguments."""
+    """Return a model whose arguments are the parameters written as numbers, and those derived ones."""
     own = [name for name, parameter in mechanism.parameters.items() if not parameter.expression]
     return Model(compile_plan(mechanism, outputs, [*own, *derived]), engine)

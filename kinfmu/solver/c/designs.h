@@ -13,14 +13,19 @@ typedef enum {
 
 /* Designs to be solved at `samples.count` samples each, and the tables to be filled.
  *
- * parameters: (count, KF_PARAMETERS). The drivers follow given values, samples.u, ud and udd, equal for all designs, or
- * with drive_step numbers from one design to the next; or, with times (samples.count), the laws with constants, of which
- * there are constant_step from one design to the next; then u, ud and udd are only memory, overwritten by each design, and
- * `start` is the time at which the laws start.
+ * count: of the designs. parameters: (count, KF_PARAMETERS).
  *
- * samples: tables, outcomes, residual and watches of the first design; those of the next follow after table_step[order]
- * numbers and directly. No failures of samples are collected.
- * reached: (count); messages: (count, KF_MESSAGE), why a design or its first unreachable sample is not reached, else empty.
+ * What moves them is one of two:
+ * - driver values: samples.u, ud and udd of the first design; those of the next one begin drive_step numbers later (0: all
+ *   designs share them). times is NULL.
+ * - the laws: times (samples.count), and constants of the first design; those of the next one begin constant_step numbers
+ *   later. The laws start at the time `start`. Each design overwrites samples.u, ud and udd.
+ *
+ * samples: its tables are those of the first design; those of the next one begin table_step[order] numbers later. Its
+ * outcomes, residual and watches follow each other without a gap. Failures of samples are not collected.
+ *
+ * reached: (count) values of kf_reached. messages: (count, KF_MESSAGE), why a design, or else its first sample without
+ * numbers, is not reached; empty if all are.
  */
 typedef struct {
     int64_t count;
