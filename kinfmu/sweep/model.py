@@ -64,8 +64,8 @@ def compile(  # noqa: A001  as re.compile
     Args:
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. What they do not depend on is not solved.
-        parameters: Names of the parameters that stay arguments; default: all that are not written as expressions. The others
-            are numbers in the generated code, which is faster. A parameter written as an expression can be named too.
+        parameters: Names of the parameters that stay arguments; default: all that are not written as expressions. The
+            others are numbers in the generated code, which is faster. One written as an expression can be named too.
         engine: 'python'; 'native', generated C, which is compiled now, or found in the cache; or 'auto', native where
             a call has enough samples to pay for compiling and a compiler is found.
 
