@@ -10,6 +10,7 @@ from kinfmu.draw.names import Mark, Name
 from kinfmu.draw.sheet import BAR, INK, PAPER, Sheet
 from kinfmu.drivers import DistanceDriver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.measures.placement import body_of, point_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
@@ -104,8 +105,7 @@ def pins(shown: Instant) -> list[Mark]:
     used = {name for place in places for name in place.points}
     held = {joint.between[0] for joint in mechanism.joints if isinstance(joint, Translational | PointOnLine)}
     for name in names:
-        body, _, point = name.partition(".")
-        if name not in used and name not in held and body != GROUND_NAME:
+        if name not in used and name not in held and body_of(name) != GROUND_NAME:
             home[name].kinds.add("loose")
             home[name].points.append(name)
     for index, (name, point) in enumerate(mechanism.points.items()):
@@ -136,7 +136,7 @@ def _note_joints(shown: Instant, home: dict[str, _Place]) -> None:
 def _pin(place: _Place) -> Pin:
     """Return the mark of a place; its names are those of its joints, else of its points, then of points of interest."""
     kind = max(place.kinds, key=_ORDER.index, default="")
-    points = [name.partition(".")[2] for name in place.points]
+    points = [point_of(name) for name in place.points]
     if kind == "slide" or (kind == "loose" and place.interest):
         points = []
     texts = dict.fromkeys([*(place.joints or points), *place.interest])

@@ -55,7 +55,7 @@ class Placement:
 
     def point(self, name: str) -> tuple[Value, Value]:
         """Return the world coordinates r + A s of 'body.point'."""
-        body = self.poses[name.partition(".")[0]]
+        body = self.poses[body_of(name)]
         s_x, s_y = self.points[name]
         return body.x + body.c * s_x - body.s * s_y, body.y + body.s * s_x + body.c * s_y
 
@@ -88,3 +88,8 @@ def unit_vector(angle: Value) -> tuple[Value, Value]:
 def body_of(point: str) -> str:
     """Return 'crank' of 'crank.tip'."""
     return point.partition(".")[0]
+
+
+def point_of(point: str) -> str:
+    """Return 'tip' of 'crank.tip'."""
+    return point.partition(".")[2]

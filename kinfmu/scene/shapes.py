@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.drivers import DistanceDriver, Driver
 from kinfmu.joints import CamRoller, Distance, Fixed, PointOnLine, Revolute
 from kinfmu.joints.joint import Joint
-from kinfmu.measures.placement import body_of
+from kinfmu.measures.placement import body_of, point_of
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.run import FloatArray
 from kinfmu.scene import palette
@@ -133,7 +133,7 @@ def _supports(shown: Instant) -> Iterator[Shape]:
                 leaving.setdefault(at, []).extend([*(ends - at), ends.mean(axis=0) - at])  # a plate covers its middle
     names: dict[tuple[float, float], list[str]] = {}
     for point, found in joints.items():
-        names.setdefault(shown.body_points[point], []).extend(found or [point.partition(".")[2]])
+        names.setdefault(shown.body_points[point], []).extend(found or [point_of(point)])
     for at, found in names.items():
         side = _free_side(leaving.get(at, []))
         yield Shape("support", ", ".join(dict.fromkeys(found)), GROUND_NAME, np.array([at]), direction=side)
