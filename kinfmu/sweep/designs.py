@@ -16,13 +16,12 @@ from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import FloatArray, Run
 from kinfmu.solver.python.status import Status
+from kinfmu.sweep.arguments import Arguments, Settings
 from kinfmu.sweep.engine import Driven
 from kinfmu.units import CoordinateName
 
 if TYPE_CHECKING:
     from kinfmu.sweep.library import Library
-
-Settings = Mapping[str, float | str]
 
 SAMPLES_AT_ONCE = 500_000  # of a piece of work: its diagnostics stay in some 30 MB
 
@@ -94,14 +93,12 @@ class Solvable(Protocol):
     """What a batch of designs needs of a Model."""
 
     plan: SolvePlan
+    arguments: Arguments
 
     def solve(
         self, t: ArrayLike | None = None, *, parameters: Settings, tolerance: float, anew: bool, **inputs: Any
     ) -> Run:
         """Return the run of one design, assembled anew if continuation does not reach it."""
-
-    def read_parameter(self, name: str, value: float | str) -> float:
-        """Return the value of a parameter or law constant as a number; refuse unknown names."""
 
     def load_library(self) -> Library: ...
 
@@ -286,9 +283,9 @@ def _arrays(model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> dict[
     arrays: dict[str, FloatArray] = {}
     for name, value in parameters.items():
         if isinstance(value, str):
-            arrays[name] = np.array([model.read_parameter(name, value)])
+            arrays[name] = np.array([model.arguments.number(name, value)])
             continue
-        model.read_parameter(name, 1.0)
+        model.arguments.number(name, 1.0)
         try:
             arrays[name] = np.atleast_1d(np.asarray(value, dtype=float))
         except (TypeError, ValueError):

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python import load_model, load_module
-from kinfmu.equations.graph import evaluate
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.mechanism import require_mechanism
-from kinfmu.mechanism.parameters import in_order, parameter_values
 from kinfmu.mechanism.settings import read_tolerance
-from kinfmu.mechanism.valid import LARGEST_NUMBER, is_number, quoted
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
 from kinfmu.solver.python.solver import TOLERANCE
+from kinfmu.sweep.arguments import Arguments, Setting, Settings
 from kinfmu.sweep.continued import anew as anew_note
 from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
@@ -35,21 +31,6 @@ from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel
 ENGINES = ("auto", "python", "native")
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 _SOLVERS_KEPT = 8  # of the last parameters
-
-Settings = Mapping[str, float | str]
-
-
-class Setting(NamedTuple):
-    """Parameters and law constants of one call.
-
-    given: As the caller wrote them. values: Of all parameters of the plan; empty: those of the plan, none was given.
-    constants: Of all laws. starts_elsewhere: The laws may start at another pose than the anchor's.
-    """
-
-    given: Settings
-    values: Vector
-    constants: Vector
-    starts_elsewhere: bool
 
 
 def compile(  # noqa: A001  as re.compile
@@ -107,12 +88,7 @@ class Model:
         self.parameters = tuple(parameter.name for parameter in plan.parameters)
         self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self._watch_names = plan.watch_names
-        self._written = tuple(parameter.value for parameter in plan.parameters)
-        self._constants_written = tuple(constant.value for constant in plan.law_constants)
-        self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
-        self._constant_places = {constant.name: k for k, constant in enumerate(plan.law_constants)}
-        self._opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
-        self._positive = {k for k, constant in enumerate(plan.law_constants) if constant.is_positive}
+        self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
 
     def __repr__(self) -> str:
@@ -123,7 +99,7 @@ class Model:
         from kinfmu.mechanism import toml_text
 
         text = toml_text.text(self.plan.mechanism)
-        return _from_text, (text, self.plan.outputs, tuple(self._places), self.engine)
+        return _from_text, (text, self.plan.outputs, self.parameters, self.engine)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -171,7 +147,7 @@ class Model:
 
         """
         tolerance = read_tolerance("tolerance", tolerance)
-        setting = self.setting(parameters or {})
+        setting = self.arguments.setting(parameters or {})
         driven, times = None, np.empty(0)
         if inputs:
             if t is not None:
@@ -212,8 +188,8 @@ class Model:
             watch_names=self._watch_names,
             watch=result.watch,
             length_unit=plan.mechanism.length_unit,
-            mechanism_source=self._mechanism_with(setting),
-            info=lambda: self._info(setting, engine.name),
+            mechanism_source=self.arguments.mechanism_with(setting),
+            info=lambda: self.arguments.info(setting, engine.name),
             events=tuple(Event(float(k if inputs else times[k]), "error", message) for k, message in result.failures),
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
@@ -271,19 +247,6 @@ class Model:
         native = workers if self._is_native(batch.count * len(times)) else 0
         return solve_batch(batch, driving, highest=derivatives, tolerance=tolerance, anew=anew, threads=native)
 
-    def read_parameter(self, name: str, value: float | str) -> float:
-        """Return the value of a parameter or law constant as a number.
-
-        Raises:
-            RequestError: The name is unknown.
-            MechanismError: The value is invalid.
-
-        """
-        setting = self.setting({name: value})
-        if name in self._places:
-            return setting.values[self._places[name]]
-        return setting.constants[self._constant_places[name]]
-
     def sensitivities(
         self,
         t: ArrayLike | None = None,
@@ -327,39 +290,6 @@ class Model:
     def _sensitivity_model(self) -> SensitivityModel:
         return SensitivityModel(self)
 
-    def setting(self, given: Settings) -> Setting:
-        """Return parameters and law constants as numbers.
-
-        Raises:
-            RequestError: A name is unknown or a value is invalid.
-            MechanismError: The mechanism cannot have these values.
-
-        """
-        if not given:
-            return Setting(given, (), self._constants_written, starts_elsewhere=False)
-        values, constants = list(self._written), list(self._constants_written)
-        own = False
-        for name, value in given.items():
-            if not (type(value) is float or is_number(value)) or not abs(value) <= LARGEST_NUMBER:  # type: ignore[arg-type]
-                return self.setting(self._read(given))._replace(given=given)
-            place = self._places.get(name)
-            if place is not None:
-                values[place] = float(value)
-                own = True
-                continue
-            place = self._constant_places.get(name)
-            if place is None:
-                raise self._unknown(name)
-            constants[place] = float(value)
-            if place in self._positive and not constants[place] > 0.0:
-                self.mechanism.settable.number(name, value)  # refuses it
-        if own and self._opens_expressions:  # those that are not given follow from the others
-            known = {name: float(value) for name, value in given.items() if name in self._places}
-            found = parameter_values(self.mechanism.parameters, known)
-            values = [float(found[name]) for name in self._places]
-        elsewhere = own or self._law_starts(tuple(constants)) != self._law_starts(self._constants_written)
-        return Setting(given, tuple(values) if own else (), tuple(constants), elsewhere)
-
     def load_library(self) -> Any:
         """Return the compiled library of the plan, compiled now or found in the cache.
 
@@ -374,41 +304,6 @@ class Model:
         from kinfmu.sweep.library import Library
 
         return Library(self.plan)
-
-    @cached_property
-    def _derived(self) -> tuple[tuple[str, Expression], ...]:
-        """Parameters that follow from others by expressions, each after those in its expression."""
-        parameters = self.mechanism.parameters
-        expressions = {
-            name: p.expression for name, p in parameters.items() if p.expression and name not in self._places
-        }
-        return tuple((name, expressions[name]) for name in in_order(parameters, expressions) if name in expressions)
-
-    def _read(self, given: Settings) -> dict[str, float]:
-        """Return the numbers of settings of which some are text, or refuse them."""
-        for name in given:
-            if name not in self._places and name not in self._constant_places:
-                raise self._unknown(name)
-        changed = self.mechanism.with_parameters(given)
-        constants = changed.settable.constants
-        return {
-            name: float(changed.parameters[name].value) if name in self._places else constants[name].value
-            for name in given
-        }
-
-    def _unknown(self, name: str) -> RequestError:
-        parameter = self.mechanism.parameters.get(name)
-        if parameter is not None:
-            expression = parameter.expression
-            how = f"follows from {quoted(expression.text)}" if expression else "is a number of the model"
-            return RequestError(f"{name} {how}; compile(mechanism, parameters=['{name}']) makes it an argument")
-        return self.mechanism.settable.unknown(name, [*self._places, *self._constant_places])
-
-    def _law_starts(self, constants: Vector) -> Vector:
-        """Return the driver values at which the laws start, with the parameters as written."""
-        model = load_model(self.plan)
-        u: Vector = model.drive(self.mechanism.run.start, constants)[0]
-        return u
 
     def _is_native(self, count: int) -> bool:
         """Return whether so many samples are solved by the native engine; its library is compiled then."""
@@ -431,8 +326,8 @@ class Model:
 
             library = self._library
             if start is not None:
-                library.require_start(setting.values or self._written, setting.constants, start, tolerance)
-            return NativeEngine(library, setting.values, lambda: self._fixed(setting), tolerance)
+                library.require_start(setting.values or self.arguments.written, setting.constants, start, tolerance)
+            return NativeEngine(library, setting.values, lambda: self.arguments.fixed(setting), tolerance)
         return PythonEngine(self._solver(setting.values, setting.constants if start is not None else None, tolerance))
 
     def _new_solver(self, values: Vector, starting: Vector | None, tolerance: float) -> Solver:
@@ -444,7 +339,7 @@ class Model:
         """
         if not values and starting is None:
             return Solver(load_model(self.plan), tolerance)
-        solver = with_parameters(load_module(self.plan), values or self._written, tolerance)
+        solver = with_parameters(load_module(self.plan), values or self.arguments.written, tolerance)
         if isinstance(solver, UnsolvableModel):
             raise UnreachedError(solver.message)
         if starting is not None:
@@ -452,35 +347,6 @@ class Model:
             if not pose.good:
                 raise UnreachedError(pose.message)
         return solver
-
-    def _fixed(self, setting: Setting) -> Mapping[str, float]:
-        """Return the coordinates that never move."""
-        nodes = self.plan.fixed_nodes
-        if not setting.values or all(node.constant is not None for node in nodes.values()):
-            return self.plan.fixed
-        known: dict[str, float] = {
-            parameter_symbol(name): value for name, value in zip(self._places, setting.values, strict=True)
-        }
-        return dict(zip(nodes, evaluate(list(nodes.values()), known), strict=True))
-
-    def _mechanism_with(self, setting: Setting) -> Mechanism | Callable[[], Mechanism]:
-        """Return the mechanism with the parameters set, or a function that makes it when it is first read."""
-        own = {name: value for name, value in setting.given.items() if name in self._places}
-        mechanism = self.mechanism
-        return (lambda: mechanism.with_parameters(own)) if own else mechanism
-
-    def _info(self, setting: Setting, engine: str) -> dict[str, str]:
-        mechanism = self.mechanism
-        values: dict[str, Any] = dict(zip(self._places, setting.values or self._written, strict=True))
-        for name, expression in self._derived if setting.values else ():
-            values[name] = expression.value(values)
-        return {
-            "name": mechanism.name,
-            "title": mechanism.title,
-            "engine": engine,
-            **{name: repr(float(values.get(name, p.value))) for name, p in mechanism.parameters.items()},
-            **{name: repr(value) for name, value in zip(self._constant_places, setting.constants, strict=True)},
-        }
 
     def _solve_anew(self, reason: str, given: Settings, t: ArrayLike | None, **arguments: Any) -> Run:
         """Solve the mechanism as a file with these parameters would be."""

@@ -21,7 +21,8 @@ from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.solver.python.status import Status
 
 if TYPE_CHECKING:
-    from kinfmu.sweep.model import Model, Settings
+    from kinfmu.sweep.arguments import Settings
+    from kinfmu.sweep.model import Model
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
@@ -97,7 +98,7 @@ class SensitivityModel:
         plan, by_law = self._model.plan, not inputs
         names = _names("outputs", outputs, plan.outputs)
         chosen = self._chosen(wrt, by_law=by_law)
-        setting = self._model.setting(parameters or {})
+        setting = self._model.arguments.setting(parameters or {})
         run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs)
         given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
         given["time"] = run.t
@@ -126,7 +127,7 @@ class SensitivityModel:
                     f"wrt: '{name}' is a law constant, which acts over time; give t in place of driver values"
                 )
             if name not in known and name in plan.mechanism.parameters:
-                self._model.setting({name: 0.0})  # reports why it is not open
+                self._model.arguments.setting({name: 0.0})  # reports why it is not open
         if not known:
             raise RequestError("the model has no parameters: write [parameters] and use their names for numbers")
         return _names("wrt", wrt, known)

@@ -13,8 +13,9 @@ from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import Run
 from kinfmu.solver.python.solver import TOLERANCE
+from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.engine import Tables
-from kinfmu.sweep.model import Model, Settings, require_engine
+from kinfmu.sweep.model import Model, require_engine
 
 MODELS_KEPT = 16
 
