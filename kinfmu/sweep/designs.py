@@ -90,13 +90,19 @@ class Designs:
 
 
 class Solvable(Protocol):
-    """What a batch of designs needs of a Model."""
+    """What batches of designs and sensitivities need of a Model."""
 
     plan: SolvePlan
     arguments: Arguments
 
     def solve(
-        self, t: ArrayLike | None = None, *, parameters: Settings, tolerance: float, anew: bool, **inputs: Any
+        self,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Settings | None,
+        tolerance: float,
+        anew: bool = True,
+        **inputs: Any,
     ) -> Run:
         """Return the run of one design, assembled anew if continuation does not reach it."""
 

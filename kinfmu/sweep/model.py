@@ -26,7 +26,7 @@ from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
 from kinfmu.sweep.engine import Engine, Tables, UnreachedError
 from kinfmu.sweep.python_engine import PythonEngine
-from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel
+from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
 
 ENGINES = ("auto", "python", "native")
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
@@ -288,7 +288,8 @@ class Model:
 
     @cached_property
     def _sensitivity_model(self) -> SensitivityModel:
-        return SensitivityModel(self)
+        plan = plan_of_unknowns(self.plan)
+        return SensitivityModel(self, self if plan is self.plan else Model(plan, self.engine))
 
     def load_library(self) -> Any:
         """Return the compiled library of the plan, compiled now or found in the cache.

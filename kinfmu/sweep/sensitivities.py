@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,10 +19,8 @@ from kinfmu.plan.sensitivity import law_symbol, scale_of, sensitivity_steps
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.solver.python.status import Status
-
-if TYPE_CHECKING:
-    from kinfmu.sweep.arguments import Settings
-    from kinfmu.sweep.model import Model
+from kinfmu.sweep.arguments import Settings
+from kinfmu.sweep.designs import Solvable
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
@@ -75,11 +73,14 @@ class Sensitivities:
 
 
 class SensitivityModel:
-    """Sensitivities of a model; code is printed when it is first needed and kept."""
+    """Sensitivities of a model; code is printed when it is first needed and kept.
 
-    def __init__(self, model: Model) -> None:
+    poses: A model of `plan_of_unknowns`.
+    """
+
+    def __init__(self, model: Solvable, poses: Solvable) -> None:
         self._model = model
-        self._poses = _model_of_unknowns(model)
+        self._poses = poses
         self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
         self._native = lru_cache(maxsize=_STAGES_KEPT)(_native_stage)
 
@@ -102,7 +103,7 @@ class SensitivityModel:
         run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs)
         given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
         given["time"] = run.t
-        for name, values, rates in zip(self._poses.outputs, run.values.T, run.rates.T, strict=True):
+        for name, values, rates in zip(self._poses.plan.outputs, run.values.T, run.rates.T, strict=True):
             if name in plan.unknowns:
                 given |= {name: values, name.derivative(1): rates}
         written = [parameter.value for parameter in plan.parameters]
@@ -149,15 +150,13 @@ def _native_stage(stage: SensitivityStage) -> Native | None:
         return None
 
 
-def _model_of_unknowns(model: Model) -> Model:
-    """Return a model whose outputs are the unknowns of all blocks, as seen from the plan's own origin."""
-    plan = model.plan
+def plan_of_unknowns(plan: SolvePlan) -> SolvePlan:
+    """Return the plan whose outputs are the unknowns of all blocks, seen from its own origin; or the same plan."""
     if set(plan.unknowns) <= set(plan.outputs) and plan.origin == (0.0, 0.0):
-        return model
+        return plan
     local, _ = localized(plan.mechanism)
-    return type(model)(
-        compile_plan(replace(local, coordinates="moving"), plan.unknowns, model.parameters), model.engine
-    )
+    open_ones = [parameter.name for parameter in plan.parameters]
+    return compile_plan(replace(local, coordinates="moving"), plan.unknowns, open_ones)
 
 
 def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
