@@ -171,7 +171,7 @@ DESCRIPTIONS: dict[str, tuple[Callable[[str], str], str]] = {
     "a unit that is unknown": (lambda text: text.replace('lengthUnit="', 'lengthUnit="x', 1), "unit of length 'xm"),
     "a library elsewhere": (
         lambda text: text.replace('modelIdentifier="', 'modelIdentifier="../../', 1),
-        "damaged: modelIdentifier '../../slider_crank' must be letters",
+        "damaged: modelIdentifier '../../slider_crank' must consist of at most 100 letters",
     ),
     "another part": (lambda text: text.replace('name="counts"', 'name="count"', 1), "part counts does not hold"),
     "outputs that are no coordinates": (lambda text: text.replace('.phi"', '.psi"'), "is no coordinate such as"),

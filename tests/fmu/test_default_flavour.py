@@ -81,9 +81,9 @@ def test_the_python_flavour_can_be_chosen_and_is_the_default_on_unknown_platform
 
 
 def test_simulate_of_a_mechanism_starts_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    def compiled(*_: object) -> None:
+    def compile_files(*_: object) -> None:
         raise AssertionError("a compiler ran")
 
-    monkeypatch.setattr(compiler, "compiled", compiled)
+    monkeypatch.setattr(compiler, "compile_files", compile_files)
     result = CliRunner().invoke(main, ["simulate", "fourbar", "--stop", "3"])
     assert result.exit_code == 0, result.output

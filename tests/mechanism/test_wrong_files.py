@@ -159,7 +159,7 @@ CHANGES = {
     "a name that no variable can have": (
         "[bodies.crank]",
         '[bodies."my crank"]',
-        "[bodies] 'my crank' must be let",
+        "[bodies] 'my crank' must consist of at most 100 letters",
     ),
     "no name": ('name = "crank_rocker"', "", "name is missing; the first line should be such as name = 'fourbar'"),
     "a line that is no TOML": (

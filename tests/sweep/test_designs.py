@@ -57,9 +57,12 @@ def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     mechanism = with_open_lengths(kinfmu.load(name))
     model = kinfmu.compile(mechanism, engine=engine)
     inputs = {driver.inputs()[0]: driver.law.at(0.0) + np.linspace(0.0, 1.5, SAMPLES) for driver in mechanism.drivers}
-    designs = model.solve_designs(drawn(mechanism, COUNT, 0.03), **inputs)
-    assert designs.status.shape == (COUNT, SAMPLES)
-    assert designs.good.any() == (name != "fourbar")  # its redundant bar fits no other lengths
+    count = (
+        3 if name == "fourbar" else COUNT
+    )  # its redundant bar fits no other lengths: each is assembled anew, in vain
+    designs = model.solve_designs(drawn(mechanism, count, 0.03), **inputs)
+    assert designs.status.shape == (count, SAMPLES)
+    assert designs.good.any() == (name != "fourbar")
     assert_as_solved(model, designs, **inputs)
 
 
