@@ -167,10 +167,10 @@ def shown_range(values: FloatArray, usual: float) -> tuple[float, float] | None:
     if np.abs(known).max() < ROUND_OFF * usual:
         return -usual, usual
     low, high = np.percentile(known, [OUTLIERS, 100.0 - OUTLIERS])
-    with np.errstate(over="ignore"):  # the width of the largest numbers is infinite; the default range is used then
+    with np.errstate(over="ignore"):  # the largest numbers lead to infinite ends; the default range is used then
         width = high - low
-    if width == np.inf:
-        return None
-    if width > 0.0 and (known.min() < low - width or known.max() > high + width):
-        return float(low - width / 2), float(high + width / 2)
+        shown = low - width / 2, high + width / 2
+        has_outliers = known.min() < low - width or known.max() > high + width
+    if width > 0.0 and has_outliers and np.isfinite(shown).all():
+        return float(shown[0]), float(shown[1])
     return None

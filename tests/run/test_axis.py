@@ -18,7 +18,7 @@ from kinfmu.log import read, write_mcap
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.series import groups
 from kinfmu.log.viewer.timeline import timeline_of
-from kinfmu.run.axis import axis_of
+from kinfmu.run.axis import axis_of, shown_range
 from kinfmu.run.channels import coordinates, select
 from kinfmu.run.verdict import sentence
 
@@ -167,3 +167,10 @@ def test_a_part_that_a_sweep_has_not_is_refused(sweep: Run) -> None:
 
     with pytest.raises(RequestError, match=r"no samples from 720 deg on; its samples: crank = 0 to 360 deg"):
         _between(sweep, "720deg", None)
+
+
+def test_the_largest_numbers_have_the_default_range() -> None:
+    largest = np.finfo(float).max
+    few = np.array([-largest, *np.linspace(-0.4, 0.4, 4000) * largest, largest])
+    assert shown_range(few, 1.0) is None
+    assert shown_range(np.array([*np.linspace(-1.0, 1.0, 4000), 1e300]), 1.0) == pytest.approx((-2.0, 2.0), rel=0.05)

@@ -326,7 +326,7 @@ def test_samples_one_by_one_equal_samples_as_arrays() -> None:
         np.testing.assert_array_equal(whole.values, model.solve(t).values)
 
 
-@pytest.mark.parametrize("name", ["jansen_leg", "stephenson_six_bar", "cam_roller", "five_bar", "pantograph"])
+@pytest.mark.parametrize("name", ["stephenson_six_bar", "cam_roller", "five_bar"])
 def test_native_and_python_engine_give_the_same(name: str) -> None:
     """Blocks of one and two unknowns, of more, and curves, which stay in Python."""
     mechanism = with_open_lengths(kinfmu.load(name))
