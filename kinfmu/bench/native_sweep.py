@@ -21,7 +21,7 @@ from kinfmu.gallery import load
 from kinfmu.gallery.chains import fourbar_chain
 from kinfmu.plan import compile_plan
 from kinfmu.run import FloatArray
-from kinfmu.sweep import solve
+from kinfmu.sweep import compile as compiled_model
 from kinfmu.sweep.library import FLAGS, Library
 
 ROUNDS = 9
@@ -44,14 +44,17 @@ def run(rounds: int = ROUNDS, samples: int = SAMPLES, loops: int = 1000) -> str:
     tables = [columns[5 * k : 5 * k + 5].T for k in range(3)]
     by_samples = [np.empty((samples, 5)) for _ in range(3)]
     result, fourbar_result = (compiled.sweep(driven, tables) for compiled in (crank_rocker, fourbar))
-    plan = compile_plan(load("crank_rocker"), FOURBAR)
+    model = compiled_model(load("crank_rocker"), FOURBAR, engine="native")
     ways: dict[str, Callable[[], object]] = {
         CLOSED: closed_form(u, columns),
         WHOLE: lambda: crank_rocker.sweep(driven, tables, reuse=result),
         "the same, tables by samples": lambda: crank_rocker.sweep(driven, by_samples, reuse=result),
         ALONE: lambda: crank_rocker.sweep(driven, (tables[0], None, None), reuse=result),
         "the same, q, qd, qdd, all arrays allocated": lambda: crank_rocker.sweep(driven, _allocated(samples)),
-        "the same, by kinfmu.solve of a plan": lambda: solve(plan, crank_angle=u, engine="native"),
+        "the same, by Model.solve into given arrays": lambda: model.solve(
+            crank_angle=u, out=(tables[0], tables[1], tables[2])
+        ),
+        "the same, by Model.solve": lambda: model.solve(crank_angle=u),
         "four-bar past two change points a turn": lambda: fourbar.sweep(driven, tables, reuse=fourbar_result),
     }
     absent = ""

@@ -28,7 +28,7 @@ def run(rounds: int = ROUNDS) -> str:
     ways = {
         "readable reference, 9 coordinates, warm start": _reference(u),
         "python engine, ready: q, qd, qdd": _engine(u),
-        "kinfmu.solve, which writes its code first": _solve(u),
+        "kinfmu.solve, the mechanism solved before": _solve(u),
         "the same, error estimates and margin read": _solve(u, read=True),
     }
     base, *_ = times = [
