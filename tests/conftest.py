@@ -19,6 +19,7 @@ GOLDEN = Path(__file__).parent / "golden"
 SHIPPED_FLAGS = {module: module.FLAGS for module in (compiler, archive, library)}
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
+settings.register_profile("long", settings.get_profile("kinfmu"), max_examples=60)  # in .ci/run: --hypothesis-profile
 settings.load_profile("kinfmu")
 
 

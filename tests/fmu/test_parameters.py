@@ -99,8 +99,9 @@ def test_parameters_take_units_and_law_constants_are_set_the_same_way() -> None:
 def test_a_derived_parameter_can_be_set_too() -> None:
     mechanism = replace(linkage(), parameters={**LENGTHS, "rocker": "crank*3"})
     run = kinfmu.solve(mechanism, parameters={"rocker": 3.2})
-    wanted = kinfmu.solve(linkage({**LENGTHS, "rocker": 3.2}))
-    np.testing.assert_allclose(run.values, wanted.values, rtol=0, atol=2e-15)
+    np.testing.assert_array_equal(run.values, kinfmu.solve(linkage(), parameters={"rocker": 3.2}).values)
+    in_file = kinfmu.solve(linkage({**LENGTHS, "rocker": 3.2}))  # not followed there from another length: other rounding
+    np.testing.assert_allclose(run.values, in_file.values, rtol=0, atol=2e-15)
 
 
 def test_lengths_that_do_not_close_are_refused_with_the_joint_and_the_gap(fmu: Path) -> None:

@@ -51,8 +51,13 @@ def _program(mechanism: kinfmu.Mechanism, fmi: int, folder: Path, *flags: str) -
 @pytest.mark.skipif(CC is None, reason="neither gcc nor clang is there")
 @pytest.mark.parametrize(("name", "fmi"), [("fourbar", 2), ("five_bar", 3), ("settable", 2), ("settable", 3)])
 def test_address_and_undefined_behaviour_sanitizers_report_no_errors(name: str, fmi: int, tmp_path: Path) -> None:
+    check_under_sanitizers(name, fmi, tmp_path)
+
+
+def check_under_sanitizers(name: str, fmi: int, tmp_path: Path, *more: str) -> None:
+    """Run the host of a mechanism's FMU under the sanitizers; more: flags of the compiler."""
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
-    flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", *more)
     done = subprocess.run([_program(mechanism, fmi, tmp_path, *flags)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
