@@ -100,7 +100,8 @@ def test_a_derived_parameter_can_be_set_too() -> None:
     mechanism = replace(linkage(), parameters={**LENGTHS, "rocker": "crank*3"})
     run = kinfmu.solve(mechanism, parameters={"rocker": 3.2})
     np.testing.assert_array_equal(run.values, kinfmu.solve(linkage(), parameters={"rocker": 3.2}).values)
-    in_file = kinfmu.solve(linkage({**LENGTHS, "rocker": 3.2}))  # not followed there from another length: other rounding
+    # In the file from the start, the pose is not followed there from another length: it is rounded otherwise.
+    in_file = kinfmu.solve(linkage({**LENGTHS, "rocker": 3.2}))
     np.testing.assert_allclose(run.values, in_file.values, rtol=0, atol=2e-15)
 
 
