@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from kinfmu.draw.names import Mark, Name, place
 from kinfmu.draw.painting import Painter, extent, placed, shortest
 from kinfmu.draw.pins import paths, pins
 from kinfmu.draw.sheet import Sheet
-from kinfmu.draw.writing import write
+from kinfmu.draw.writing import check_target, write
 from kinfmu.errors import listed
 from kinfmu.joints import Coordinate, Distance, Fixed, PointOnLine, Revolute, Translational
 from kinfmu.mechanism import Mechanism
@@ -21,12 +22,25 @@ from kinfmu.scene.instant import Instant
 from kinfmu.scene.shape import Shape
 from kinfmu.scene.shapes import shapes
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 MOST_NAMES = 90  # more would cover the drawing
 _ALWAYS_DRAWN = (Revolute, Translational, Fixed, Distance, PointOnLine, Coordinate)
 
 
-def figure(mechanism: Mechanism, path: str | Path, at: float | None = None) -> None:
-    """Draw a mechanism into a .svg or .png file.
+@overload
+def figure(mechanism: Mechanism, path: str | Path, at: float | None = None, *, ax: None = None) -> None: ...
+
+
+@overload
+def figure(mechanism: Mechanism, path: None = None, at: float | None = None, *, ax: Axes) -> Axes: ...
+
+
+def figure(
+    mechanism: Mechanism, path: str | Path | None = None, at: float | None = None, *, ax: Axes | None = None
+) -> Axes | None:
+    """Draw a mechanism into a .svg or .png file, or into Axes of matplotlib.
 
     The figure shows bodies, joints, drivers and points of interest with their names, and the paths of these points over
     the file's run; the axes are in the mechanism's unit of length, with equal scales. The same mechanism gives the same
@@ -37,25 +51,35 @@ def figure(mechanism: Mechanism, path: str | Path, at: float | None = None) -> N
         path: The .svg or .png file.
         at: Value of the only driver [rad or length]. Default: the start of the run, or a later sample if links hide one
             another at the start.
+        ax: Axes to draw into, in place of a file. Widths of lines and places of names are for their size at the time
+            of the call; limits, labels and title are set.
+
+    Returns:
+        `ax`; None for a file.
 
     Raises:
-        FigureError: The suffix is unknown, the file cannot be written, or `at` cannot be reached.
+        FigureError: The suffix is unknown, the file cannot be written, `at` cannot be reached, or neither or both of
+            `path` and `ax` are given.
         MissingPackageError: matplotlib is not installed.
         AssemblyError: The mechanism does not close.
         MechanismError: The mechanism is invalid.
 
     """
+    check_target("figure", path, ax)
+    if path is None:
+        return sheet_of(instant(mechanism, at), ax).axes
     write(Path(path), lambda: sheet_of(instant(mechanism, at)).figure)
+    return None
 
 
-def sheet_of(shown: Instant) -> Sheet:
-    """Return the sheet with everything drawn on it; needs matplotlib."""
+def sheet_of(shown: Instant, ax: Axes | None = None) -> Sheet:
+    """Return the sheet with everything drawn on it, by default in a figure of its own; needs matplotlib."""
     mechanism = shown.mechanism
     found = placed(shown, shapes(shown))
     arrows, places, tracks = motion(shown), pins(shown), paths(shown)
     reach = np.vstack([extent(found), *(mark.extent() for mark in (*arrows, *places, *tracks))])
     size = float(np.ptp(reach, axis=0).max())
-    sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name)
+    sheet = Sheet(reach, shortest(found, size), mechanism.length_unit, mechanism.title or mechanism.name, ax)
     names = draw(sheet, found, tracks, [*arrows, *places])
     notes = [pose] if (pose := pose_note(shown)) else []
     if len(names) <= MOST_NAMES:

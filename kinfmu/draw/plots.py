@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinfmu.draw.chart import SMALL, dress
+from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
-from kinfmu.draw.writing import check_suffix, write
+from kinfmu.draw.writing import check_suffix, check_target, write
 from kinfmu.errors import FigureError
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
@@ -31,34 +30,52 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels;
 _BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _EDGE = 8.0  # [pt] around the title
 _LABEL = 40.0  # [pt] from an axis to its name
-_BINS = 1500  # of a long run; each shows its least and its greatest value
-_LOST: palette.Colour = (246, 222, 222)
 
 
-def plot(run: Run, path: str | Path, columns: Sequence[str] = ()) -> None:
-    """Draw coordinates of `run` over its axis, usually time, into a .svg or .png file for a report.
+@overload
+def plot(run: Run, path: str | Path, columns: Sequence[str] = (), *, ax: None = None) -> None: ...
 
-    Each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of length.
-    Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text "not
-    kept". The same run gives the same bytes.
+
+@overload
+def plot(run: Run, path: None = None, columns: Sequence[str] = (), *, ax: Axes) -> Axes: ...
+
+
+def plot(
+    run: Run, path: str | Path | None = None, columns: Sequence[str] = (), *, ax: Axes | None = None
+) -> Axes | None:
+    """Draw `run` over its axis, usually time: coordinates into a .svg or .png file, or columns into Axes of matplotlib.
+
+    In a file, each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of
+    length. Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text
+    "not kept". The same run gives the same bytes. Into Axes, each column is a curve with its name as the label, in your
+    settings of matplotlib; several calls draw several runs into the same Axes.
 
     Args:
         run: The run.
         path: The .svg or .png file.
-        columns: Names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as in tables. Default: all generalized
-            coordinates.
+        columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as in tables. Default: all
+            generalized coordinates. With `ax`: columns of one unit, such as 'coupler.vx', with * for any letters.
+            Default: all generalized coordinates, if they have one unit.
+        ax: Axes to draw into, in place of a file.
+
+    Returns:
+        `ax`; None for a file.
 
     Raises:
-        RequestError: A name is not a coordinate.
+        RequestError: A name is not a coordinate or, with `ax`, not a column.
         FigureError: There are more than MOST_COORDINATES coordinates, the run has no samples, the suffix is unknown, or
-            the file cannot be written.
+            the file cannot be written; neither or both of `path` and `ax` are given; curves for `ax` have two units.
         MissingPackageError: matplotlib is not installed.
 
     """
-    path = Path(path)
+    check_target("plot", path, ax)
+    if ax is not None:
+        return curves(ax, run, columns)
+    path = Path(str(path))
     check_suffix(path)
     names = _chosen(run, columns, path)
     write(path, lambda: _sheet(run, names))
+    return None
 
 
 def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[CoordinateName, ...]:
@@ -113,7 +130,7 @@ def _panel(axes: Axes, run: Run, axis: Axis, name: CoordinateName, order: int) -
     is_kept = column not in run.absent
     values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan) if is_kept else np.full(len(run), np.nan)
     known = values[np.isfinite(values)]
-    rows = _rows(values)
+    rows = rows_of(values)
     colour = ink((palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[order])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
     if len(known) < 2:
@@ -130,8 +147,8 @@ def _panel(axes: Axes, run: Run, axis: Axis, name: CoordinateName, order: int) -
     axes.set_ylabel(f"{column.removeprefix(f'{name.owner}.')} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
     if not is_kept:
         axes.text(0.5, 0.5, "not kept", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
-    for first, last in _gaps(run, axis.values):
-        axes.axvspan(first, last, color=ink(_LOST), linewidth=0.0, zorder=0.0)
+    for first, last in gaps(run, axis.values):
+        axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
 
 
 def _shown(run: Run, axis: Axis, name: CoordinateName, order: int, known: FloatArray) -> tuple[float, float] | None:
@@ -149,31 +166,7 @@ def _shown(run: Run, axis: Axis, name: CoordinateName, order: int, known: FloatA
     return shown_range(known, usual)
 
 
-def _rows(values: FloatArray) -> NDArray[np.int64]:
-    """Return samples that give the same picture as all: of long runs the extremes of short intervals, and gaps."""
-    count = len(values)
-    if count <= 4 * _BINS:
-        return np.arange(count)
-    found = [np.array([0, count - 1]), np.flatnonzero(np.diff(np.isfinite(values))) + np.array([[0], [1]])]
-    edges = np.linspace(0, count, _BINS + 1).astype(int)
-    for first, last in pairwise(edges):
-        part = values[first:last]
-        if np.isfinite(part).any():
-            found.append(first + np.array([np.nanargmin(part), np.nanargmax(part)]))
-    return np.unique(np.concatenate([rows.ravel() for rows in found]))
-
-
 def _span(t: FloatArray) -> tuple[float, float]:
     first, last = float(t.min()), float(t.max())
     edge = 0.01 * (last - first) or 0.5
     return first - edge, last + edge
-
-
-def _gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
-    """Return for each gap the last sample with numbers before it and the first one after it."""
-    turns = np.flatnonzero(np.diff(np.r_[True, run.good, True].astype(int)))  # first of a gap, first after it, ...
-    last = len(run) - 1
-    return [
-        (float(values[max(begin - 1, 0)]), float(values[min(end, last)]))
-        for begin, end in zip(turns[::2], turns[1::2], strict=True)
-    ]

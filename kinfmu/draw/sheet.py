@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +30,7 @@ _WIDEST, _HIGHEST = 470.0, 380.0  # [pt], of the drawing
 _SMALLEST = 120.0  # [pt]
 _LONG, _LONGEST_STRIP = 6.0, 2.5  # width to height from which a drawing, such as a chain, may be wider; largest factor
 _MARGIN = 34.0  # [pt]; for supports and names
+_MARGIN_PART = 0.15  # of the shorter side of given axes, at most
 _LEFT, _RIGHT, _BOTTOM, _TOP = 46.0, 12.0, 40.0, 28.0  # [pt] around the axes
 _EDGE = 12.0  # [pt], margin left and below without axes
 _FINEST = 0.45  # smallest factor of the sizes of details, for short links
@@ -36,31 +38,39 @@ _SPACING = 3.0  # [pt] between the dots that record what is covered
 TITLE_FONT = 11.0  # [pt]
 TITLE_LINE = 15.0  # [pt], from line to line
 MOST_LINES = 2  # of a title
+_NOTE_FONT = 8.0  # [pt]
 _THINNEST = 2.0  # [pt], width of the narrowest letters, i and l
 
 
 class Sheet:
     """A sheet for a mechanism within `extent` (k, 2), whose shortest link is `shortest` [length].
 
-    unit: of the axes, None for a sheet without axes and names, as in animations; point: length of a printer's point
-    (1/72 inch) in the world; fine: factor of the sizes of details.
+    unit: of the axes, None for a sheet without axes and names, as in animations; given: Axes of another figure to draw
+    into, which keep their size; point: length of a printer's point (1/72 inch) in the world; fine: factor of the sizes
+    of details.
     """
 
-    def __init__(self, extent: FloatArray, shortest: float, unit: str | None, title: str) -> None:
+    def __init__(
+        self, extent: FloatArray, shortest: float, unit: str | None, title: str, given: Axes | None = None
+    ) -> None:
         low, high = extent.min(axis=0), extent.max(axis=0)
-        width, height = high - low
-        side = float(max(width, height)) or 1.0
-        strip = min(max(1.0, width / max(_LONG * height, 1e-9 * side)), _LONGEST_STRIP)
-        scale = min(strip * _WIDEST / max(width, 1e-9 * side), _HIGHEST / max(height, 1e-9 * side))  # [pt/length]
+        paper, scale = _paper_for(high - low) if given is None else _paper_of(given, high - low)
         self.point = float(1.0 / scale)
         self.fine: float = float(np.clip(shortest * scale / 40.0, _FINEST, 1.0))
-        paper = np.maximum((high - low) * scale, _SMALLEST) + 2.0 * _MARGIN
         self.low: FloatArray = (low + high) / 2.0 - paper / 2.0 / scale
         self.high: FloatArray = (low + high) / 2.0 + paper / 2.0 / scale
-        self._has_names = unit is not None
+        self._has_names, self._is_given = unit is not None, given is not None
         self._layer = 1.0
         self._dots: list[FloatArray] = []  # (k, 3): x, y [pt], weight
-        self.figure, self.axes = _paper(paper, self.low, self.high, unit, title)
+        self.axes = _new_axes(paper, bool(unit), title) if given is None else given
+        _dress(self.axes, self.low, self.high, unit, title_lines(title, float(paper[0])), float(paper[1]))
+        if given is not None:
+            given.set_aspect("equal", adjustable="box")  # also after the figure is laid out anew
+
+    @property
+    def figure(self) -> Figure:
+        """The figure of the sheet's own axes."""
+        return cast("Figure", self.axes.figure)
 
     def to_paper(self, points: ArrayLike) -> FloatArray:
         """Return world coordinates (..., 2) as printer's points from the lower left corner."""
@@ -186,8 +196,11 @@ class Sheet:
         """Write a sentence below the right end of the title's line."""
         if not text:
             return
+        if self._is_given:
+            width = float((self.high - self.low)[0]) / self.point
+            text = "\n".join(title_lines(text, width * TITLE_FONT / _NOTE_FONT))
         self.axes.text(
-            1.0, 1.0, text, fontsize=8.0, ha="right", va="top", transform=self.axes.transAxes, color=ink(GREY)
+            1.0, 1.0, text, fontsize=_NOTE_FONT, ha="right", va="top", transform=self.axes.transAxes, color=ink(GREY)
         )
 
     def _next(self) -> float:
@@ -208,16 +221,40 @@ def arc(centre: ArrayLike, radius: float, first: float, last: float) -> FloatArr
     return np.asarray(centre, dtype=float) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | None, title: str) -> tuple[Figure, Axes]:
-    """Return a figure for a drawing of size `paper` [pt], with axes in the mechanism's unit of length."""
+def _paper_for(size: FloatArray) -> tuple[FloatArray, float]:
+    """Return the size of the paper (2,) [pt] for a drawing of `size` (2,) [length], and the scale [pt/length]."""
+    width, height = size
+    side = float(max(width, height)) or 1.0
+    strip = min(max(1.0, width / max(_LONG * height, 1e-9 * side)), _LONGEST_STRIP)
+    scale = min(strip * _WIDEST / max(width, 1e-9 * side), _HIGHEST / max(height, 1e-9 * side))
+    return np.maximum(size * scale, _SMALLEST) + 2.0 * _MARGIN, float(scale)
+
+
+def _paper_of(given: Axes, size: FloatArray) -> tuple[FloatArray, float]:
+    """Return the size of Axes (2,) [pt], and the scale [pt/length] at which a drawing of `size` (2,) fits into them."""
+    box = given.get_window_extent()
+    paper = np.array([box.width, box.height]) * INCH / given.figure.dpi
+    free = paper - 2.0 * min(_MARGIN, _MARGIN_PART * float(paper.min()))
+    side = float(size.max()) or 1.0
+    return paper, float((free / np.maximum(size, 1e-9 * side)).min())
+
+
+def _new_axes(paper: FloatArray, has_names: bool, title: str) -> Axes:
+    """Return axes of size `paper` [pt] in a new figure."""
     from matplotlib.figure import Figure
 
-    left, bottom = (_LEFT, _BOTTOM) if unit else (_EDGE, _EDGE)
+    left, bottom = (_LEFT, _BOTTOM) if has_names else (_EDGE, _EDGE)
     lines = title_lines(title, float(paper[0]))
     width = paper[0] + left + _RIGHT
     height = paper[1] + bottom + _TOP + max(len(lines) - 1, 0) * TITLE_LINE
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
-    axes = made.add_axes((left / width, bottom / height, paper[0] / width, paper[1] / height))
+    return made.add_axes((left / width, bottom / height, paper[0] / width, paper[1] / height))
+
+
+def _dress(
+    axes: Axes, low: FloatArray, high: FloatArray, unit: str | None, title: Sequence[str], height: float
+) -> None:
+    """Give axes of a height [pt] their limits, their title, and scales in the mechanism's unit of length."""
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     if not unit:
@@ -226,15 +263,9 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
         axes.set_yticks([])
         above: Any = {"va": "bottom", "transform": axes.transAxes}
         axes.text(
-            0.0,
-            1.0 + 6.0 / paper[1],
-            "\n".join(lines),
-            fontsize=TITLE_FONT,
-            color=ink(INK),
-            parse_math=False,
-            **above,
+            0.0, 1.0 + 6.0 / height, "\n".join(title), fontsize=TITLE_FONT, color=ink(INK), parse_math=False, **above
         )
-        return made, axes
+        return
     grey = ink(GREY)
     axes.tick_params(labelsize=8.0, length=3.0, width=0.6, color=grey, labelcolor=grey)
     axes.set_xlabel(f"x [{unit}]", fontsize=8.0, color=grey, labelpad=2.0)
@@ -243,8 +274,7 @@ def _paper(paper: FloatArray, low: FloatArray, high: FloatArray, unit: str | Non
         spine.set_visible(side in ("left", "bottom"))
         spine.set_linewidth(0.6)
         spine.set_color(grey)
-    axes.set_title("\n".join(lines), fontsize=TITLE_FONT, loc="left", color=ink(INK), parse_math=False)
-    return made, axes
+    axes.set_title("\n".join(title), fontsize=TITLE_FONT, loc="left", color=ink(INK), parse_math=False)
 
 
 @lru_cache(maxsize=64)

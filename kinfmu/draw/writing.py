@@ -17,6 +17,26 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".svg", ".png")
 DOTS_PER_INCH = 150  # of a PNG
+_NEEDS_MATPLOTLIB = "drawing needs matplotlib: pip install 'kinfmu[figures]'"
+
+
+def check_target(function: str, path: object, ax: object) -> None:
+    """Raise a FigureError unless a call names either a file or matplotlib Axes with two linear scales.
+
+    MissingPackageError without matplotlib.
+    """
+    if (path is None) == (ax is None):
+        raise FigureError(f"{function} needs a path, or Axes of matplotlib as ax=; give one of both")
+    if ax is None:
+        return
+    try:
+        from matplotlib.axes import Axes
+    except ImportError:
+        raise MissingPackageError(f"{function}: {_NEEDS_MATPLOTLIB}") from None
+    if not isinstance(ax, Axes):
+        raise FigureError(f"ax must be Axes of matplotlib, such as plt.subplots()[1], not {type(ax).__name__}")
+    if ax.name != "rectilinear":
+        raise FigureError(f"ax must be Axes with x and y, not with the projection '{ax.name}'")
 
 
 def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
@@ -40,7 +60,7 @@ def figure_style(path: Path) -> Iterator[None]:
     try:
         import matplotlib as mpl
     except ImportError:
-        raise MissingPackageError(f"{path}: drawing needs matplotlib: pip install 'kinfmu[figures]'") from None
+        raise MissingPackageError(f"{path}: {_NEEDS_MATPLOTLIB}") from None
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")  # a frame is drawn instead
         mpl.rcdefaults()

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from kinfmu.draw import plot
-from kinfmu.draw.plots import _gaps, _rows, _sheet, _shown
+from kinfmu.draw.curves import gaps, rows_of
+from kinfmu.draw.plots import _sheet, _shown
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
@@ -54,10 +55,10 @@ def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
 
 def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
     gap = with_gap(run, 100, 120)
-    assert _gaps(gap, gap.t) == [(99.0, 121.0)]
-    assert _gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
-    assert _gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
-    assert _gaps(run, run.t) == []
+    assert gaps(gap, gap.t) == [(99.0, 121.0)]
+    assert gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
+    assert gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
+    assert gaps(run, run.t) == []
     panel = _sheet(gap, coordinates(gap, ["coupler.x"])).axes[0]
     assert len(panel.patches) == 1
     assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
@@ -78,10 +79,10 @@ def test_noise_about_a_constant_is_a_straight_line(run: Run) -> None:
 def test_a_long_run_is_drawn_by_its_extremes() -> None:
     values = np.random.default_rng(5).normal(size=100_000)
     values[40_000:40_500] = np.nan
-    rows = _rows(values)
+    rows = rows_of(values)
     assert len(rows) < 3100
     assert {int(np.nanargmin(values)), int(np.nanargmax(values)), 39_999, 40_000, 40_499, 40_500} <= set(rows.tolist())
-    assert np.array_equal(_rows(values[:6000]), np.arange(6000))
+    assert np.array_equal(rows_of(values[:6000]), np.arange(6000))
 
 
 def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path: Path) -> None:

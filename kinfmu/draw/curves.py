@@ -1,0 +1,90 @@
+"""Curves of a run: columns over its axis in Axes of matplotlib, with gaps where samples have no numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.draw.sheet import ink
+from kinfmu.errors import FigureError, RequestError, suggestion
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import axis_of
+from kinfmu.scene import palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LOST: palette.Colour = (246, 222, 222)
+_BINS = 1500  # of a long run; each shows its least and its greatest value
+
+
+def curves(axes: Axes, run: Run, columns: Sequence[str] = ()) -> Axes:
+    """Draw columns of a run into `axes` and return it; arguments and errors as in `plot` with `ax`."""
+    names = _columns(run, columns)
+    units = {place.name: place.unit for place in run.places()}
+    for name in names[1:]:
+        if units[name] != units[names[0]]:
+            raise FigureError(
+                f"Axes show one unit, but '{names[0]}' is in {units[names[0]]} and '{name}' in {units[name]}; "
+                "name columns of one unit"
+            )
+    if not len(run) or not names:
+        raise FigureError(f"the run has no {'samples' if names else 'coordinates'} to plot")
+    axis = axis_of(run)
+    for name in names:
+        values = np.where(run.good, np.asarray(run[name], dtype=float), np.nan)
+        rows = rows_of(values)
+        is_curve = np.isfinite(values).sum() > 1
+        axes.plot(axis.values[rows], values[rows], marker="" if is_curve else "o", label=name)
+    axes.set_xlabel(axis.label)
+    unit = units[names[0]].replace("2", "\N{SUPERSCRIPT TWO}")
+    axes.set_ylabel(f"{names[0]} [{unit}]" if len(axes.lines) == 1 else f"[{unit}]")
+    if len(axes.lines) > 1:
+        axes.legend()
+    for first, last in gaps(run, axis.values):
+        axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
+    return axes
+
+
+def _columns(run: Run, wanted: Sequence[str]) -> list[str]:
+    """Return the names of the columns that were asked for."""
+    if isinstance(wanted, str):
+        raise RequestError(f"columns: '{wanted}' must be a list of names, such as ['{wanted}']")
+    known = [place.name for place in run.places()]
+    names: dict[str, None] = {}
+    for name in wanted or run.names or run.outputs:
+        found = [column for column in known if fnmatchcase(column, name)]
+        if not found:
+            run[name]  # reports why: unknown, or not kept
+            raise RequestError(f"'{name}' does not move, so there is no curve{suggestion(name, known)}")
+        names |= dict.fromkeys(found)
+    return list(names)
+
+
+def rows_of(values: FloatArray) -> NDArray[np.int64]:
+    """Return samples that give the same picture as all: of long runs the extremes of short intervals, and gaps."""
+    count = len(values)
+    if count <= 4 * _BINS:
+        return np.arange(count)
+    found = [np.array([0, count - 1]), np.flatnonzero(np.diff(np.isfinite(values))) + np.array([[0], [1]])]
+    edges = np.linspace(0, count, _BINS + 1).astype(int)
+    for first, last in pairwise(edges):
+        part = values[first:last]
+        if np.isfinite(part).any():
+            found.append(first + np.array([np.nanargmin(part), np.nanargmax(part)]))
+    return np.unique(np.concatenate([rows.ravel() for rows in found]))
+
+
+def gaps(run: Run, values: FloatArray) -> list[tuple[float, float]]:
+    """Return for each gap the last sample with numbers before it and the first one after it."""
+    turns = np.flatnonzero(np.diff(np.r_[True, run.good, True].astype(int)))  # first of a gap, first after it, ...
+    last = len(run) - 1
+    return [
+        (float(values[max(begin - 1, 0)]), float(values[min(end, last)]))
+        for begin, end in zip(turns[::2], turns[1::2], strict=True)
+    ]
