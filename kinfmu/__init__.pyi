@@ -53,8 +53,10 @@ from kinfmu.mechanism import Parameter as Parameter
 from kinfmu.mechanism import Point as Point
 from kinfmu.mechanism import RunSettings as RunSettings
 from kinfmu.mechanism import Start as Start
+from kinfmu.motion import DesignMeasures as DesignMeasures
 from kinfmu.motion import MeasuredValue as MeasuredValue
 from kinfmu.motion import measure as measure
+from kinfmu.motion import measure_designs as measure_designs
 from kinfmu.run import Run as Run
 from kinfmu.run import Sink as Sink
 from kinfmu.solver.python.status import Status as Status

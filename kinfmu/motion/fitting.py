@@ -127,6 +127,7 @@ def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> I
     count = shape.parameters.shape[-1] + 1
     n = x.shape[-1]
     contacts = np.tile(np.arange(count) * (n - 1) // count, (len(x), 1))
+    is_fitted = np.zeros((len(x), 1), bool)
     for _ in range(_ROUNDS):
         errors, basis = shape.distance(x, y), shape.basis(x, y)
         for _ in range(_EXCHANGES):
@@ -136,7 +137,7 @@ def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> I
             left = errors - (basis @ step[..., None])[..., 0]
             entering = np.argmax(np.abs(left), axis=1)
             worst = np.take_along_axis(left, entering[:, None], 1)[:, 0]
-            grows = np.abs(worst) > level + _EQUAL * size
+            grows = (np.abs(worst) > level + _EQUAL * size) & ~is_fitted[:, 0]
             if not grows.any():
                 break
             signed = np.concatenate([at * signs[..., None], np.ones((*contacts.shape, 1))], axis=-1)
@@ -146,8 +147,9 @@ def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> I
             shares = np.where(d > 0.0, np.abs(weights) / np.where(d > 0.0, d, 1.0), np.inf)
             leaving = np.argmin(shares, axis=1)
             contacts[grows, leaving[grows]] = entering[grows]
-        shape.parameters = shape.parameters + step
-        if np.all(np.abs(step).max(axis=-1) <= _EQUAL * (1.0 + size)):
+        shape.parameters = np.where(is_fitted, shape.parameters, shape.parameters + step)
+        is_fitted |= (np.abs(step).max(axis=-1) <= _EQUAL * (1.0 + size))[:, None]
+        if is_fitted.all():
             break
     return contacts
 

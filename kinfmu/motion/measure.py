@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion
 from kinfmu.readings import Reading
 from kinfmu.run import Run
-from kinfmu.run.axis import axis_of
+from kinfmu.run.axis import HasAxis, axis_of
 from kinfmu.units import unit_of
 
 
@@ -78,10 +79,10 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> dict[s
 
     """
     motion = Motion.of_run(run)
-    return {reading.name: _value(run, motion, reading) for reading in _chosen(motion.mechanism, measures)}
+    return {reading.name: _value(run, motion, reading) for reading in chosen_measures(motion.mechanism, measures)}
 
 
-def _chosen(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> tuple[Reading, ...]:
+def chosen_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> tuple[Reading, ...]:
     """Return the measures of a call, checked and with numbers in place of texts."""
     if measures is None:
         return mechanism.measures
@@ -100,6 +101,7 @@ def _chosen(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> t
 def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
     unit = motion.mechanism.length_unit
     try:
+        motion = motion.going_round(bool(motion.goes_round(reading)))
         found = reading.read(motion.part(reading.begin, reading.end))
     except RequestError as error:
         raise RequestError(f"[measures.{reading.name}]: {error}") from None
@@ -113,14 +115,14 @@ def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
         driver=motion.driver,
         at=at,
         at_unit=unit_of(motion.driver_quantity, unit),
-        reason="" if np.isfinite(value) else _reason(run),
+        reason="" if np.isfinite(value) else reason_without_value(run, run.good),
     )
 
 
-def _reason(run: Run) -> str:
-    """Return why a measure has no value."""
-    missing = np.flatnonzero(~run.good)
+def reason_without_value(samples: HasAxis, good: NDArray[np.bool_]) -> str:
+    """Return why a measure has no value; good: (n,) True for samples with numbers."""
+    missing = np.flatnonzero(~good)
     if not len(missing):
         return "the quantity has no finite value at some samples"
-    first = axis_of(run).place(float(run.t[missing[0]]))
-    return f"{len(missing)} of {len(run)} samples have no numbers, the first at {first}"
+    first = axis_of(samples).place(float(samples.t[missing[0]]))
+    return f"{len(missing)} of {len(good)} samples have no numbers, the first at {first}"

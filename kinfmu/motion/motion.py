@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import RequestError, listed, suggestion
@@ -19,15 +19,16 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.motion.fitting import Circle, Line, deviation
-from kinfmu.motion.track import FEWEST, FloatArray, Track
+from kinfmu.motion.going_round import goes_round
+from kinfmu.motion.needed import needed
+from kinfmu.motion.track import FEWEST, FloatArray, IntArray, Track
+from kinfmu.readings import Reading
 from kinfmu.run import Run
-from kinfmu.run.axis import TIME, axis_of, rates_per
-from kinfmu.solver.python.status import Status
+from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
 from kinfmu.units import CoordinateName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
-_SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
-_SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
+_SAME = 1e-9  # of the way of the driver; values of it closer than this are equal
 Vector = tuple[Taylor, Taylor]
 
 
@@ -41,8 +42,9 @@ class Motion:
         per: What x is: 'time', 'angle' or 'length'.
         tables: Values, rates and accelerations of the outputs, each (..., n, m).
         outputs: Names of the m outputs.
-        fixed: Coordinates that a joint holds at a constant, by name.
+        fixed: Coordinates that a joint holds at a constant, by name; those that differ between designs are (m, 1).
         drive: Value of the driver over x; None if several drivers move.
+        points: Body-fixed coordinates of the points by 'body.point'; those that differ between designs are (m, 1).
         driver: Name of that driver; 'time' if several move.
         margin: (..., n) 1 / condition of the samples; None if unknown.
         is_closed: True if the motion goes round: the last sample is the first, after one period.
@@ -54,9 +56,10 @@ class Motion:
     x: FloatArray
     per: str
     tables: tuple[FloatArray, FloatArray, FloatArray]
-    outputs: Sequence[str]
-    fixed: Mapping[CoordinateName, float]
+    outputs: Sequence[CoordinateName]
+    fixed: Mapping[CoordinateName, Value]
     drive: Track | None
+    points: Mapping[str, tuple[Value, Value]]
     driver: str = TIME
     margin: FloatArray | None = None
     is_closed: bool = False
@@ -77,13 +80,13 @@ class Motion:
             raise RequestError("the run holds no mechanism, so nothing can be measured on it")
         if len(run) < FEWEST:
             raise RequestError(f"the run has {len(run)} samples; measures need {FEWEST} or more")
-        x, per = _argument(run)
+        x, per = argument_of(run)
         order = np.s_[:] if x[-1] > x[0] else np.s_[::-1]
         x = x[order]
         if not np.all(np.diff(x) > 0.0):
             raise RequestError("the samples of the run are not in ascending or descending order")
         tables = tuple(table[order] for table in (run.values, run.rates, run.accelerations))
-        drive, driver, is_closed = None, TIME, _goes_round(run)
+        drive, driver, is_closed = None, TIME, bool(goes_round(run.outputs, tables))
         if len(run.input_names) == 3 or run.axis != TIME:
             column = 0 if run.axis == TIME else run.input_names.index(run.axis)
             driver = run.input_names[column].driver
@@ -99,9 +102,41 @@ class Motion:
             run.outputs,
             run.fixed,
             drive,
+            mechanism.body_points,
             driver,
             run.margin[order],
             is_closed,
+        )
+
+    def goes_round(self, reading: Reading) -> NDArray[np.bool_]:
+        """Return (...) whether what a measure reads goes round, whatever else moves."""
+        names = needed(self.mechanism, [reading]).coordinates
+        columns = [k for k, name in enumerate(self.outputs) if name in names]
+        if not columns:
+            return np.full(self.tables[0].shape[:-2], self.is_closed)
+        return goes_round([self.outputs[k] for k in columns], [table[..., columns] for table in self.tables])
+
+    def going_round(self, is_closed: bool) -> Motion:
+        """Return the motion as one that goes round, or does not."""
+        if is_closed == self.is_closed:
+            return self
+        drive = replace(self.drive, is_closed=is_closed) if self.drive else None
+        return replace(self, is_closed=is_closed, drive=drive, _tracks={})
+
+    def of_designs(self, chosen: IntArray) -> Motion:
+        """Return the motion of some of the designs, of one leading axis."""
+
+        def rows(value: Value) -> Value:
+            return value[chosen] if isinstance(value, np.ndarray) else value
+
+        tables = [table.transpose(0, 2, 1)[chosen].transpose(0, 2, 1) for table in self.tables]
+        return replace(
+            self,
+            tables=(tables[0], tables[1], tables[2]),
+            fixed={name: rows(value) for name, value in self.fixed.items()},
+            points={name: (rows(x), rows(y)) for name, (x, y) in self.points.items()},
+            margin=None,
+            _tracks={},
         )
 
     @property
@@ -120,7 +155,7 @@ class Motion:
         if self.drive is None:
             return x
         found, first, last = self._driven(x), self.drive.value[0], self.drive.value[-1]
-        is_end = self.is_closed & (np.abs(found - last) <= _SAME_POSE * np.abs(last - first))
+        is_end = self.is_closed & (np.abs(found - last) <= _SAME * np.abs(last - first))
         return np.asarray(np.where(is_end, first, found))
 
     def driven_between(self, start: FloatArray, stop: FloatArray) -> FloatArray:
@@ -278,10 +313,10 @@ class Motion:
         """Return the track of a coordinate."""
         if name not in self._tracks:
             if name in self.fixed:
-                constant = np.full(self.x.shape, self.fixed[name])  # type: ignore[index]  # a name is a text
+                constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
                 track = Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
             elif name in self.outputs:
-                k = list(self.outputs).index(name)
+                k = [str(output) for output in self.outputs].index(name)
                 value, rate, acceleration = (table[..., k] for table in self.tables)
                 track = Track(self.x, value, rate, acceleration, self.is_closed)
             else:
@@ -306,7 +341,7 @@ class Motion:
             else BodyFrame.of(*(self._coordinate(f"{body}.{axis}").taylor for axis in ("x", "y", "phi")))
             for body in {*bodies, GROUND_NAME}
         }
-        return Placement(poses, self.mechanism.body_points)
+        return Placement(poses, self.points)
 
     def _as_track(self, value: Value) -> Track:
         """Return a computed quantity as a track of this motion."""
@@ -319,7 +354,7 @@ def _derived(track: Track, order: int) -> Track:
     return (lambda: track, track.derivative, track.second_derivative)[order]()
 
 
-def _argument(run: Run) -> tuple[FloatArray, str]:
+def argument_of(run: HasAxis) -> tuple[FloatArray, str]:
     """Return the arguments of a run's samples and what they are: 'time', or 'angle' or 'length' of a driver."""
     if run.axis == TIME:
         return run.t, "time"
@@ -343,21 +378,3 @@ def _argument_at(drive: Track, value: float) -> float:
         if value == drive.value[k]:
             return float(drive.x[k])
     return float(drive.crossings(np.asarray(value))[1][0])
-
-
-def _goes_round(run: Run) -> bool:
-    """Return True if the last sample of a run is its first, after one period."""
-    if not (run.status <= Status.BRIDGED).all():
-        return False
-    ends = [table[[0, -1]] for table in (run.values, run.rates, run.accelerations)]
-    apart = ends[0][1] - ends[0][0]
-    is_angle = np.array([name.is_angle for name in run.outputs], bool)
-    apart[is_angle] = np.vectorize(lambda angle: math.remainder(angle, math.tau), otypes=[float])(apart[is_angle])
-    size = max(float(np.ptp(run.values[:, ~is_angle], axis=0).max(initial=0.0)), 1e-300)
-    scale = np.where(is_angle, 1.0, size)
-    is_same = [np.abs(apart) <= _SAME_POSE * scale]
-    for end, table in zip(ends[1:], (run.rates, run.accelerations), strict=True):
-        largest = np.abs(table).max(axis=0)
-        of_kind = np.where(is_angle, largest[is_angle].max(initial=0.0), largest[~is_angle].max(initial=0.0))
-        is_same.append(np.abs(end[1] - end[0]) <= _SAME_RATE * of_kind)
-    return bool(np.ptp(run.values, axis=0).any()) and bool(np.all(is_same))

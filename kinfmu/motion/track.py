@@ -163,13 +163,14 @@ class Track:
             rows = [np.concatenate([row, row[..., 1:] + more], -1) for row, more in zip(self.rows, turns, strict=True)]
             whole = Track(np.concatenate([self.x, self.x[1:] + self.span]), rows[0], rows[1], rows[2])
         least = _NEAR * float(np.min(np.diff(self.x)))
-        inside = (whole.x > begin + least) & (whole.x < end - least)
-        x = np.concatenate([[begin], whole.x[inside], [end]])
-        value, rate, acceleration = (
-            np.concatenate([at[..., :1], row[..., inside], at[..., 1:]], axis=-1)
-            for at, row in zip(whole.at(np.array([begin, end])), whole.rows, strict=True)
-        )
-        return Track(x, value, rate, acceleration)
+        first, last = np.searchsorted(whole.x, begin + least, "right"), np.searchsorted(whole.x, end - least, "left")
+        x = np.concatenate([[begin], whole.x[first:last], [end]])
+        rows = []
+        for at, row in zip(whole.at(np.array([begin, end])), whole.rows, strict=True):
+            part = np.empty((*row.shape[:-1], len(x)))  # samples one after another, however the whole is stored
+            part[..., 0], part[..., 1:-1], part[..., -1] = at[..., 0], row[..., first:last], at[..., 1]
+            rows.append(part)
+        return Track(x, rows[0], rows[1], rows[2])
 
     def maximum(self) -> Extreme:
         """Return the largest value of each design and where it occurs; NaN for designs with unknown samples."""
@@ -333,7 +334,7 @@ def _root(c: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     low, high = low.copy(), high.copy()
     c1 = _derived(c)
     is_rising = _polynomial(c, high) > _polynomial(c, low)
-    s = 0.5 * (low + high)
+    s, is_found = 0.5 * (low + high), np.zeros(low.shape, bool)
     for _ in range(_STEPS):
         value = _polynomial(c, s)
         is_below = (value < 0.0) == is_rising
@@ -341,9 +342,11 @@ def _root(c: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         slope = _polynomial(c1, s)
         step = s - value / np.where(slope == 0.0, np.inf, slope)
         new = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-        if np.all(np.abs(new - s) <= _SAME):
-            return new
+        new = np.where(is_found, s, new)  # so that a root does not depend on the others
+        is_found |= np.abs(new - s) <= _SAME
         s = new
+        if is_found.all():
+            break
     return s
 
 

@@ -301,9 +301,7 @@ class Run:
             MissingPackageError: pandas is not installed.
 
         """
-        frame = _optional("pandas").DataFrame({column.name: column.values for column in self.columns()})
-        frame.attrs["units"] = {place.name: place.unit for place in self.places()}
-        return frame
+        return data_frame(self.columns())
 
     def to_polars(self) -> Any:
         """Return the columns as a polars.DataFrame.
@@ -354,6 +352,14 @@ def arrow_table(columns: Iterable[Column]) -> Any:
         arrays.append(pa.array(column.values))
         fields.append(pa.field(column.name, arrays[-1].type, False, {"unit": column.unit}))
     return pa.table(arrays, schema=pa.schema(fields))
+
+
+def data_frame(columns: Iterable[Column]) -> Any:
+    """Return columns as a pandas.DataFrame, with the units by column in `attrs["units"]`."""
+    columns = list(columns)
+    frame = _optional("pandas").DataFrame({column.name: column.values for column in columns})
+    frame.attrs["units"] = {column.name: column.unit for column in columns}
+    return frame
 
 
 def _optional(package: str) -> Any:

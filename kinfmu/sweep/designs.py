@@ -115,17 +115,18 @@ class Batch:
     Args:
         model: The model.
         parameters: Arrays (m,), or numbers and texts that hold for all designs, by name.
+        count: The number m of designs; default: that of the arrays.
 
     Raises:
         RequestError: A name is unknown, or arrays have other lengths.
 
     """
 
-    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> None:
+    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str], count: int | None = None) -> None:
         self.model = model
         self.plan = model.plan
         self.parameters = _arrays(model, parameters)
-        self.count = max((len(array) for array in self.parameters.values()), default=1)
+        self.count = count or max((len(array) for array in self.parameters.values()), default=1)
         self.values = self._rows(self.plan.parameters)
         self.constants = self._rows(self.plan.law_constants)
 

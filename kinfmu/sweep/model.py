@@ -233,8 +233,7 @@ class Model:
         tolerance = read_tolerance("tolerance", tolerance)
         if derivatives not in (0, 1, 2):
             raise RequestError(f"derivatives = {derivatives!r} must be 0, 1 or 2")
-        if not (isinstance(workers, int) and workers > 0):
-            raise RequestError(f"workers = {workers!r} must be a positive whole number")
+        require_workers(workers)
         if inputs and t is not None:
             raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
         batch = Batch(self, parameters)
@@ -244,7 +243,7 @@ class Model:
         else:
             times = np.arange(driven[0].shape[-2], dtype=float)
         driving = Driving(times, driven, {name: np.asarray(value, dtype=float) for name, value in inputs.items()})
-        native = workers if self._is_native(batch.count * len(times)) else 0
+        native = workers if self.is_native(batch.count * len(times)) else 0
         return solve_batch(batch, driving, highest=derivatives, tolerance=tolerance, anew=anew, threads=native)
 
     def sensitivities(
@@ -306,7 +305,7 @@ class Model:
 
         return Library(self.plan)
 
-    def _is_native(self, count: int) -> bool:
+    def is_native(self, count: int) -> bool:
         """Return whether so many samples are solved by the native engine; its library is compiled then."""
         work = count * max(1, len(self.plan.blocks))
         if self.engine == "python" or (self.engine == "auto" and work < WORTH_COMPILING):
@@ -322,7 +321,7 @@ class Model:
     def _engine(self, count: int, setting: Setting, tolerance: float, *, by_law: bool) -> Engine:
         """Return an engine with the parameters set."""
         start = self.mechanism.run.start if by_law and setting.starts_elsewhere else None
-        if self._is_native(count):
+        if self.is_native(count):
             from kinfmu.sweep.native_engine import NativeEngine
 
             library = self._library
@@ -361,6 +360,12 @@ def require_engine(engine: str) -> None:
     """Raise a RequestError for the name of an unknown engine."""
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+
+
+def require_workers(workers: object) -> None:
+    """Raise a RequestError for a number of workers that is no positive whole number."""
+    if not (isinstance(workers, int) and workers > 0):
+        raise RequestError(f"workers = {workers!r} must be a positive whole number")
 
 
 def _from_text(text: str, outputs: Sequence[str], parameters: Sequence[str], engine: str) -> Model:

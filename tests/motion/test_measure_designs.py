@@ -1,0 +1,254 @@
+"""`measure_designs`: equal to `measure` of the run of every design, failures included."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.errors import KinfmuError, RequestError
+from kinfmu.measures import AngleBetween, DistanceBetween
+from kinfmu.mechanism.toml_file import parse
+from kinfmu.readings import (
+    READINGS,
+    Dwell,
+    LowestMargin,
+    Maximum,
+    MechanicalAdvantage,
+    Minimum,
+    PathDistance,
+    PeakAcceleration,
+    PeakSpeed,
+    PressureAngle,
+    Range,
+    Reading,
+    Roundness,
+    Straightness,
+    TimeRatio,
+    TransmissionAngle,
+    VelocityRatio,
+)
+
+TURN = np.linspace(0.0, 2.0 * math.pi, 121)
+CRANK_ROCKER = """
+name = "crank_rocker"
+[units]
+length = "mm"
+[parameters]
+ground_link = "42 mm"
+crank_link = "15 mm"
+coupler_link = "50 mm"
+rocker_link = "45 mm"
+height = "10 mm"
+middle = "coupler_link / 2"
+lean = "15 deg"
+[bodies.ground]
+points = { O = [0, 0], C = ["ground_link", 0] }
+[bodies.crank]
+points = { O = [0, 0], P = ["crank_link", 0] }
+start = { phi = "60 deg" }
+[bodies.coupler]
+points = { P = [0, 0], Q = ["coupler_link", 0], tracer = ["middle * cos(lean)", "sqrt(height * height)"] }
+start = { phi = "40 deg" }
+[bodies.rocker]
+points = { C = [0, 0], Q = ["rocker_link", 0] }
+start = { phi = "100 deg" }
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "coupler.P"] }
+Q = { type = "revolute", between = ["coupler.Q", "rocker.Q"] }
+C = { type = "revolute", between = ["ground.C", "rocker.C"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+speed = "2 rad/s"
+[measures.rest]
+type = "dwell"
+of = "rocker.phi"
+band = "height / coupler_link"
+[measures.part]
+type = "maximum"
+of = "coupler.y"
+begin = "lean"
+end = "lean + 100 deg"
+"""
+BEGIN, END = 1.0, 4.0
+READ: tuple[Reading, ...] = (
+    Minimum("minimum", "rocker.phi"),
+    Maximum("maximum", DistanceBetween(("ground.O", "coupler.tracer"))),
+    Range("range", "rocker.omega", BEGIN, END),
+    Range("relative", AngleBetween("coupler", to="rocker")),
+    PeakSpeed("peak_speed", "coupler.tracer"),
+    PeakAcceleration("peak_acceleration", "rocker.phi"),
+    TimeRatio("time_ratio", "rocker.phi"),
+    Dwell("dwell", "rocker.phi", 0.1, "minimum"),
+    Straightness("straightness", "coupler.tracer", BEGIN, END),
+    Roundness("roundness", "coupler.tracer"),
+    PathDistance("path_distance", "coupler.tracer", ((20.0, 30.0), (25.0, 40.0))),
+    TransmissionAngle("transmission_angle", ("coupler.P", "coupler.Q"), ("rocker.C", "rocker.Q")),
+    PressureAngle("pressure_angle", "crank", "coupler.tracer", "rocker.C"),
+    VelocityRatio("velocity_ratio", "rocker.phi", None, "minimum", BEGIN, END),
+    MechanicalAdvantage("mechanical_advantage", "coupler.phi", "rocker.phi", 2.0, 2.5),
+    LowestMargin("lowest_margin"),
+)
+LENGTHS = ("ground_link", "crank_link", "coupler_link", "rocker_link")
+
+
+def crank_rocker() -> kinfmu.Mechanism:
+    return parse(CRANK_ROCKER)
+
+
+def drawn(count: int, **others: object) -> dict[str, object]:
+    rng = np.random.default_rng(3)
+    lengths = {name: float(crank_rocker().parameters[name].value) for name in LENGTHS}
+    values = {name: value * np.exp(rng.uniform(-0.03, 0.03, count)) for name, value in lengths.items()}
+    return {**values, "height": rng.uniform(5.0, 20.0, count), "lean": rng.uniform(0.0, 0.4, count), **others}
+
+
+def assert_as_measured(
+    found: kinfmu.DesignMeasures, model: kinfmu.Model, measures: object, t: object = None, **inputs: np.ndarray
+) -> None:
+    """Check every design against `measure` of its run."""
+    for k in range(len(found)):
+        values = {name: float(array[k]) for name, array in found.parameters.items()}
+        given = {name: array[k] if np.ndim(array) == 2 else array for name, array in inputs.items()}
+        try:
+            run = model.solve(t, parameters=values, **given)  # type: ignore[arg-type]
+        except KinfmuError as error:
+            reason = str(error)
+        else:
+            reason = ""
+        if reason:
+            assert found.reasons[k] == reason
+            assert np.isnan([column[k] for column in found.values.values()]).all()
+            continue
+        assert found.status[k] == run.status.max()
+        reasons = []
+        for one in measures or [reading.name for reading in model.mechanism.measures]:  # type: ignore[attr-defined]
+            name = one if isinstance(one, str) else one.name
+            try:
+                wanted = kinfmu.measure(run, [one])[name]
+            except KinfmuError as error:
+                reasons.append(str(error))
+                assert np.isnan(found[name][k])
+                continue
+            assert found[name][k] == pytest.approx(wanted.value, rel=1e-12, abs=1e-13, nan_ok=True), name
+            assert found.at[name][k] == pytest.approx(wanted.at, rel=1e-9, abs=2e-7, nan_ok=True), name
+            assert (found.units[name], found.driver, found.at_unit) == (wanted.unit, wanted.driver, wanted.at_unit)
+            reasons += [wanted.reason] if wanted.reason else []
+        assert found.reasons.get(k) == (reasons[0] if reasons else None)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_every_kind_of_measure_equals_measure_of_each_design(engine: str) -> None:
+    assert {reading.type for reading in READ} == {reading.type for reading in READINGS}
+    model = kinfmu.compile(crank_rocker(), engine=engine)
+    found = kinfmu.measure_designs(model, drawn(6), READ, crank_angle=TURN)  # type: ignore[arg-type]
+    assert found.good.all()
+    assert_as_measured(found, model, READ, crank_angle=TURN)
+
+
+def test_measures_of_the_file_may_have_numbers_that_depend_on_the_design() -> None:
+    model = kinfmu.compile(crank_rocker())
+    found = kinfmu.measure_designs(model, drawn(4), crank_angle=TURN)  # type: ignore[arg-type]
+    assert list(found.values) == ["rest", "part"]
+    assert_as_measured(found, model, None, crank_angle=TURN)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_designs_without_numbers_have_the_reasons_of_solve_and_measure(engine: str) -> None:
+    model = kinfmu.compile(crank_rocker(), engine=engine)
+    lengths = {"crank_link": [15.0, np.nan, 38.0, 15.2]}
+    measures = [READ[0], READ[6], Maximum("part", "rocker.phi", 1.0, 1.2)]
+    found = kinfmu.measure_designs(model, lengths, measures, crank_angle=TURN)
+    assert set(found.reasons) == {1, 2}
+    assert "of 121 samples have no numbers, the first at crank = " in found.reasons[2]
+    assert np.isfinite(found["part"][2])
+    assert_as_measured(found, model, measures, crank_angle=TURN)
+
+
+def test_what_one_design_refuses_is_its_reason() -> None:
+    model = kinfmu.compile(crank_rocker())
+    half = np.linspace(0.0, math.pi, 61)
+    found = kinfmu.measure_designs(model, {"crank_link": [14.0, 15.0]}, [READ[6], READ[0]], crank_angle=half)
+    assert found.reasons[0].startswith("[measures.time_ratio]: time_ratio needs a motion that goes round")
+    assert_as_measured(found, model, [READ[6], READ[0]], crank_angle=half)
+
+
+@pytest.mark.parametrize("constants", [{}, {"crank.speed": 3.0}, {"crank.speed": np.array([1.0, 2.0, 3.0])}])
+def test_laws_over_time(constants: dict[str, object]) -> None:
+    model = kinfmu.compile(crank_rocker())
+    t = np.linspace(0.0, math.pi, 121)
+    measures = [READ[0], READ[4], READ[7], READ[13]]
+    found = kinfmu.measure_designs(model, drawn(3, **constants), measures, t)  # type: ignore[arg-type]
+    assert found.units["peak_speed"] == "mm/s"
+    assert_as_measured(found, model, measures, t)
+
+
+def test_every_design_may_have_driver_values_of_its_own() -> None:
+    model = kinfmu.compile(crank_rocker())
+    angles = TURN + np.array([[0.0], [0.5], [1.0]])
+    measures = [READ[0], READ[4], READ[7], READ[13]]
+    found = kinfmu.measure_designs(model, drawn(3), measures, crank_angle=angles)  # type: ignore[arg-type]
+    assert_as_measured(found, model, measures, crank_angle=angles)
+
+
+def test_descending_driver_values_and_fixed_coordinates_that_depend_on_a_parameter() -> None:
+    text = CRANK_ROCKER.replace('C = ["ground_link", 0] }', 'C = ["ground_link", 0], D = ["height", "middle"] }')
+    body = "[bodies.post]\npoints = { D = [0, 0] }\nstart = { x = 10, y = 25 }\n"
+    weld = 'D = { type = "fixed", between = ["ground.D", "post.D"] }\n'
+    text = text.replace("[joints]\n", f"{body}[joints]\n{weld}")
+    model = kinfmu.compile(parse(text))
+    measures = [Range("r", DistanceBetween(("post.D", "coupler.tracer"))), Maximum("x", "post.x"), READ[0]]
+    found = kinfmu.measure_designs(model, drawn(3), measures, crank_angle=TURN[::-1])  # type: ignore[arg-type]
+    np.testing.assert_allclose(found["x"], found["height"], rtol=1e-15)
+    assert_as_measured(found, model, measures, crank_angle=TURN[::-1])
+
+
+def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = kinfmu.compile(crank_rocker(), engine="native")
+    values = drawn(50)
+    alone = kinfmu.measure_designs(model, values, READ[:-1], crank_angle=TURN)  # type: ignore[arg-type]
+    for size, workers in ((121 * 7, 1), (121, 3)):
+        monkeypatch.setattr("kinfmu.motion.batch_reading.SAMPLES_AT_ONCE", size)
+        other = kinfmu.measure_designs(model, values, READ[:-1], crank_angle=TURN, workers=workers)  # type: ignore[arg-type]
+        for name in alone.values:
+            np.testing.assert_array_equal(other[name], alone[name], name)
+            np.testing.assert_array_equal(other.at[name], alone.at[name], name)
+
+
+def test_the_result_is_a_table() -> None:
+    model = kinfmu.compile(crank_rocker())
+    found = kinfmu.measure_designs(model, {"crank_link": [14.0, 15.0], "height": 12.0}, [READ[2]], crank_angle=TURN)
+    assert repr(found) == "<2 designs, 2 of them with all measures; range>"
+    columns = {column.name: column for column in found.columns()}
+    assert list(columns) == ["crank_link", "height", "range", "range.at", "range.at2", "solver.status"]
+    assert [column.unit for column in columns.values()] == ["mm", "mm", "rad/rad", "rad", "rad", "1"]
+    np.testing.assert_array_equal(columns["height"].values, [12.0, 12.0])
+    frame = found.to_pandas()
+    assert frame.attrs["units"]["range"] == "rad/rad"
+    assert found.to_arrow().column_names == list(columns)
+    with pytest.raises(KinfmuError, match="the designs have no column 'rnge'; did you mean 'range'"):
+        found["rnge"]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "measures", "arguments", "message"),
+    [
+        ({"crank": [1.0]}, [READ[0]], {"crank_angle": TURN}, "there is no parameter 'crank'"),
+        ({"height": [1.0]}, ["swing"], {"crank_angle": TURN}, "there is no measure 'swing'; measures: rest, part"),
+        ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0]}, "there are 2 samples; measures need 3 or more"),
+        ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0, 1.0]}, "measures need samples over time or over one"),
+        ({"height": [1.0]}, [READ[0]], {"t": [0.0, 1.0, 2.0], "crank_angle": TURN}, "give times or inputs, not both"),
+        ({"height": [1.0]}, [READ[0]], {"crank_angle": TURN, "workers": 0}, "workers = 0 must be a positive whole"),
+    ],
+)
+def test_a_wrong_request_is_refused_in_one_line(
+    parameters: dict[str, object], measures: object, arguments: dict[str, object], message: str
+) -> None:
+    with pytest.raises(RequestError) as error:
+        kinfmu.measure_designs(kinfmu.compile(crank_rocker()), parameters, measures, **arguments)  # type: ignore[arg-type]
+    assert str(error.value).startswith(message)
