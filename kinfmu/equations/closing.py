@@ -41,9 +41,8 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
 
     """
     part = Part(part) if isinstance(part, System) else part
-    best, residual = _straight(part, q, u)
+    best, residual, jacobian = _straight(part, q, u)
     damping, too_far, slow = 1e-3, False, 0
-    jacobian = None
     for _ in range(_ITERATIONS):
         norm = float(np.linalg.norm(residual))
         if norm == 0.0 or slow == _SLOW_STEPS:
@@ -74,15 +73,16 @@ def close(part: System | Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray
     return best, float(np.abs(residual).max(initial=0.0))
 
 
-def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return pose and residual after one whole Gauss-Newton step if that closes linear rows, else those at q."""
+def _straight(part: Part, q: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return pose, residual and, if known, Jacobian: after a whole Gauss-Newton step if it closes the rows, or at q."""
     residual = part.residual(q, u)
     if np.abs(residual).max(initial=0.0) == 0.0:
-        return q.copy(), residual
-    there = q + part.column_scales * np.linalg.lstsq(part.jacobian(q), -residual, rcond=_RANK)[0]
+        return q.copy(), residual, None
+    jacobian = part.jacobian(q)
+    there = q + part.column_scales * np.linalg.lstsq(jacobian, -residual, rcond=_RANK)[0]
     left = part.residual(there, u)
-    linear = np.abs(left).max(initial=0.0) <= 1e-3 * CLOSED
-    return (there, left) if linear else (q.copy(), residual)
+    is_linear = np.abs(left).max(initial=0.0) <= 1e-3 * CLOSED
+    return (there, left, None) if is_linear else (q.copy(), residual, jacobian)
 
 
 def motion_samples(part: Part, q: FloatArray, count: int, step: float = 0.2) -> list[FloatArray]:

@@ -31,18 +31,15 @@ class Part:
         self.column_scales: FloatArray = system.column_scales[self.columns]
         self._at = np.zeros(n) if at is None else at.copy()
         row_place, column_place = _places(self.rows, len(system.rows)), _places(self.columns, n)
-        self._members = []  # (member, its rows wanted and their places, its columns wanted and their places)
+        self._members = []  # (member, its rows wanted and their places, its entries of Phi_q wanted and their places)
         for number in sorted({system.member_of[row] for row in self.rows}):
             member = system.members[number]
             wanted_rows = [k for k, row in enumerate(member.rows) if row_place[row] >= 0]
             wanted_columns = [k for k, column in enumerate(member.columns) if column_place[column] >= 0]
-            self._members.append(
-                (
-                    member,
-                    (wanted_rows, row_place[[member.rows[k] for k in wanted_rows]]),
-                    (wanted_columns, column_place[[member.columns[k] for k in wanted_columns]]),
-                )
-            )
+            row_places = row_place[[member.rows[k] for k in wanted_rows]]
+            column_places = column_place[[member.columns[k] for k in wanted_columns]]
+            entries = np.ix_(wanted_rows, wanted_columns), np.ix_(row_places, column_places)
+            self._members.append((member, (wanted_rows, row_places), entries))
 
     def whole(self, q: FloatArray) -> FloatArray:
         """Return all coordinates of the system, (n,)."""
@@ -61,8 +58,8 @@ class Part:
     def jacobian(self, q: FloatArray) -> FloatArray:
         """Return Phi_q, rows relative to the size and columns in sizes and radians: pure numbers of order one."""
         at, matrix = self.whole(q), np.zeros((len(self.rows), len(self.columns)))
-        for member, (rows, row_places), (columns, column_places) in self._members:
-            matrix[np.ix_(row_places, column_places)] = self.system.gradients(member, at)[np.ix_(rows, columns)]
+        for member, _, (entries, places) in self._members:
+            matrix[places] = self.system.gradients(member, at)[entries]
         return matrix / self.row_scales[:, None] * self.column_scales
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.drivers import Driver
+from kinfmu.equations.dual import Dual
 from kinfmu.equations.taylor import Taylor
 from kinfmu.joints import Joint
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement
@@ -118,10 +119,11 @@ class System:
 
     def gradients(self, member: Member, q: FloatArray) -> FloatArray:
         """Return Phi_q of one joint or driver, (its rows, its columns); q: (n,) all coordinates."""
-        unit = np.eye(len(member.columns))
-        along = [Taylor(value, unit[k]) for k, value in enumerate(q[list(member.columns)].tolist())]
-        lines = [np.broadcast_to(_derivative(phi, 1), len(along)) for phi in self._alone(member, along, 0.0)]
-        return np.array(lines).reshape(len(member.rows), len(along))
+        along = list(map(Dual, q[list(member.columns)].tolist(), np.eye(len(member.columns))))
+        gradients = np.zeros((len(member.rows), len(along)))
+        for row, phi in enumerate(self._alone(member, along, 0.0)):
+            gradients[row] = phi.g if isinstance(phi, Dual) else 0.0
+        return gradients
 
     def _alone(self, member: Member, coordinates: Sequence[Any], target: Any) -> Sequence[Any]:
         """Return the rows of one joint or driver, in the arithmetic of its bodies' coordinates."""

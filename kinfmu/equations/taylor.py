@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from kinfmu.equations.dual import NO_LENGTH
 from kinfmu.measures.arithmetic import atan2_like, cos, curve, floor, sin, sqrt
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
 
-_NOTHING = 1e-100  # in place of a length of 0 that a derivative divides by: a point at rest then stays at rest
 Derivative = Any  # float, or (n,) for n lines at once
 
 
@@ -21,8 +21,8 @@ class Taylor:
 
         (f g)'' = f'' g + 2 f' g' + f g'',   h(f)'' = h''(f) f'^2 + h'(f) f''
 
-    The joints' own formulas run on these numbers: with unit vectors as f' they give the Jacobian, with the velocities
-    they give nu and gamma. No formula is differentiated by hand, none by finite differences. `f` may be an array too:
+    The joints' own formulas run on these numbers: with the velocities as f' they give nu and gamma. No formula is
+    differentiated by hand, none by finite differences. `f` may be an array too:
     the quantities of a motion at all its samples.
     """
 
@@ -92,7 +92,7 @@ def _(x: Taylor) -> Taylor:
 @sqrt.register
 def _(x: Taylor) -> Taylor:
     root = _plain(np.sqrt(x.f))
-    slope = 0.5 / (np.where(root == 0.0, _NOTHING, root) if isinstance(root, np.ndarray) else root or _NOTHING)
+    slope = 0.5 / (np.where(root == 0.0, NO_LENGTH, root) if isinstance(root, np.ndarray) else root or NO_LENGTH)
     return _chain(x, root, slope, -2.0 * slope * slope * slope)
 
 
@@ -110,7 +110,7 @@ def _(x: Taylor, data: CurveData, order: int = 0) -> Taylor:
 def _(like: Taylor, y: Taylor | float, x: Taylor | float) -> Taylor:  # noqa: ARG001
     """w = (x y' - y x') / r^2 and w' = (x y'' - y x'' - 2 w (x x' + y y')) / r^2."""
     y, x = _lifted(y), _lifted(x)
-    squared = x.f * x.f + y.f * y.f or _NOTHING
+    squared = x.f * x.f + y.f * y.f or NO_LENGTH
     d1 = (x.f * y.d1 - y.f * x.d1) / squared
     d2 = (x.f * y.d2 - y.f * x.d2 - 2.0 * d1 * (x.f * x.d1 + y.f * y.d1)) / squared
     return Taylor(float(np.arctan2(y.f, x.f)), d1, d2)
