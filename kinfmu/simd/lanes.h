@@ -10,15 +10,7 @@
 
 #include "kinfmu.h"
 #include "lane_sizes.h"
-#include "sincos.h"
-
-#if defined(__clang__)
-#define KF_SIDE_BY_SIDE _Pragma("clang loop vectorize(enable)")
-#elif defined(__GNUC__)
-#define KF_SIDE_BY_SIDE _Pragma("GCC ivdep")
-#else
-#define KF_SIDE_BY_SIDE
-#endif
+#include "vectors.h"
 
 #define KF_LANES (KF_COORDINATES <= 64 ? 64 : 32) /* as many as the first caches hold */
 #define KF_VECTOR 8 /* lanes that are predicted at once, and may be past the last one */
@@ -56,20 +48,6 @@ void kf_lanes_motion(const kf_model *model, kf_lanes *lanes, const bool *held);
 #else
 #define KF_FMA(a, b, c) ((a) * (b) + (c))
 #endif
-
-static inline double kf_sin_lane(double x)
-{
-    double sine, cosine;
-    kf_sincos_lane(x, &sine, &cosine);
-    return sine;
-}
-
-static inline double kf_cos_lane(double x)
-{
-    double sine, cosine;
-    kf_sincos_lane(x, &sine, &cosine);
-    return cosine;
-}
 
 /* Sine and cosine of an angle that changes by a small step, below 2e-3. */
 static inline void kf_rotate(double step, double *sine, double *cosine)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.codegen.c.sensitivity import is_printable, load_native_sensitivity
 from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.sensitivity import law_symbol, scale_of, sensitivity_steps
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
+from kinfmu.simd.sensitivity import empty_results, is_printable, load_native_sensitivity
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.designs import Solvable
@@ -26,7 +26,7 @@ OPEN = 1e-7  # derivative of a row relative to the size, for a change by the siz
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 _STAGES_KEPT = 16
 
-Native = Callable[[Sequence[FloatArray], FloatArray], None]  # fills results (rows, n) from arrays (n,) or (1,)
+Native = Callable[[Sequence[FloatArray], FloatArray], bool]  # fills results (rows, n) from arrays (n,) or (1,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,13 +190,13 @@ def _evaluated(
     numbers = [given[name] for name in stage.given]
     if not is_whole:
         numbers = [number[good] if isinstance(number, np.ndarray) else number for number in numbers]
-    results = _results(stage, native, numbers, (int(ends[-1]), n))
+    results, is_finite = _results(stage, native, numbers, (int(ends[-1]), n))
     tables = [
         np.moveaxis(results[a:b].reshape(*shape, n), -1, 0) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)
     ]
     *tables, gaps = tables
     refused = _refused(plan, parameters, gap_names, gaps, run.status[good])
-    if not np.isfinite(results.sum()):
+    if not is_finite:
         results[~np.isfinite(results)] = np.nan
     for name in refused:
         for table in tables[2:]:
@@ -212,12 +212,18 @@ def _evaluated(
 
 def _results(
     stage: SensitivityStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
-) -> FloatArray:
-    """Return all results of a stage, (rows, n); not finite where a block is singular. numbers: arrays (n,), or one."""
-    results, n = np.zeros(shape), shape[1]
+) -> tuple[FloatArray, bool]:
+    """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
+
+    numbers: arrays (n,), or one number each.
+    """
+    n = shape[1]
+    results = empty_results(*shape)
+    results[list(set(range(shape[0])) - set(stage.places))] = 0.0
     if native is not None:
-        native([number if isinstance(number, np.ndarray) else np.array([number]) for number in numbers], results)
-    elif n <= stage.few:
+        arrays = [number if isinstance(number, np.ndarray) else np.array([number]) for number in numbers]
+        return results, native(arrays, results)
+    if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []
         for given in zip(*columns, strict=True):
@@ -233,7 +239,7 @@ def _results(
                 own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
                 for place, result in zip(stage.places, stage.of_samples(own), strict=True):
                     results[place, part] = result
-    return results
+    return results, bool(np.isfinite(results).all())
 
 
 def _refused(

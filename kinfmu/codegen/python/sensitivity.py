@@ -81,14 +81,16 @@ def stage_lines(
     given: Sequence[str],
     curves: Mapping[CurveData, str],
     solve: Callable[[Entries, Entries, Sequence[str]], list[str]],
+    functions: Mapping[str, str] | None = None,
 ) -> tuple[list[str], list[str]]:
     """Return the statements of a stage, in Python or in C without their ends, and expressions of its results.
 
-    solve: gives statements for columns of J, columns b and the names of the solutions.
+    solve: gives statements for rows of J, columns b and the names of the solutions. functions: names of functions called
+    in place of sin and cos.
     """
     roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
     made = [name for step in steps.steps for name in _names(step)]
-    writer = Writer(Names((*given, *made), curves), (), _used_again(reachable(roots), roots))
+    writer = Writer(Names((*given, *made), curves, functions), (), _used_again(reachable(roots), roots))
     lines = []
     for step in steps.steps:
         lines += writer.statements(_nodes(step))

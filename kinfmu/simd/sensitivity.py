@@ -1,0 +1,199 @@
+"""Sensitivity stage in C: the statements of `kinfmu.codegen.python.sensitivity`, compiled, for samples side by side."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinfmu.codegen.c import compiler
+from kinfmu.codegen.c.text import array
+from kinfmu.codegen.python.sensitivity import SensitivityStage, stage_lines
+from kinfmu.codegen.writer import identifier
+from kinfmu.equations.graph import reachable
+from kinfmu.errors import KinfmuError
+from kinfmu.plan.sensitivity import LinearSolve
+
+FloatArray = NDArray[np.float64]
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # loops over samples need them
+HEADERS = ("stage.h", "stream.h", "vectors.h")
+FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
+LINE = 8  # numbers in a line of the caches
+LARGE = 1 << 20  # numbers; larger tables are written past the caches
+_UNEVEN = 512  # numbers; rows whose pitch is a multiple of it would share few places of the caches
+
+
+class _Stage(ctypes.Structure):
+    """kf_stage of stage.h."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64),
+        ("given", ctypes.c_void_p),
+        ("step", ctypes.c_void_p),
+        ("results", ctypes.c_void_p),
+        ("pitch", ctypes.c_int64),
+        ("is_large", ctypes.c_bool),
+    )
+
+
+class _Solve(NamedTuple):
+    """A linear solve between two loops: expressions of J, row after row, and of -b, column after column."""
+
+    size: int
+    columns: int
+    jacobian: list[str]
+    right: list[str]
+    names: Sequence[str]
+
+
+def is_printable(stage: SensitivityStage) -> bool:
+    """Return True for a stage without curves and least squares, which stay in Python."""
+    steps = stage.steps
+    solves = [step for step in steps.steps if isinstance(step, LinearSolve)]
+    if any(len(step.jacobian) > len(step.jacobian[0]) for step in solves):
+        return False
+    roots = [step.node for step in steps.steps if not isinstance(step, LinearSolve)] + steps.results
+    roots += [node for step in solves for row in (*step.jacobian, *step.columns) for node in row]
+    return all(node.op != "curve" for node in reachable(roots))
+
+
+def sensitivity_source(stage: SensitivityStage) -> str:
+    """Return the C source of a stage: loops over the samples of a block, with linear solves between them."""
+    solves: list[_Solve] = []
+
+    def solve(rows: Sequence[Sequence[Any]], columns: Sequence[Sequence[Any]], names: Sequence[str]) -> list[str]:
+        entries = [entry for row in rows for entry in row]
+        right = [f"-({entry})" for column in columns for entry in column]
+        solves.append(_Solve(len(rows), len(columns), entries, right, names))
+        return [_BREAK]
+
+    lines, results = stage_lines(stage.steps, stage.given, {}, solve, FUNCTIONS)
+    loops: list[list[str]] = [[]]
+    for line in lines:
+        if line == _BREAK:
+            loops.append([])
+        else:
+            loops[-1].append(line)
+    places = {identifier(name): k for k, name in enumerate(stage.given)}
+    jacobian = _places_of_values(places, loops, solves, results)
+    body: list[str] = []
+    for k, loop in enumerate(loops):
+        stores = []
+        if k < len(solves):
+            one = solves[k]
+            stores = [f"x[{jacobian + n}][i] = {entry}" for n, entry in enumerate(one.jacobian)]
+            stores += [f"x[{places[name]}][i] = {entry}" for name, entry in zip(one.names, one.right, strict=True)]
+        else:
+            stores = [f"results[{n}][i] = {result}" for n, result in enumerate(results)]
+        body += _loop(loop, stores, places)
+        if k < len(solves):
+            body.append(f"    kf_solutions({one.size}, {one.columns}, x + {jacobian}, x + {places[one.names[0]]});")
+    values = jacobian + max((len(one.jacobian) for one in solves), default=0)
+    return "\n".join(
+        [
+            f"#define KF_GIVEN {len(stage.given)}",
+            f"#define KF_VALUES {values}",
+            f"#define KF_RESULTS {len(results)}",
+            '#include "stage.h"',
+            "",
+            *array("static int places", stage.places),
+            "",
+            "static void fill(kf_numbers *x, kf_numbers *results)",
+            "{",
+            "    int i;",
+            *body,
+            "}",
+            "",
+            "int kf_sensitivities(const kf_stage *stage)",
+            "{",
+            "    return kf_fill(stage, places, fill);",
+            "}",
+            "",
+        ]
+    )
+
+
+_BREAK = "between two loops"
+
+
+def _places_of_values(
+    places: dict[str, int], loops: Sequence[Sequence[str]], solves: Sequence[_Solve], results: Sequence[str]
+) -> int:
+    """Add places for the solutions and for values that later loops read; return the first place after them."""
+    last: dict[str, int] = {}
+    for k, loop in enumerate(loops):
+        own = results if k == len(solves) else (*solves[k].jacobian, *solves[k].right)
+        last |= dict.fromkeys(_words([*loop, *own]), k)
+    for k, loop in enumerate(loops):
+        for name in (_assigned(line) for line in loop):
+            if last.get(name, k) > k:
+                places[name] = len(places)
+        if k < len(solves):
+            for name in solves[k].names:
+                places[name] = len(places)
+    return len(places)
+
+
+def _loop(lines: Sequence[str], stores: Sequence[str], places: dict[str, int]) -> Iterator[str]:
+    """Yield a loop over the samples of a block: it reads and writes values that have places."""
+    own = [_assigned(line) for line in lines]
+    read = [name for name in _words([*lines, *stores]) if name in places and name not in own]
+    kept = [f"x[{places[name]}][i] = {name}" for name in own if name in places]
+    yield "    KF_EACH (i) {"
+    yield from (f"        const double {name} = x[{places[name]}][i];" for name in read)
+    yield from (f"        const double {line};" for line in lines)
+    yield from (f"        {line};" for line in (*kept, *stores))
+    yield "    }"
+
+
+def _assigned(line: str) -> str:
+    return line.partition(" = ")[0]
+
+
+def _words(lines: Sequence[str]) -> list[str]:
+    return list(dict.fromkeys(re.findall(r"\b[A-Za-z_]\w*", "\n".join(lines))))
+
+
+def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[FloatArray], FloatArray], bool]:
+    """Return the compiled stage.
+
+    It fills the rows of `empty_results` that are not 0, from arrays (n,) or (1,), and returns whether all are finite.
+
+    Raises:
+        CompilerError: There is no compiler, or it fails.
+
+    """
+    texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
+    files = {"sensitivities.c": sensitivity_source(stage)} | texts | compiler.sources(("sincos.h",))
+    library = compiler.load(files, FLAGS)
+
+    def fill(given: Sequence[FloatArray], results: FloatArray) -> bool:
+        arrays = [np.ascontiguousarray(array) for array in given]
+        places = [array.__array_interface__["data"][0] for array in (*arrays, results)]
+        starts = np.array(places, dtype=np.uintp)
+        steps = np.array([len(array) > 1 for array in arrays], dtype=np.int64)
+        n = results.shape[1]
+        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, places[-1], results.strides[0] // 8, results.size > LARGE)
+        answer = library.kf_sensitivities(ctypes.byref(job))
+        if answer < 0:
+            raise KinfmuError(f"no memory is left for the sensitivities of {n} samples")
+        return answer == 1
+
+    return fill
+
+
+def empty_results(rows: int, n: int) -> FloatArray:
+    """Return an array (rows, n) without values, whose rows begin at lines of the caches."""
+    pitch = -(-n // LINE) * LINE
+    pitch += LINE if pitch % _UNEVEN == 0 else 0
+    whole = np.empty(rows * pitch + LINE)
+    first = -whole.ctypes.data // whole.itemsize % LINE
+    return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
+
+
+__all__ = ["empty_results", "is_printable", "load_native_sensitivity", "sensitivity_source"]
