@@ -106,6 +106,9 @@ class Solvable(Protocol):
     ) -> Run:
         """Return the run of one design, assembled anew if continuation does not reach it."""
 
+    def is_native(self, count: int) -> bool:
+        """Return whether so many samples are solved by the native engine; its library is compiled then."""
+
     def load_library(self) -> Library: ...
 
 

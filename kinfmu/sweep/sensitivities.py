@@ -81,6 +81,12 @@ class SensitivityModel:
     def __init__(self, model: Solvable, poses: Solvable) -> None:
         self._model = model
         self._poses = poses
+        unknowns = set(model.plan.unknowns)
+        self._unknowns = [
+            (k, name, name.derivative(1)) for k, name in enumerate(poses.plan.outputs) if name in unknowns
+        ]
+        self._symbols = [parameter_symbol(parameter.name) for parameter in model.plan.parameters]
+        self._law_symbols = [law_symbol(constant.name) for constant in model.plan.law_constants]
         self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
         self._native = lru_cache(maxsize=_STAGES_KEPT)(_native_stage)
 
@@ -103,17 +109,13 @@ class SensitivityModel:
         run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs)
         given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
         given["time"] = run.t
-        for name, values, rates in zip(self._poses.plan.outputs, run.values.T, run.rates.T, strict=True):
-            if name in plan.unknowns:
-                given |= {name: values, name.derivative(1): rates}
-        written = [parameter.value for parameter in plan.parameters]
-        for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
-            given[parameter_symbol(parameter.name)] = value
-        given |= dict(
-            zip((law_symbol(constant.name) for constant in plan.law_constants), setting.constants, strict=True)
-        )
+        for k, name, rate in self._unknowns:
+            given[name] = run.values[:, k]
+            given[rate] = run.rates[:, k]
+        given |= zip(self._symbols, setting.values or self._model.arguments.written, strict=True)
+        given |= zip(self._law_symbols, setting.constants, strict=True)
         stage, gap_names = self._stage(names, chosen, by_law, frozenset(parameters or ()))
-        native = self._native(stage) if run.info["engine"] == "native" else None
+        native = self._native(stage) if self._poses.is_native(len(run.t)) else None
         return _evaluated(plan, stage, native, gap_names, names, chosen, run, given)
 
     def _chosen(self, wrt: Sequence[str] | None, *, by_law: bool) -> tuple[str, ...]:
@@ -219,7 +221,7 @@ def _results(
     """
     n = shape[1]
     results = empty_results(*shape)
-    results[list(set(range(shape[0])) - set(stage.places))] = 0.0
+    results[stage.zeros] = 0.0
     if native is not None:
         arrays = [number if isinstance(number, np.ndarray) else np.array([number]) for number in numbers]
         return results, native(arrays, results)
@@ -246,12 +248,13 @@ def _refused(
     plan: SolvePlan, parameters: Sequence[str], rows: Sequence[str], gaps: FloatArray, status: IntArray
 ) -> dict[str, str]:
     """Return the parameters whose change would open a row, with the reason; gaps: (n, parameters, rows)."""
+    if not rows:
+        return {}
     if (status == Status.OK).any():
         gaps = gaps[status == Status.OK]
-    found = {}
-    for k, name in enumerate(parameters):
-        largest = np.abs(gaps[:, k]).max(axis=0, initial=0.0) * scale_of(plan, name)
-        if largest.max(initial=0.0) > OPEN:
-            row = rows[int(largest.argmax())]
-            found[name] = f"'{name}' cannot change by itself: redundant row {row} would not close"
-    return found
+    largest = np.abs(gaps).max(axis=0, initial=0.0) * [[scale_of(plan, name)] for name in parameters]
+    return {
+        name: f"'{name}' cannot change by itself: redundant row {rows[int(of.argmax())]} would not close"
+        for name, of in zip(parameters, largest, strict=True)
+        if of.max() > OPEN
+    }

@@ -49,6 +49,11 @@ class SensitivityStage:
     few: int
 
     @cached_property
+    def zeros(self) -> list[int]:
+        """Places of the results that are 0."""
+        return sorted(set(range(len(self.steps.results))) - set(self.places))
+
+    @cached_property
     def places(self) -> tuple[int, ...]:
         """Places of the returned values in the row of all results, where the others are 0."""
         return tuple(k for k, node in enumerate(self.steps.results) if node.constant != 0.0)
