@@ -178,8 +178,9 @@ def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[Float
         starts = np.array(places, dtype=np.uintp)
         steps = np.array([len(array) > 1 for array in arrays], dtype=np.int64)
         n = results.shape[1]
-        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, places[-1], results.strides[0] // 8, results.size > LARGE)
-        answer = library.kf_sensitivities(ctypes.byref(job))
+        pitch = results.strides[0] // results.itemsize
+        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, places[-1], pitch, results.size > LARGE)
+        answer: int = library.kf_sensitivities(ctypes.byref(job))
         if answer < 0:
             raise KinfmuError(f"no memory is left for the sensitivities of {n} samples")
         return answer == 1

@@ -90,8 +90,8 @@ def stage_lines(
 ) -> tuple[list[str], list[str]]:
     """Return the statements of a stage, in Python or in C without their ends, and expressions of its results.
 
-    solve: gives statements for rows of J, columns b and the names of the solutions. functions: names of functions called
-    in place of sin and cos.
+    solve: gives statements for rows of J, columns b and the names of the solutions.
+    functions: names of functions called in place of sin and cos.
     """
     roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
     made = [name for step in steps.steps for name in _names(step)]
