@@ -3,6 +3,7 @@
 from kinfmu import draw as draw
 from kinfmu import log as log
 from kinfmu import readings as readings
+from kinfmu import synthesis as synthesis
 from kinfmu.analysis import Report as Report
 from kinfmu.analysis import check as check
 from kinfmu.drivers import AngleDriver as AngleDriver
@@ -65,6 +66,9 @@ from kinfmu.sweep import Model as Model
 from kinfmu.sweep import Sensitivities as Sensitivities
 from kinfmu.sweep import compile as compile  # noqa: A004  as re.compile
 from kinfmu.sweep import solve as solve
+from kinfmu.synthesis import FitProblem as FitProblem
+from kinfmu.synthesis import FitResult as FitResult
+from kinfmu.synthesis import fit as fit
 
 VERSION: str
 __version__: str

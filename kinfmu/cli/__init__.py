@@ -1,4 +1,4 @@
-"""The command line: kinfmu list | new | schema | check | solve | build | simulate | review | export | recover | bench.
+"""The command line: kinfmu list, new, schema, check, solve, fit, build, simulate, review, export, recover, bench.
 
 One command per file; importing a file adds its command to the group `main`.
 """
@@ -8,6 +8,7 @@ from kinfmu.cli import (  # noqa: F401  for the commands that they add
     build,
     check,
     export,
+    fit,
     listing,
     new,
     recover,

@@ -64,15 +64,20 @@ _TABLES = (
 def read(path: str | Path) -> Mechanism:
     """Return the mechanism of a TOML file; a MechanismError states the file, the table and the key."""
     path = Path(path)
+    return parse(text_in(path, "a mechanism file"), str(path), path.parent)
+
+
+def text_in(path: Path, what: str) -> str:
+    """Return the text of a file, or raise a MechanismError; what: 'a mechanism file'."""
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)  # a device or a pipe has no size to ask for
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         raise MechanismError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     if len(content) > LARGEST_FILE:
-        raise MechanismError(f"{path}: too large for a mechanism file (largest: {LARGEST_FILE} bytes)")
+        raise MechanismError(f"{path}: too large for {what} (largest: {LARGEST_FILE} bytes)")
     try:
-        return parse(content.decode("utf-8-sig"), str(path), path.parent)
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MechanismError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
 
@@ -91,22 +96,27 @@ def parse(text: str, where: str = "mechanism", folder: str | Path | None = None)
     """
     if len(text) > LARGEST_FILE:
         raise MechanismError(f"{where}: too large for a mechanism (largest: {LARGEST_FILE} characters)")
+    document = document_of(text, where)
+    try:
+        return _mechanism(document, None if folder is None else Path(folder))
+    except MechanismError as error:
+        raise type(error)(f"{where}: {error}", **error.data) from None
+
+
+def document_of(text: str, where: str) -> dict[str, Any]:
+    """Return the tables of TOML text; a MechanismError states the line."""
     deep = _deep_key(text)
     if deep is not None:
         line = text.count("\n", 0, deep) + 1
         raise MechanismError(f"{where}: not valid: a key of more than {DEEPEST_KEY} parts (at line {line})")
     try:
-        document = tomllib.loads(text.replace("\r\n", "\n"))
+        return tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
         raise MechanismError(f"{where}: not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise MechanismError(f"{where}: not valid TOML: {error}") from None
     except ValueError:  # Python refuses whole numbers of thousands of digits
         raise MechanismError(f"{where}: not valid TOML: a number has too many digits") from None
-    try:
-        return _mechanism(document, None if folder is None else Path(folder))
-    except MechanismError as error:
-        raise type(error)(f"{where}: {error}", **error.data) from None
 
 
 def _deep_key(text: str) -> int | None:

@@ -255,6 +255,7 @@ class Model:
         parameters: Settings | None = None,
         tolerance: float = TOLERANCE,
         wrap: bool = False,
+        anew: bool = True,
         **inputs: ArrayLike,
     ) -> Sensitivities:
         """Return exact derivatives of positions and rates with respect to parameters.
@@ -272,6 +273,7 @@ class Model:
             parameters: Values of parameters and law constants, as in `solve`.
             tolerance: As in `solve`.
             wrap: As in `solve`.
+            anew: As in `solve`.
             **inputs: Driver values in place of t, as in `solve`.
 
         Returns:
@@ -283,7 +285,9 @@ class Model:
             KinfmuError: As in `solve`.
 
         """
-        return self._sensitivity_model.solve(t, outputs, parameters, wrt, tolerance=tolerance, wrap=wrap, inputs=inputs)
+        return self._sensitivity_model.solve(
+            t, outputs, parameters, wrt, tolerance=tolerance, wrap=wrap, anew=anew, inputs=inputs
+        )
 
     @cached_property
     def _sensitivity_model(self) -> SensitivityModel:

@@ -99,6 +99,7 @@ class SensitivityModel:
         *,
         tolerance: float,
         wrap: bool,
+        anew: bool,
         inputs: Mapping[str, Any],
     ) -> Sensitivities:
         """Return the sensitivities; arguments and errors as in `Model.sensitivities`."""
@@ -106,7 +107,7 @@ class SensitivityModel:
         names = _names("outputs", outputs, plan.outputs)
         chosen = self._chosen(wrt, by_law=by_law)
         setting = self._model.arguments.setting(parameters or {})
-        run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **inputs)
+        run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, **inputs)
         given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
         given["time"] = run.t
         for k, name, rate in self._unknowns:

@@ -1,0 +1,85 @@
+"""Fit files: TOML to FitProblem. Messages state the file, the table, the key and what would be valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed
+from kinfmu.files.whole_file import suffix_of
+from kinfmu.gallery import has, load
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.table_file import read_table
+from kinfmu.mechanism.toml_file import document_of, text_in
+from kinfmu.mechanism.toml_tables import check_keys, class_of_type, named_tables, table_of, text_of
+from kinfmu.synthesis.constraints import CONSTRAINTS
+from kinfmu.synthesis.problem import FitProblem
+from kinfmu.synthesis.targets import TARGETS, FunctionTarget, PathTarget
+
+KEYS = ("mechanism", "over", "unknowns", "targets", "constraints")
+_WITH_FILE = (PathTarget, FunctionTarget)  # their points can be in a CSV file
+
+
+def read_problem(path: str | Path) -> FitProblem:
+    """Return the problem of a fit file.
+
+    Args:
+        path: The file (.toml). A relative path of a mechanism in it starts in its folder.
+
+    Raises:
+        MechanismError: The file cannot be read or is invalid; the message states file, table and key.
+
+    """
+    path = Path(path)
+    document = document_of(text_in(path, "a fit file"), str(path))
+    try:
+        return _problem(document, path.parent)
+    except (MechanismError, RequestError) as error:
+        raise MechanismError(f"{path}: {error}", **error.data) from None
+
+
+def _problem(document: Mapping[str, Any], folder: Path) -> FitProblem:
+    check_keys("", document, KEYS)
+    if "mechanism" not in document:
+        raise MechanismError("mechanism is missing; the first line should be such as mechanism = 'crank_rocker.toml'")
+    over = document.get("over")
+    return FitProblem(
+        _mechanism(text_of("mechanism", document["mechanism"]), folder),
+        table_of(document, "unknowns"),
+        tuple(_members(document, "targets", TARGETS, folder)),
+        tuple(_members(document, "constraints", CONSTRAINTS, folder)),
+        None if over is None else text_of("over", over),
+    )
+
+
+def _mechanism(name: str, folder: Path) -> Mechanism:
+    """Return the mechanism of a file, or of the gallery."""
+    if suffix_of(name) != ".toml" and has(name):
+        return load(name)
+    try:
+        return load(folder / name if suffix_of(name) == ".toml" else name)
+    except KinfmuError as error:
+        raise MechanismError(f"mechanism: {error}") from None
+
+
+def _members(document: Mapping[str, Any], table: str, classes: Iterable[Any], folder: Path) -> Iterable[Any]:
+    """Yield the targets or constraints."""
+    for name, values in named_tables(document, table):
+        where = f"[{table}.{name}]"
+        cls = class_of_type(where, values, "type", classes)
+        own = [one for one in fields(cls) if one.name != "name"]
+        with_file = cls in _WITH_FILE
+        check_keys(where, values, ("type", *(one.name for one in own), *(("file",) if with_file else ())))
+        keys = {key: value for key, value in values.items() if key not in ("type", "file")}
+        if with_file and "file" in values:
+            if "points" in values:
+                raise MechanismError(f"{where} has both 'points' and 'file'; give one of them")
+            keys["points"] = read_table(f"{where} file", values["file"], folder)
+        for one in own:
+            if one.default is MISSING and one.name not in keys:
+                names = listed(key.name for key in own)
+                or_file = " or 'file'" if one.name == "points" else ""
+                raise MechanismError(f"{where} needs the key '{one.name}'{or_file}; keys: {names}")
+        yield cls(name=name, **keys)

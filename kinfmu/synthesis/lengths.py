@@ -1,0 +1,102 @@
+"""Grashof's condition as a residual of the parameters alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinfmu.errors import MechanismError
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.number import read_constant, read_number
+from kinfmu.mechanism.parameters import Parameter, parameter_values
+from kinfmu.mechanism.valid import quoted
+from kinfmu.run import FloatArray
+from kinfmu.synthesis.constraints import GrashofConstraint
+from kinfmu.synthesis.numbers import read_weights
+from kinfmu.units import Quantity
+
+LENGTH = Quantity("length")
+_STEP = 1e-30  # of a complex-step derivative, which is exact to round-off
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """The conditions on four lengths: p + q - s - l >= gap and, if the shortest is named, others - shortest >= 0.
+
+    Attributes:
+        name: Name of the constraint.
+        links: The lengths as expressions.
+        shortest: Which of them shall be the shortest; None: any.
+        gap: Smallest p + q - s - l [length].
+        root: Square root of the weight.
+        parameters: All parameters of the mechanism.
+
+    """
+
+    name: str
+    links: tuple[Expression, ...]
+    shortest: int | None
+    gap: float
+    root: float
+    parameters: Mapping[str, Parameter]
+
+    @classmethod
+    def of(cls, constraint: GrashofConstraint, where: str, mechanism: Mechanism) -> Lengths:
+        """Return the conditions of a constraint.
+
+        Raises:
+            MechanismError: A length is not an expression of parameters, or there are not four.
+
+        """
+        links, unit = constraint.links, mechanism.length_unit
+        if isinstance(links, str) or not isinstance(links, Sequence) or len(links) != 4:
+            raise MechanismError(f"{where} links = {quoted(links)} must be four lengths, such as ['a', 'b', 'c', 'd']")
+        shortest = constraint.shortest
+        if shortest is not None and shortest not in links:
+            raise MechanismError(f"{where} shortest = {quoted(shortest)} must be one of links, {quoted(list(links))}")
+        known = {name: float(parameter.value) for name, parameter in mechanism.parameters.items()}
+        read = []
+        for text in links:
+            link = read_number(f"{where} links", text, LENGTH, unit)
+            link = link if isinstance(link, Expression) else Expression(f"{link!r}", unit)
+            link.refuse_unknown(known)
+            read.append(link)
+        return cls(
+            constraint.name,
+            tuple(read),
+            None if shortest is None else list(links).index(shortest),
+            read_constant(f"{where} gap", constraint.gap, LENGTH, unit),
+            float(read_weights(f"{where} weight", constraint.weight, 1)[0]) ** 0.5,
+            mechanism.parameters,
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of conditions."""
+        return 1 if self.shortest is None else 4
+
+    def excess(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+        """Return by how much each condition is met (count,), and its derivatives by parameters (count, names)."""
+        lengths = np.array([float(link.value(self._known(values))) for link in self.links])
+        slopes = np.zeros((4, len(names)))
+        for k, name in enumerate(names):
+            if name in self.parameters:
+                known = self._known({**values, name: values[name] + 1j * _STEP})  # type: ignore[dict-item]
+                slopes[:, k] = [complex(link.value(known)).imag / _STEP for link in self.links]
+        order = np.argsort(lengths, kind="stable")
+        signs = np.zeros((self.count, 4))
+        signs[0, order] = [-1.0, 1.0, 1.0, -1.0]
+        others = [k for k in range(4) if k != self.shortest]
+        for row, k in enumerate(others if self.shortest is not None else (), start=1):
+            signs[row, k], signs[row, self.shortest] = 1.0, -1.0
+        limits = np.zeros(self.count)
+        limits[0] = self.gap
+        return signs @ lengths - limits, signs @ slopes
+
+    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return all parameters, those that follow from others too."""
+        own = {name: value for name, value in values.items() if name in self.parameters}
+        return dict(parameter_values(self.parameters, own))

@@ -1,0 +1,163 @@
+"""FitProblem: a mechanism, its unknowns, what it shall do, and the conditions it shall meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from kinfmu.errors import MechanismError, RequestError, listed
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.parameters import NUMBER
+from kinfmu.mechanism.valid import check_name
+from kinfmu.run import FloatArray
+from kinfmu.synthesis.argument import Argument, argument_of
+from kinfmu.synthesis.constraints import CONSTRAINTS, Constraint, GrashofConstraint
+from kinfmu.synthesis.lengths import Lengths
+from kinfmu.synthesis.measuring import Measuring, measuring_of
+from kinfmu.synthesis.numbers import Bounds, read_bounds
+from kinfmu.synthesis.sampled import Sampled, Tracer, sampled
+from kinfmu.synthesis.targets import TARGETS, MeasureTarget, Target
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """Parameters of a mechanism that are to be found, and what they are to bring about.
+
+    Args:
+        mechanism: The mechanism; its parameters as written are the first start.
+        unknowns: Bounds (low, high) of parameters by name, as numbers or text with a unit. Over time also law
+            constants such as 'crank.speed'.
+        targets: What the mechanism shall do.
+        constraints: Conditions it shall meet. Default: none.
+        over: What the samples go by: 'driver' or 'time'. Default: the driver, if there is one only.
+
+    Attributes:
+        argument: What the samples go by.
+        traced: The mechanism with the points of the targets as points of interest.
+        bounds: Bounds of all unknowns as numbers, also of starts and offsets such as 'curve.start'.
+        sampled: Paths, functions and poses in one form.
+        measuring: Measures with values or limits; None: there are none.
+        lengths: Grashof's conditions.
+
+    Raises:
+        MechanismError: A name or a value is invalid; the message states table and key.
+        RequestError: An unknown is not a parameter that can be set.
+
+    """
+
+    mechanism: Mechanism
+    unknowns: Mapping[str, Any]
+    targets: Sequence[Target]
+    constraints: Sequence[Constraint] = ()
+    over: str | None = None
+
+    argument: Argument = field(init=False)
+    traced: Mechanism = field(init=False)
+    bounds: Mapping[str, Bounds] = field(init=False)
+    sampled: tuple[Sampled, ...] = field(init=False)
+    measuring: Measuring | None = field(init=False)
+    lengths: tuple[Lengths, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        require_mechanism(self.mechanism, "fit")
+        names = [*self._names("targets", self.targets, TARGETS)]
+        names += self._names("constraints", self.constraints, CONSTRAINTS)
+        if not self.targets:
+            raise MechanismError("a fit needs targets: write a table such as [targets.curve]")
+        doubled = next((name for k, name in enumerate(names) if name in names[:k]), None)
+        if doubled is not None:
+            raise MechanismError(f"two targets or constraints have the name '{doubled}'")
+        unit, tracer = self.mechanism.length_unit, Tracer(self.mechanism)
+        argument = argument_of(self.mechanism, self.over)
+        known = {str(name): name.is_angle for name in self.mechanism.coordinate_names}
+        known |= {f"{point}.{axis}": False for point in self.mechanism.points for axis in ("x", "y")}
+        own = [
+            sampled(target, f"[targets.{target.name}]", tracer, known, argument, unit)
+            for target in self.targets
+            if not isinstance(target, MeasureTarget)
+        ]
+        bounds = self._parameter_bounds(argument)
+        for prepared in own:
+            bounds |= prepared.free
+        lengths = [
+            Lengths.of(constraint, f"[constraints.{constraint.name}]", self.mechanism)
+            for constraint in self.constraints
+            if isinstance(constraint, GrashofConstraint)
+        ]
+        found = {
+            "argument": argument,
+            "traced": replace(self.mechanism, points=tracer.points),
+            "bounds": bounds,
+            "sampled": tuple(own),
+            "measuring": measuring_of(self.mechanism, argument, self.targets, self.constraints),
+            "lengths": tuple(lengths),
+            "targets": tuple(self.targets),
+            "constraints": tuple(self.constraints),
+        }
+        for key, value in found.items():
+            object.__setattr__(self, key, value)
+
+    def __reduce__(self) -> tuple[Callable[..., FitProblem], tuple[Any, ...]]:
+        from kinfmu.mechanism import toml_text
+
+        text = toml_text.text(self.mechanism)
+        return _from_text, (text, dict(self.unknowns), self.targets, self.constraints, self.over)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The unknowns that are parameters or law constants of the mechanism."""
+        return tuple(self.unknowns)
+
+    def of(self, mechanism: Mechanism) -> FitProblem:
+        """Return the same problem of another mechanism."""
+        return FitProblem(mechanism, self.unknowns, self.targets, self.constraints, self.over)
+
+    def written(self) -> dict[str, float | None]:
+        """Return the values of the unknowns as written, within their bounds; starts and offsets have none."""
+        settable = self.mechanism.settable
+        values: dict[str, float | None] = dict.fromkeys(self.bounds)
+        for name in self.parameters:
+            setting = settable.constants.get(name) or self.mechanism.parameters[name]
+            values[name] = min(max(float(setting.value), self.bounds[name].low), self.bounds[name].high)
+        return values
+
+    def vector(self, z: FloatArray) -> dict[str, float]:
+        """Return the unknowns by name; z: (n,) as parts of the ranges between their bounds."""
+        return {
+            name: b.low + float(part) * (b.high - b.low) for (name, b), part in zip(self.bounds.items(), z, strict=True)
+        }
+
+    @staticmethod
+    def _names(table: str, members: Sequence[Any], classes: Any) -> list[str]:
+        for one in members:
+            if not isinstance(one, classes):
+                kinds = listed(cls.__name__ for cls in classes)
+                raise RequestError(f"{table}: {type(one).__name__} is not one of {kinds}")
+            check_name(f"[{table}]", one.name)
+        return [one.name for one in members]
+
+    def _parameter_bounds(self, argument: Argument) -> dict[str, Bounds]:
+        """Return the bounds of parameters and law constants."""
+        settable = self.mechanism.settable
+        if not self.unknowns:
+            raise MechanismError("a fit needs unknowns: write bounds of parameters in [unknowns], such as a = [20, 50]")
+        bounds = {}
+        for name, value in self.unknowns.items():
+            parameter, constant = self.mechanism.parameters.get(name), settable.constants.get(name)
+            if constant is not None and argument.input:
+                raise RequestError(f"[unknowns] {name} is a law constant, which acts over time: write over = 'time'")
+            if constant is None and (parameter is None or parameter.expression is not None):
+                raise RequestError(f"[unknowns] {settable.unknown(name, settable.names)}")
+            setting: Any = constant or parameter
+            where = f"[unknowns] {name}"
+            bounds[name] = read_bounds(where, value, setting.quantity or NUMBER, self.mechanism.length_unit)
+        return bounds
+
+
+def _from_text(text: str, *rest: Any) -> FitProblem:
+    """Return a problem from its mechanism's text: how problems arrive in other processes."""
+    from kinfmu.mechanism import toml_file
+
+    return FitProblem(toml_file.parse(text, "the mechanism of the fit"), *rest)

@@ -1,0 +1,132 @@
+"""Least squares from one start, and the starts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from kinfmu.run import FloatArray
+from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
+from kinfmu.synthesis.problem import FitProblem
+
+
+class Effort(NamedTuple):
+    """When a search ends.
+
+    tolerance: Relative change of the sum of squares, and of the unknowns; most: Number of designs that are tried.
+    """
+
+    tolerance: float
+    most: int
+
+
+SHORT, LONG, FINE = Effort(1e-6, 12), Effort(1e-6, 150), Effort(1e-15, 300)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where a search ended.
+
+    Attributes:
+        z: (n,) the unknowns as parts of their ranges; None: the start cannot be assembled.
+        total: Sum of squares with penalties.
+        tried: Number of designs.
+        refused: How often designs could not be assembled or did not reach a sample, by reason.
+
+    """
+
+    z: FloatArray | None
+    total: float
+    tried: int
+    refused: Mapping[str, int] = field(default_factory=dict)
+
+
+def start_points(problem: FitProblem, count: int, seed: int) -> FloatArray:
+    """Return points (count, n) of a scrambled Sobol sequence; the first one is the mechanism as written.
+
+    Unknowns that have no value as written, such as a free start, keep that of the sequence.
+    """
+    from scipy.stats.qmc import Sobol
+
+    size = 1 << max(0, (count - 1).bit_length())  # Sobol points balance in powers of two
+    points = np.asarray(Sobol(len(problem.bounds), scramble=True, rng=seed).random(size)[:count])
+    for k, ((low, high), value) in enumerate(zip(problem.bounds.values(), problem.written().values(), strict=True)):
+        if value is not None:
+            points[0, k] = (value - low) / (high - low)
+    return points
+
+
+def search(equations: Equations, z: FloatArray, effort: Effort) -> Found:
+    """Return where least squares from a start ends (trust region reflective; Branch, Coleman and Li 1999).
+
+    A design that cannot be assembled counts as infinitely bad: the step is refused and a shorter one is tried, so that
+    the search never goes on from a geometry that does not exist.
+    """
+    from scipy.optimize import least_squares
+
+    refused: Counter[str] = Counter()
+    last: dict[str, tuple[bytes, Evaluation, FloatArray]] = {}
+    tried, count = 0, 1
+
+    def residuals(z: FloatArray) -> FloatArray:
+        nonlocal tried, count
+        tried += 1
+        try:
+            found, jacobian = equations.at(z)
+        except NotAssembledError as reason:
+            refused[str(reason)] += 1
+            return np.full(count, np.inf)
+        count = len(found.residuals)
+        last["design"] = z.tobytes(), found, jacobian
+        return found.residuals
+
+    def jacobian(z: FloatArray) -> FloatArray:
+        if "design" not in last or last["design"][0] != z.tobytes():
+            residuals(z)
+        _, found, known = last["design"]
+        return equations.with_measures(z, found, known)
+
+    z = np.clip(z, 1e-9, 1.0 - 1e-9)  # strictly within the bounds
+    if not np.isfinite(residuals(z)).all():
+        return Found(None, np.inf, tried, refused)
+    result = least_squares(
+        residuals,
+        z,
+        jac=jacobian,
+        bounds=(0.0, 1.0),
+        method="trf",
+        x_scale="jac",
+        ftol=effort.tolerance,
+        xtol=effort.tolerance,
+        gtol=effort.tolerance,
+        max_nfev=effort.most,
+    )
+    return Found(result.x, 2.0 * float(result.cost), tried, refused)
+
+
+def distinct(found: Sequence[tuple[Found, int]]) -> list[tuple[Found, int]]:
+    """Return optima with the number of searches that ended there, each once, best first."""
+    kept: list[tuple[Found, int]] = []
+    for one, searches in sorted(found, key=lambda pair: pair[0].total):
+        for k, (other, count) in enumerate(kept):
+            if _is_same(one, other):
+                kept[k] = other, count + searches
+                break
+        else:
+            kept.append((one, searches))
+    return [pair for pair in kept if pair[0].z is not None]
+
+
+SAME = 1e-3  # of the ranges of the unknowns, between two ends of a search at one optimum
+SAME_TOTAL = 1e-3  # relative
+
+
+def _is_same(one: Found, other: Found) -> bool:
+    if one.z is None or other.z is None:
+        return False
+    near = float(np.abs(one.z - other.z).max()) <= SAME
+    return near and abs(one.total - other.total) <= SAME_TOTAL * max(one.total, other.total) + 1e-14

@@ -1,0 +1,97 @@
+"""The report of a fit as text: errors of the targets, constraints, parameters and optima."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from kinfmu.synthesis.result import MOST_OPTIMA, FitResult, TargetErrors, argument_unit
+from kinfmu.units import unit_of
+
+_MOST_POINTS = 40  # of a target in the table
+
+
+def report(result: FitResult) -> str:
+    """Return the report as lines."""
+    lines = [
+        f"{result.mechanism.name}: sum of squares {result.squares:.9g}, rms {result.rms:.6g}, "
+        f"{result.tried} designs tried"
+    ]
+    if result.refused:
+        count = sum(result.refused.values())
+        lines.append(f"  {count} of them refused: they cannot be assembled or do not reach all samples")
+    unit = argument_unit(result.problem)
+    for one in result.errors:
+        lines += ["", *_target(one, unit)]
+    if result.conditions:
+        lines += ["", "constraints"]
+        for condition in result.conditions:
+            verdict = "holds" if condition.holds else f"VIOLATED by {condition.violation:.3g}"
+            lines.append(f"  {condition.name}: {verdict}; {condition.text}")
+    lines += ["", "parameters", *_parameters(result), "", "local optima"]
+    rows = [
+        (f"{k}", f"{one.total:.9g}", f"{one.searches}", *(f"{value:.6g}" for value in one.parameters.values()))
+        for k, one in enumerate(result.optima[:MOST_OPTIMA], start=1)
+    ]
+    lines += _table(("", "sum of squares", "searches", *result.parameters), rows)
+    if len(result.optima) > MOST_OPTIMA:
+        lines.append(f"  and {len(result.optima) - MOST_OPTIMA} more")
+    return "\n".join(lines)
+
+
+def _target(one: TargetErrors, unit: str) -> Iterable[str]:
+    """Yield the table of a target."""
+    if one.type == "measure":
+        shown = "" if one.units[0] == "1" else f" {one.units[0]}"
+        yield (
+            f"{one.name} (measure): {one.reached[0, 0]:.9g}{shown}, wanted {one.wanted[0, 0]:.9g}{shown}, "
+            f"error {one.errors[0, 0]:.3g}"
+        )
+        return
+    length = one.units[0]
+    yield f"{one.name} ({one.type}): rms {one.rms:.6g} {length}, largest error {one.largest:.6g} {length}"
+    degrees = unit == "rad"
+    columns = [f"{name} [{unit}]" for name, unit in zip(one.names, one.units, strict=True)]
+    titles = (
+        "point",
+        f"{one.argument} [{'deg' if degrees else unit}]",
+        *(f"{name}, wanted" for name in columns),
+        *(f"{name}, reached" for name in columns),
+        "error",
+    )
+    at = np.degrees(one.at) if degrees else one.at
+    rows = []
+    for k, row in enumerate(zip(at, one.wanted, one.reached, one.errors, strict=True), start=1):
+        u, wanted, reached, error = row
+        size = math.sqrt(float(error @ error)) if len(set(one.units)) == 1 else float(np.abs(error).max())
+        rows.append((f"{k}", f"{u:.4f}", *(f"{n:.6g}" for n in wanted), *(f"{n:.6g}" for n in reached), f"{size:.3g}"))
+    yield from _table(titles, rows[:_MOST_POINTS])
+    if len(rows) > _MOST_POINTS:
+        yield f"  and {len(rows) - _MOST_POINTS} more points"
+
+
+def _parameters(result: FitResult) -> Iterable[str]:
+    """Yield the unknowns with their units and bounds."""
+    problem = result.problem
+    settable = problem.mechanism.settable
+    rows = []
+    for name, value in result.parameters.items():
+        setting = settable.constants.get(name) or problem.mechanism.parameters.get(name)
+        quantity = setting.quantity if setting is not None else None
+        unit = "" if quantity is None or quantity.kind == "number" else unit_of(quantity, problem.mechanism.length_unit)
+        low, high = problem.bounds[name]
+        near = 1e-6 * (high - low)
+        at = "at its lower bound" if value - low < near else "at its upper bound" if high - value < near else ""
+        rows.append((name, f"{value:.12g}", unit, f"[{low:.6g}, {high:.6g}]", at))
+    return _table(("", "value", "unit", "bounds", ""), rows)
+
+
+def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return lines of columns that are aligned to the right."""
+    widths = [max(len(row[k]) for row in (titles, *rows)) for k in range(len(titles))]
+    return [
+        ("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))).rstrip()
+        for row in (titles, *rows)
+    ]
