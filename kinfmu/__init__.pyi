@@ -56,6 +56,7 @@ from kinfmu.mechanism import RunSettings as RunSettings
 from kinfmu.mechanism import Start as Start
 from kinfmu.motion import DesignMeasures as DesignMeasures
 from kinfmu.motion import MeasuredValue as MeasuredValue
+from kinfmu.motion import MeasuredValues as MeasuredValues
 from kinfmu.motion import measure as measure
 from kinfmu.motion import measure_designs as measure_designs
 from kinfmu.run import Run as Run

@@ -13,6 +13,7 @@ from kinfmu.analysis.measuring import measurements
 from kinfmu.analysis.named_loops import find_named_loops
 from kinfmu.analysis.singular import driver_range
 from kinfmu.analysis.text import lines
+from kinfmu.display import Displayed
 from kinfmu.equations.redundancy import find_redundancy
 from kinfmu.equations.system import System
 from kinfmu.errors import AssemblyError, KinfmuError
@@ -21,8 +22,12 @@ from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.plan import localized, plan_from
 
 
-class Report(Findings):
+class Report(Findings, Displayed):
     """The findings of a check; as text with `str`."""
+
+    def __repr__(self) -> str:
+        problem = f"; problem: {self.problem}" if self.problem else ""
+        return f"<Report on {self.mechanism.name}: mobility {self.mobility}{problem}>"
 
     def __str__(self) -> str:
         return "\n".join(lines(self))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import partial
+from typing import NamedTuple
 
 from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
@@ -12,6 +13,7 @@ from kinfmu.analysis.singular import DriverRange, LimitPosition
 from kinfmu.analysis.transmission import TransmissionAngle
 from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
 from kinfmu.errors import listed
+from kinfmu.mechanism import Mechanism
 from kinfmu.motion import MeasuredValue
 
 _MOST_LOOPS = 8  # in the text; JSON has all
@@ -24,18 +26,31 @@ _SAME = 1e-9  # [rad or length]; values closer than this are equal
 _MOST_NAMES = 24  # in one line; JSON has all
 
 
-def lines(report: Findings) -> list[str]:
-    """Return the findings, one per line, each after its subject."""
-    found = [f"{report.mechanism.name}: {report.mechanism.title}" if report.mechanism.title else report.mechanism.name]
+class ReportLine(NamedTuple):
+    """A line of the report; subject: '' if it continues the line before."""
+
+    subject: str
+    text: str
+
+
+def findings(report: Findings) -> list[ReportLine]:
+    """Return the findings in order."""
+    found: list[ReportLine] = []
     for parts in (_count, _rows, _plan, _advice, _loops, _motion, _measures, _notes):
         found += parts(report)
     if report.problem is not None:
-        found.append(_line("problem", str(report.problem)))
+        found.append(ReportLine("problem", str(report.problem)))
     return found
 
 
-def _line(subject: str, text: str) -> str:
-    return f"  {subject:<12}{text}"
+def title(mechanism: Mechanism) -> str:
+    """Return the name and the title of a mechanism."""
+    return f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
+
+
+def lines(report: Findings) -> list[str]:
+    """Return the findings, one per line, each after its subject."""
+    return [title(report.mechanism), *(f"  {found.subject:<12}{found.text}" for found in findings(report))]
 
 
 def _names(names: Iterable[str]) -> str:
@@ -45,83 +60,85 @@ def _names(names: Iterable[str]) -> str:
     return listed(names[:_MOST_NAMES]) + more
 
 
-def _count(report: Findings) -> Iterator[str]:
+def _count(report: Findings) -> Iterator[ReportLine]:
     mechanism = report.mechanism
     rows = sum(len(joint.labels) for joint in mechanism.joints)
-    yield _line("bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}")
-    yield _line("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
+    yield ReportLine(
+        "bodies", f"{len(mechanism.moving_bodies)} moving: {_names(b.name for b in mechanism.moving_bodies)}"
+    )
+    yield ReportLine("joint rows", f"{rows} over {len(mechanism.coordinate_names)} coordinates")
     drivers = f"driven by {_names(driver.name for driver in mechanism.drivers)}" if mechanism.drivers else "no driver"
-    yield _line("mobility", f"{report.mobility}, {drivers}")
+    yield ReportLine("mobility", f"{report.mobility}, {drivers}")
     if report.gruebler != report.mobility:
-        yield _line("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
+        yield ReportLine("", f"Gruebler's count gives {report.gruebler}, because it counts redundant rows")
 
 
-def _rows(report: Findings) -> Iterator[str]:
+def _rows(report: Findings) -> Iterator[ReportLine]:
     for row in report.redundant:
         within = f"{row.tolerance:.3g} {'rad' if row.row.kind == 'angle' else report.mechanism.length_unit}"
         reason = f"at every pose it follows from {listed(row.implied_by_joints)}, to within {within}"
-        yield _line("redundant", f"{row.row.owner} (row {row.row.name}): {reason}; set aside, residual monitored")
+        yield ReportLine("redundant", f"{row.row.owner} (row {row.row.name}): {reason}; set aside, residual monitored")
     if not report.redundancy.dependent:
-        yield _line("redundant", "none")
+        yield ReportLine("redundant", "none")
     for row in report.inconsistent:
         unit = "rad" if row.row.kind == "angle" else report.mechanism.length_unit
         gap = f"{abs(row.gap):.6g} {unit} at every pose; up to {row.tolerance:.3g} {unit} would count as redundant"
         reason = f"does not close with {listed(row.implied_by_joints)}: gap {gap}"
-        yield _line("contradicts", f"{row.row.owner} (row {row.row.name}) {reason}")
+        yield ReportLine("contradicts", f"{row.row.owner} (row {row.row.name}) {reason}")
 
 
-def _plan(report: Findings) -> Iterator[str]:
+def _plan(report: Findings) -> Iterator[ReportLine]:
     plan = report.plan
     if plan is None:
         return
     unit = report.mechanism.length_unit
     drivers, assembled = report.mechanism.drivers, plan.anchor.u.tolist()
-    yield _line("start", _names(map(partial(driver_text, unit=unit), drivers, report.starts)))
+    yield ReportLine("start", _names(map(partial(driver_text, unit=unit), drivers, report.starts)))
     if any(abs(u - start) > _SAME for u, start in zip(assembled, report.starts, strict=True)):
-        yield _line("assembled", _names(map(partial(driver_text, unit=unit), drivers, assembled)))
-    yield _line("coordinates", _names(plan.coordinates))
+        yield ReportLine("assembled", _names(map(partial(driver_text, unit=unit), drivers, assembled)))
+    yield ReportLine("coordinates", _names(plan.coordinates))
     if plan.fixed:
-        yield _line("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
+        yield ReportLine("fixed", _names(f"{name} = {value:.6g}" for name, value in plan.fixed.items()))
     for k, block in enumerate(report.blocks[:_MOST_NAMES], start=1):
         size = f"{len(block.rows)} x {len(block.unknowns)}"
         determinant = f", determinant {block.determinant}" if block.determinant else ""
-        yield _line(f"block {k}", f"{size}: {listed(block.unknowns)} from {listed(block.rows)}{determinant}")
+        yield ReportLine(f"block {k}", f"{size}: {listed(block.unknowns)} from {listed(block.rows)}{determinant}")
     if len(report.blocks) > _MOST_NAMES:
-        yield _line("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
+        yield ReportLine("", f"and {len(report.blocks) - _MOST_NAMES} more blocks")
 
 
-def _advice(report: Findings) -> Iterator[str]:
+def _advice(report: Findings) -> Iterator[ReportLine]:
     advice = report.advice
     if advice is None:
         return
     for surplus in advice.surplus:
         by = f"{listed(surplus.implied_by)} and the joints" if surplus.implied_by else "the joints alone"
-        yield _line("surplus", f"driver {surplus.name}: {by} determine what it drives; remove it")
+        yield ReportLine("surplus", f"driver {surplus.name}: {by} determine what it drives; remove it")
     if advice.missing:
         more = (
             f"{advice.missing} more driver{'s' * (advice.missing > 1)} needed" if report.mobility else "nothing drives"
         )
-        yield _line("loose", f"{_names(advice.loose)}: {more}")
+        yield ReportLine("loose", f"{_names(advice.loose)}: {more}")
     for suggestion in advice.suggestions:
-        yield _line("could add", str(suggestion))
+        yield ReportLine("could add", str(suggestion))
 
 
-def _loops(report: Findings) -> Iterator[str]:
+def _loops(report: Findings) -> Iterator[ReportLine]:
     unit = report.mechanism.length_unit
     for named in report.loops[:_MOST_LOOPS]:
         loop = named.loop
         if isinstance(loop, FourBar):
             links = zip(("ground", *loop.links), loop.lengths, strict=True)
-            yield _line("loop", f"four-bar: {listed(f'{name} {length:.6g}' for name, length in links)} {unit}")
-            yield _line("", _four_bar_class(named, loop))
+            yield ReportLine("loop", f"four-bar: {listed(f'{name} {length:.6g}' for name, length in links)} {unit}")
+            yield ReportLine("", _four_bar_class(named, loop))
         else:
             sizes = f"{_sized('crank', loop.crank)}, {_sized('rod', loop.rod)}"
-            yield _line("loop", f"slider-crank: {sizes}, offset {loop.offset:.6g} {unit}")
-            yield _line("", _slider_crank_class(named, loop))
+            yield ReportLine("loop", f"slider-crank: {sizes}, offset {loop.offset:.6g} {unit}")
+            yield ReportLine("", _slider_crank_class(named, loop))
         for angle in named.transmission:
-            yield _line("", _transmission(angle, unit))
+            yield ReportLine("", _transmission(angle, unit))
     if len(report.loops) > _MOST_LOOPS:
-        yield _line("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
+        yield ReportLine("", f"and {len(report.loops) - _MOST_LOOPS} more four-bars and slider-cranks")
 
 
 def _sized(role: str, link: Link) -> str:
@@ -191,36 +208,36 @@ def _in_line(angle: TransmissionAngle) -> str:
     return f"{angle.coupler} and {angle.output} fall in line"
 
 
-def _motion(report: Findings) -> Iterator[str]:
+def _motion(report: Findings) -> Iterator[ReportLine]:
     several = len(report.mechanism.drivers) > 1
     for reach in report.ranges:
         yield from _change_points(report, reach, several)
     for reach in report.ranges:
         yield from _range(report, reach)
     if several and report.ranges:
-        yield _line("", "each with the other drivers at their start values")
+        yield ReportLine("", "each with the other drivers at their start values")
     if report.ranges and not report.singular and not any(reach.stopped for reach in report.ranges):
-        yield _line("singular", "none in the range")
+        yield ReportLine("singular", "none in the range")
 
 
-def _measures(report: Findings) -> Iterator[str]:
+def _measures(report: Findings) -> Iterator[ReportLine]:
     measured = report.measured
     if measured is None:
         return
-    yield _line("measures", f"over {measured.over}")
+    yield ReportLine("measures", f"over {measured.over}")
     for value in measured.values:
-        yield _line(
-            "", f"{value.name} = {_measured(value)}" if not value.reason else _no_value(value.name, value.reason)
+        yield ReportLine(
+            "", f"{value.name} = {measured_text(value)}" if not value.reason else _no_value(value.name, value.reason)
         )
     for name, reason in measured.refused.items():
-        yield _line("", _no_value(name, reason))
+        yield ReportLine("", _no_value(name, reason))
 
 
 def _no_value(name: str, reason: str) -> str:
     return f"{name}: no value, because {reason}"
 
 
-def _measured(value: MeasuredValue) -> str:
+def measured_text(value: MeasuredValue) -> str:
     """Return a value with its unit and the driver values where it occurs."""
     number = value_text(value.value, value.unit, "angle" if value.unit == "rad" else "length")
     at = [degrees(u) if value.at_unit == "rad" else f"{u:.6g} {value.at_unit}" for u in value.at]
@@ -228,19 +245,19 @@ def _measured(value: MeasuredValue) -> str:
     return f"{number.removesuffix(' 1')}{places}"
 
 
-def _notes(report: Findings) -> Iterator[str]:
+def _notes(report: Findings) -> Iterator[ReportLine]:
     for note in report.notes:
-        yield _line("note", note)
+        yield ReportLine("note", note)
 
 
-def _change_points(report: Findings, reach: DriverRange, several: bool) -> Iterator[str]:
+def _change_points(report: Findings, reach: DriverRange, several: bool) -> Iterator[ReportLine]:
     ends = (reach.low, reach.high)
     changes = [point.value for point in reach.points if point.kind == "change point" and point.value not in ends]
     if changes:
         places = _names(value_text(value, report.mechanism.length_unit, reach.kind) for value in changes)
         every = "k pi: " if reach.turns == 1 and _all_multiples_of_pi(changes) else ""
         goes_on = "with several drivers no run can cross it" if several else "the motion goes on (bridged)"
-        yield _line("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
+        yield ReportLine("singular", f"{reach.driver} = {every}{places}; branches cross, {goes_on}")
 
 
 def _all_multiples_of_pi(values: list[float]) -> bool:
@@ -248,32 +265,34 @@ def _all_multiples_of_pi(values: list[float]) -> bool:
     return len(values) == 2 and [multiple_of_pi(value) for value in sorted(values)] == ["0", "pi"]
 
 
-def _range(report: Findings, reach: DriverRange) -> Iterator[str]:
+def _range(report: Findings, reach: DriverRange) -> Iterator[ReportLine]:
     unit = report.mechanism.length_unit
     seen = [value_text(end, unit, reach.kind) for end in reach.reach]
     limits = reach.limits
     ends = [value_text(limit.value, unit, reach.kind) for limit in limits]
     if reach.stopped is not None:
-        yield _line("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
+        yield ReportLine("range", f"{reach.driver} was followed from {seen[0]} to {seen[1]}; then: {reach.stopped}")
     elif len(limits) == 2:
         low, high = (_END[limit.kind] for limit in limits)
         if limits[0].kind == limits[1].kind == "dead centre":
-            yield _line("range", f"{reach.driver} from {ends[0]} to {ends[1]}; dead centre at each limit")
+            yield ReportLine("range", f"{reach.driver} from {ends[0]} to {ends[1]}; dead centre at each limit")
         else:
-            yield _line("range", f"{reach.driver} from {ends[0]}, {low}, to {ends[1]}, {high}")
+            yield ReportLine("range", f"{reach.driver} from {ends[0]}, {low}, to {ends[1]}, {high}")
     elif reach.lowest is not None:
-        yield _line("range", f"{reach.driver} from {ends[0]}, {_END[limits[0].kind]}; no limit up to {seen[1]}")
+        yield ReportLine("range", f"{reach.driver} from {ends[0]}, {_END[limits[0].kind]}; no limit up to {seen[1]}")
     elif reach.highest is not None:
-        yield _line("range", f"{reach.driver} up to {ends[0]}, {_END[limits[0].kind]}; no limit down to {seen[0]}")
+        yield ReportLine("range", f"{reach.driver} up to {ends[0]}, {_END[limits[0].kind]}; no limit down to {seen[0]}")
     elif reach.turns == 1:
-        yield _line("range", f"{reach.driver} turns all the way round")
+        yield ReportLine("range", f"{reach.driver} turns all the way round")
     elif reach.turns is not None:
-        yield _line("range", f"{reach.driver} turns all the way round; the mechanism repeats after {reach.turns} turns")
+        yield ReportLine(
+            "range", f"{reach.driver} turns all the way round; the mechanism repeats after {reach.turns} turns"
+        )
     else:
-        yield _line("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
+        yield ReportLine("range", f"{reach.driver}: no limit from {seen[0]} to {seen[1]}")
     for limit, end in zip(limits, ends, strict=True):
         if limit.bodies:
-            yield _line("", f"at {end} {_parted(report, reach, limit)}")
+            yield ReportLine("", f"at {end} {_parted(report, reach, limit)}")
 
 
 def _parted(report: Findings, reach: DriverRange, limit: LimitPosition) -> str:

@@ -43,7 +43,8 @@ def curves(axes: Axes, run: Run, columns: Sequence[str] = ()) -> Axes:
         axes.plot(axis.values[rows], values[rows], marker="" if is_curve else "o", label=name)
     axes.set_xlabel(axis.label)
     unit = units[names[0]].replace("2", "\N{SUPERSCRIPT TWO}")
-    axes.set_ylabel(f"{names[0]} [{unit}]" if len(axes.lines) == 1 else f"[{unit}]")
+    label = f"{names[0]} [{unit}]" if len(names) == 1 else f"[{unit}]"
+    axes.set_ylabel(label if axes.get_ylabel() in ("", label) else f"[{unit}]")
     if len(axes.lines) > 1:
         axes.legend()
     for first, last in gaps(run, axis.values):

@@ -54,13 +54,19 @@ def write(paths: Path | tuple[Path, ...], draw: Callable[[], Figure]) -> None:
         write_bytes(path, image)
 
 
+def svg_text(subject: str, draw: Callable[[], Figure]) -> str:
+    """Return the figure of `draw` as SVG; MissingPackageError about `subject` without matplotlib."""
+    with figure_style(subject):
+        return _image(draw(), ".svg").decode()
+
+
 @contextmanager
-def figure_style(path: Path) -> Iterator[None]:
-    """Apply kinfmu's style instead of the user's settings; MissingPackageError about `path` without matplotlib."""
+def figure_style(subject: object) -> Iterator[None]:
+    """Apply kinfmu's style instead of the user's settings; MissingPackageError about `subject` without matplotlib."""
     try:
         import matplotlib as mpl
     except ImportError:
-        raise MissingPackageError(f"{path}: {_NEEDS_MATPLOTLIB}") from None
+        raise MissingPackageError(f"{subject}: {_NEEDS_MATPLOTLIB}") from None
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")  # a frame is drawn instead
         mpl.rcdefaults()

@@ -8,6 +8,7 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
+from kinfmu.display import Displayed
 from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
@@ -26,7 +27,7 @@ COORDINATES = ("x", "y", "phi")
 
 
 @dataclass(frozen=True)
-class Mechanism:
+class Mechanism(Displayed):
     """A planar mechanism: bodies, the joints between them, and the drivers that move it.
 
     Every number can also be given as text with a unit or as an expression of parameters ("60 deg", "a/2 + 5 mm"). The
@@ -82,6 +83,10 @@ class Mechanism:
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "expressions", MappingProxyType(expressions))
         check_members(self)
+
+    def __repr__(self) -> str:
+        parts = {"moving bodies": self.moving_bodies, "joints": self.joints, "drivers": self.drivers}
+        return f"<Mechanism {self.name}; {', '.join(f'{name}: {len(part)}' for name, part in parts.items())}>"
 
     def __hash__(self) -> int:
         return hash((self.name, self.bodies, self.joints, self.drivers, tuple(self.points.items()), self.coordinates))

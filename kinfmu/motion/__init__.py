@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 from kinfmu.motion.designs import DesignMeasures, measure_designs
-from kinfmu.motion.measure import MeasuredValue, measure
+from kinfmu.motion.measure import MeasuredValue, MeasuredValues, measure
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.track import Extreme, Track
 
-__all__ = ["DesignMeasures", "Extreme", "MeasuredValue", "Motion", "Track", "measure", "measure_designs"]
+__all__ = [
+    "DesignMeasures",
+    "Extreme",
+    "MeasuredValue",
+    "MeasuredValues",
+    "Motion",
+    "Track",
+    "measure",
+    "measure_designs",
+]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion
@@ -59,7 +60,11 @@ class MeasuredValue:
         }
 
 
-def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> dict[str, MeasuredValue]:
+class MeasuredValues(dict[str, MeasuredValue], Displayed):
+    """Values of measures by name, in the order of the measures."""
+
+
+def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> MeasuredValues:
     """Measure a motion.
 
     Extremes lie between the samples where values, rates and accelerations of the samples place them (polynomials of
@@ -79,7 +84,8 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> dict[s
 
     """
     motion = Motion.of_run(run)
-    return {reading.name: _value(run, motion, reading) for reading in chosen_measures(motion.mechanism, measures)}
+    chosen = chosen_measures(motion.mechanism, measures)
+    return MeasuredValues((reading.name, _value(run, motion, reading)) for reading in chosen)
 
 
 def chosen_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> tuple[Reading, ...]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, MissingPackageError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
@@ -81,7 +82,7 @@ class Event(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Run:
+class Run(Displayed):
     """The motion of a mechanism at n samples.
 
     Samples of status 3 to 5 are NaN in values, rates and accelerations, and in the diagnostics. Fields declared as

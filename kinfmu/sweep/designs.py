@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import LawConstant
 from kinfmu.plan import SolvePlan
@@ -27,7 +28,7 @@ SAMPLES_AT_ONCE = 500_000  # of a piece of work: its diagnostics stay in some 30
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Designs:
+class Designs(Displayed):
     """The motions of m designs at n samples.
 
     Designs that cannot be assembled, and samples that cannot be reached, are NaN with a status of 3 to 5.

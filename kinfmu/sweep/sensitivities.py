@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
+from kinfmu.display import Displayed
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.sensitivity import law_symbol, scale_of, sensitivity_steps
@@ -30,7 +31,7 @@ Native = Callable[[Sequence[FloatArray], FloatArray], bool]  # fills results (ro
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Displayed):
     """Outputs and rates of a motion with their derivatives with respect to parameters.
 
     Angles are in radians, lengths in the mechanism's unit of length. A derivative is in the output's unit per unit of

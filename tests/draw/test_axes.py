@@ -96,6 +96,9 @@ def test_two_runs_share_axes(run: Run, axes: Axes) -> None:
         plot(part, columns=["A.x"], ax=axes)
     assert [len(line.get_xydata()) for line in axes.lines] == [181, 90]
     assert len({str(line.get_color()) for line in axes.lines}) == 2
+    assert axes.get_ylabel() == "A.x [m]"
+    plot(run, columns=["A.y"], ax=axes)
+    assert axes.get_ylabel() == "[m]"
 
 
 def test_what_axes_cannot_show_is_reported(run: Run, axes: Axes, tmp_path: Path) -> None:

@@ -1,0 +1,51 @@
+"""The methods by which notebooks ask a value for its picture and its table."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from importlib import import_module
+
+from kinfmu.display.html import escaped
+
+_MAKERS = "kinfmu.notebook"  # by name: it knows the classes, which know only this package
+
+
+@singledispatch
+def html_of(value: object) -> str | None:
+    """Return a value as HTML; `kinfmu.notebook` registers a function for each class. None: as text."""
+    del value
+    return None
+
+
+@singledispatch
+def svg_of(value: object) -> str | None:
+    """Return the picture of a value as SVG, registered like `html_of`. None: there is no picture."""
+    del value
+    return None
+
+
+class Displayed:
+    """A value that shows itself in notebooks, which call these methods of a cell's result.
+
+    No method raises an error: the text in its place states the reason.
+    """
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str | None:
+        try:
+            import_module(_MAKERS)
+            return html_of(self)
+        except Exception as error:
+            return f"<pre>{escaped(repr(self))}\ncannot be shown: {escaped(_reason(error))}</pre>"
+
+    def _repr_svg_(self) -> str | None:
+        try:
+            import_module(_MAKERS)
+            return svg_of(self)
+        except Exception:
+            return None  # the HTML states the reason
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
