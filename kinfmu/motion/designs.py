@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, suggestion
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.motion.batch_reading import BatchReading
@@ -21,7 +22,7 @@ from kinfmu.sweep.model import require_workers
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DesignMeasures:
+class DesignMeasures(Displayed):
     """The measures of m designs, as columns of a table.
 
     Attributes:

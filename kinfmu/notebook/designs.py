@@ -1,13 +1,15 @@
-"""Designs and sensitivities as tables."""
+"""Designs, their measures, and sensitivities as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinfmu.display import escaped, html_of, page, table
+from kinfmu.motion import DesignMeasures
 from kinfmu.notebook.picture import MOST_ROWS, some
+from kinfmu.run import FloatArray
 from kinfmu.sweep import Designs, Sensitivities
 
 
@@ -18,16 +20,33 @@ def designs_html(designs: Designs) -> str:
     whole = int(designs.good.all(axis=1).sum())
     return page(
         f"{count} designs at {samples} samples, {whole} of them without gaps",
-        table(_varied(designs), ("parameter", "smallest", "largest")),
+        table(_ranges(designs.parameters), ("parameter", "smallest", "largest")),
         table(_outputs(designs), ("output", "unit", "smallest", "largest")),
         table(_gaps(designs), ("design", "samples without numbers", "reason")) if designs.reasons else "",
     )
 
 
-def _varied(designs: Designs) -> list[Sequence[object]]:
-    """Return the range of each parameter that was given."""
-    ranges = [(name, float(np.min(array)), float(np.max(array))) for name, array in designs.parameters.items()]
-    return [*ranges[:MOST_ROWS], *_more(len(ranges), 3)]
+@html_of.register
+def design_measures_html(designs: DesignMeasures) -> str:
+    """Return the ranges of the parameters and measures, and the first designs without a value with their reasons."""
+    units = designs.units
+    measures = [(name, units.get(str(name), ""), *ends) for name, *ends in _ranges(designs.values)]
+    reasons = [*list(designs.reasons.items())[:MOST_ROWS], *_more(len(designs.reasons), 2)]
+    return page(
+        f"{len(designs)} designs, {int(designs.good.sum())} of them with all measures",
+        table(_ranges(designs.parameters), ("parameter", "smallest", "largest")),
+        table(measures, ("measure", "unit", "smallest", "largest")),
+        table(reasons, ("design", "reason")) if reasons else "",
+    )
+
+
+def _ranges(columns: Mapping[str, FloatArray]) -> list[Sequence[object]]:
+    """Return the range of each of the first columns, of the numbers that are finite."""
+    rows: list[Sequence[object]] = []
+    for name, values in list(columns.items())[:MOST_ROWS]:
+        known = values[np.isfinite(values)]
+        rows.append((name, *((float(known.min()), float(known.max())) if len(known) else ("none", "none"))))
+    return [*rows, *_more(len(columns), 3)]
 
 
 def _outputs(designs: Designs) -> list[Sequence[object]]:

@@ -184,6 +184,16 @@ def test_designs_show_ranges_and_the_reasons_of_gaps() -> None:
     assert shown.row("1") == ["61", designs.reasons[1]]
 
 
+def test_measures_of_designs_show_ranges_and_reasons() -> None:
+    model = kinfmu.compile(kinfmu.load("jansen_leg"), ["foot.x", "foot.y"])
+    found = kinfmu.measure_designs(model, {"f": [39.4, 5.0, 39.0]}, [Range("stroke", of="foot.x")], crank_angle=TURN)
+    shown = page(found)
+    assert "3 designs, 2 of them with all measures" in shown.text
+    ends = np.nanmin(found["stroke"]), np.nanmax(found["stroke"])
+    assert shown.row("stroke") == ["mm", *(f"{value:.6g}" for value in ends)]
+    assert shown.row("1") == [found.reasons[1]]
+
+
 def test_sensitivities_show_the_largest_derivatives() -> None:
     model = kinfmu.compile(kinfmu.load("jansen_leg"), ["foot.x", "foot.y"])
     found = model.sensitivities(crank_angle=TURN, wrt=["a", "c"])
