@@ -22,7 +22,7 @@ _KEPT = 8  # drawings
 
 @html_of.register
 def mechanism_html(mechanism: Mechanism) -> str:
-    """Return the drawing of a mechanism and the table of its parts; a reason where one cannot be had."""
+    """Return the drawing of a mechanism, or the reason why there is none, and the table of its parts."""
     title = f"{mechanism.name}: {mechanism.title}" if mechanism.title else mechanism.name
     return page(title, picture(lambda: drawing(mechanism), f"Drawing of {title}"), table(_parts(mechanism)))
 
