@@ -62,6 +62,8 @@ from kinfmu.motion import measure_designs as measure_designs
 from kinfmu.run import Run as Run
 from kinfmu.run import Sink as Sink
 from kinfmu.solver.python.status import Status as Status
+from kinfmu.studies import StudyResult as StudyResult
+from kinfmu.studies import study as study
 from kinfmu.sweep import Designs as Designs
 from kinfmu.sweep import Model as Model
 from kinfmu.sweep import Sensitivities as Sensitivities

@@ -9,6 +9,7 @@
     |   |-- AmbiguousStartError the start pose lies where branches cross, so the branch is not defined
     |-- PoseError               a sample is unreachable, or the solver did not converge
     |-- CompilerError           compiling generated C
+    |-- StudyError              running a study, or reading its results
     |-- FmuError                building or stepping an FMU
     |-- LogError                writing or reading a log
     |-- FigureError             drawing a figure
@@ -66,6 +67,10 @@ class PoseError(KinfmuError):
 
 class CompilerError(KinfmuError):
     """Compiling generated C failed, or there is no compiler."""
+
+
+class StudyError(KinfmuError):
+    """Running a study, or reading its results, failed."""
 
 
 class FmuError(KinfmuError):

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.singular import DriverRange
+from kinfmu.analysis.driver_path import follow
+from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.errors import KinfmuError
 from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import MeasuredValue, measure
+from kinfmu.plan import SolvePlan
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
 from kinfmu.sweep import solve
@@ -69,16 +71,32 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
 
 def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[Run, str]:
     """Return the samples of the motion, and what it is as text."""
-    if len(mechanism.drivers) == 1 and ranges and ranges[0].turns is not None:
-        (driver,), turns = mechanism.drivers, ranges[0].turns
-        speed = driver.law.speed if isinstance(driver.law, ConstantSpeed) else 0.0
-        angle, speed_name, _ = driver.inputs()
-        start = float(driver.law.at(mechanism.run.start))
-        angles = start + np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
-        inputs: dict[str, Any] = {angle: angles, speed_name: float(speed) or 1.0}
-        run = solve(mechanism, **inputs)
-        count = "one turn" if turns == 1 else f"{turns} turns"
-        at = f"at {float(speed):.6g} {unit_of(speed_name.quantity, mechanism.length_unit)}"
-        return run, f"{count} of {driver.name} {at if speed else 'at speed 1, so that rates are per rad'}"
-    run = solve(mechanism)
-    return run, f"the run of the file, {axis_of(run).range()}"
+    inputs, over = _cycle(mechanism, ranges)
+    run = solve(mechanism, **inputs)
+    return run, over or f"the run of the file, {axis_of(run).range()}"
+
+
+def driver_cycle(plan: SolvePlan) -> tuple[dict[str, Any], str]:
+    """Return the driver values of one cycle of a single driver, as `solve` takes them, and what it is as text.
+
+    Both are empty if the driver does not turn all the way round.
+
+    Raises:
+        KinfmuError: The driver cannot be followed.
+
+    """
+    return _cycle(plan.mechanism, [driver_range(follow(plan, 0))])
+
+
+def _cycle(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
+    if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
+        return {}, ""
+    (driver,), turns = mechanism.drivers, ranges[0].turns
+    speed = driver.law.speed if isinstance(driver.law, ConstantSpeed) else 0.0
+    angle, speed_name, _ = driver.inputs()
+    start = float(driver.law.at(mechanism.run.start))
+    angles = start + np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
+    count = "one turn" if turns == 1 else f"{turns} turns"
+    at = f"at {float(speed):.6g} {unit_of(speed_name.quantity, mechanism.length_unit)}"
+    over = f"{count} of {driver.name} {at if speed else 'at speed 1, so that rates are per rad'}"
+    return {angle: angles, speed_name: float(speed) or 1.0}, over

@@ -1,4 +1,4 @@
-"""The command line: kinfmu list, new, schema, check, solve, fit, build, simulate, review, export, recover, bench.
+"""The command line: kinfmu list, new, schema, check, solve, fit, study, build, simulate, review, export, recover, bench.
 
 One command per file; importing a file adds its command to the group `main`.
 """
@@ -16,6 +16,7 @@ from kinfmu.cli import (  # noqa: F401  for the commands that they add
     schema,
     simulate,
     solve,
+    study,
 )
 from kinfmu.cli.group import main
 

@@ -14,7 +14,21 @@ from kinfmu import VERSION
 from kinfmu.cli.messages import printable
 from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
 
-ORDER = ("list", "new", "check", "solve", "fit", "build", "simulate", "review", "export", "recover", "schema", "bench")
+ORDER = (
+    "list",
+    "new",
+    "check",
+    "solve",
+    "fit",
+    "study",
+    "build",
+    "simulate",
+    "review",
+    "export",
+    "recover",
+    "schema",
+    "bench",
+)
 
 
 class _Command(click.Command):

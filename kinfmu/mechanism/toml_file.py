@@ -29,7 +29,7 @@ from kinfmu.mechanism.toml_tables import (
     text_of,
 )
 from kinfmu.mechanism.valid import check_name, quoted
-from kinfmu.readings import READINGS
+from kinfmu.readings import READINGS, Reading
 
 LARGEST_FILE = 4_000_000  # [bytes]; a chain of ten thousand links has less
 DEEPEST_KEY = 50  # parts of a dotted key; the time that the standard library takes grows with their square
@@ -162,10 +162,15 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
         coordinates=coordinates,
         parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
         run=_run(table_of(document, "run")),
-        measures=tuple(
-            _member(f"[measures.{name}]", name, reading, READINGS, (), folder)
-            for name, reading in named_tables(document, "measures")
-        ),
+        measures=read_measures(document, folder),
+    )
+
+
+def read_measures(document: Mapping[str, Any], folder: Path | None) -> tuple[Reading, ...]:
+    """Return the measures of the tables [measures.NAME]; a mechanism checks them."""
+    return tuple(
+        _member(f"[measures.{name}]", name, reading, READINGS, (), folder)
+        for name, reading in named_tables(document, "measures")
     )
 
 

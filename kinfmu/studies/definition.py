@@ -1,0 +1,294 @@
+"""Study: which designs are measured, over which motion, by which measures; from a file or from arguments."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu import VERSION, gallery
+from kinfmu.analysis.measuring import driver_cycle
+from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.mechanism import Mechanism, toml_text
+from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.mechanism.valid import quoted
+from kinfmu.motion.needed import needed
+from kinfmu.plan import compile_plan
+from kinfmu.readings import Reading
+from kinfmu.run import FloatArray
+from kinfmu.studies.sampling import METHODS, Sampling
+from kinfmu.studies.variation import Grid, read_variation, whole_number
+from kinfmu.sweep import Model, compile, run_times  # noqa: A004  as re.compile
+from kinfmu.sweep.model import WORTH_COMPILING, require_engine
+
+SAMPLES = 1000  # of sampled parameters, by default
+SEED = 0
+OWN_COLUMNS = DESIGN, STATUS, REASON = "design", "solver.status", "reason"
+_SAMPLES_AT_ONCE = {"native": 1_500_000, "python": 200_000}  # of a part: 0.2 to 2 s
+_MOST, _FEWEST = 4096, 32  # designs of a part
+_PARTS = 32  # at least, so that all cores have work and progress shows
+
+Choice = str | Reading
+
+
+@dataclass(frozen=True, eq=False)
+class StudyMotion:
+    """The motion that every design makes.
+
+    Attributes:
+        t: (n,) times [s], for the laws of the file; None: driver values.
+        inputs: Driver values as `solve` takes them; empty: times.
+        over: What it is, as text.
+
+    """
+
+    t: FloatArray | None
+    inputs: Mapping[str, FloatArray | float]
+    over: str
+
+    def __len__(self) -> int:
+        arrays = [self.t] if self.t is not None else [np.atleast_1d(value) for value in self.inputs.values()]
+        return max(len(array) for array in arrays)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what identifies the motion; long arrays by their hash."""
+        given: dict[str, Any] = dict(self.inputs) if self.t is None else {"t": self.t}
+        return {"over": self.over, **{name: _identified(value) for name, value in given.items()}}
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study: the designs of a mechanism, the motion of each, and what is measured on it.
+
+    Attributes:
+        mechanism: The mechanism with the measures of the study.
+        sampling: The parameters of the designs.
+        motion: The motion that every design makes.
+        engine: 'python' or 'native'.
+        file_text: Text of the study file; '' if there is none.
+
+    """
+
+    mechanism: Mechanism
+    sampling: Sampling
+    motion: StudyMotion
+    engine: str
+    file_text: str = ""
+
+    def __len__(self) -> int:
+        return len(self.sampling)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Names of the measures."""
+        return tuple(reading.name for reading in self.mechanism.measures)
+
+    @cached_property
+    def mechanism_text(self) -> str:
+        """The mechanism as TOML."""
+        return toml_text.text(self.mechanism)
+
+    @cached_property
+    def definition(self) -> dict[str, Any]:
+        """All that the rows of the study follow from, except the mechanism, as plain data."""
+        sampling = self.sampling
+        return {
+            "parameters": {one.name: one.as_json() for one in sampling.variations},
+            "sampling": sampling.method if sampling.sampled else "grid",
+            "samples": sampling.samples,
+            "designs": len(sampling),
+            "seed": sampling.seed,
+            "motion": self.motion.as_json(),
+            "engine": self.engine,
+            "part": self.part_size,
+        }
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of the definition, the mechanism and the version: equal ones give equal rows."""
+        said = json.dumps(self.definition, sort_keys=True)
+        return hashlib.sha256("\n".join((VERSION, said, self.mechanism_text)).encode()).hexdigest()
+
+    @property
+    def part_size(self) -> int:
+        """Number of designs that are measured in one piece; it does not depend on the workers."""
+        fitting = _SAMPLES_AT_ONCE[self.engine] // len(self.motion)
+        wanted = min(fitting, -(-len(self) // _PARTS), _MOST)
+        return max(wanted, min(_FEWEST, fitting), 1)
+
+    @property
+    def parts(self) -> range:
+        """Numbers of the first designs of all parts."""
+        return range(0, len(self), self.part_size)
+
+    def part(self, first: int) -> dict[str, FloatArray]:
+        """Return the parameters of the part that begins with a design, by name."""
+        return self.sampling.values(first, min(self.part_size, len(self) - first))
+
+    def model(self) -> Model:
+        """Return the compiled mechanism, whose arguments are the varied parameters."""
+        names = [one.name for one in self.sampling.variations if one.name in self.mechanism.parameters]
+        outputs = needed(self.mechanism, self.mechanism.measures).coordinates
+        every = replace(self.mechanism, coordinates="all")
+        return compile(every, outputs or None, parameters=names, engine=self.engine)
+
+
+def define(
+    mechanism: Mechanism | str | Path,
+    parameters: Mapping[str, Any],
+    *,
+    measures: Iterable[Choice] | Choice | None = None,
+    sampling: str = METHODS[0],
+    designs: int = SAMPLES,
+    seed: int = SEED,
+    t: ArrayLike | None = None,
+    over: str = "",
+    engine: str = "auto",
+    file_text: str = "",
+    inputs: Mapping[str, ArrayLike] | None = None,
+) -> Study:
+    """Return a study; arguments as `kinfmu.study` has them.
+
+    Args:
+        mechanism: The mechanism, or what `kinfmu.load` takes.
+        parameters: For each parameter a table, as `read_variation` reads it.
+        measures: Names of measures of the mechanism, and measures.
+        sampling: 'sobol' or 'latin_hypercube'.
+        designs: Number of samples.
+        seed: Of the random numbers.
+        t: Times.
+        over: What the motion is, as text.
+        engine: 'auto', 'python' or 'native'.
+        file_text: Text of the study file.
+        inputs: Driver values.
+
+    Raises:
+        RequestError: An argument is invalid.
+        MechanismError: The mechanism, or a table of a parameter, is invalid.
+
+    """
+    if isinstance(mechanism, str | Path):
+        mechanism = gallery.load(mechanism)
+    require_mechanism(mechanism, "study")
+    require_engine(engine)
+    if sampling not in METHODS:
+        raise RequestError(
+            f"sampling = {quoted(sampling)} is not known{suggestion(str(sampling), METHODS)}; known: {listed(METHODS)}"
+        )
+    if not isinstance(parameters, Mapping) or not parameters:
+        raise RequestError("a study needs [parameters]: which of them vary, and how")
+    variations = tuple(
+        read_variation(f"[parameters.{name}]", name, table, mechanism) for name, table in parameters.items()
+    )
+    is_sampled = any(not isinstance(one, Grid) for one in variations)
+    count = whole_number("designs", designs, 1) if is_sampled else 1
+    samples = Sampling(variations, sampling, count, whole_number("seed", seed, 0))
+    whole_number("the number of designs, of all grids and samples together,", len(samples), 1)
+    mechanism = replace(mechanism, measures=_chosen(mechanism, measures))
+    _refuse_equal_names([one.name for one in variations], [reading.name for reading in mechanism.measures])
+    motion = _motion(mechanism, t, inputs or {}, over)
+    constants = [one.name for one in variations if one.name in mechanism.settable.constants]
+    if constants and motion.t is None:
+        raise RequestError(
+            f"{constants[0]} is a constant of a law, which acts over time: give times "
+            f"([run] start, stop and step in a study file) in place of driver values"
+        )
+    if engine == "auto":
+        engine = _engine(len(samples) * len(motion))
+    return Study(mechanism, samples, motion, engine, file_text)
+
+
+def _chosen(mechanism: Mechanism, measures: Iterable[Choice] | Choice | None) -> tuple[Reading, ...]:
+    """Return the measures of a study, each with a name of its own."""
+    own = {reading.name: reading for reading in mechanism.measures}
+    if measures is None:
+        wanted: Sequence[Choice] = list(own)
+    else:
+        wanted = [measures] if isinstance(measures, str | Reading) else list(measures)
+    if not wanted:
+        raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
+    chosen: dict[str, Reading] = {}
+    for one in wanted:
+        if not isinstance(one, str):
+            chosen[one.name] = one
+        elif one in own:
+            chosen[one] = own[one]
+        else:
+            raise RequestError(f"there is no measure '{one}'{suggestion(one, own)}; measures: {listed(own)}")
+    return tuple(chosen.values())
+
+
+def _refuse_equal_names(parameters: Sequence[str], measures: Sequence[str]) -> None:
+    """Raise a RequestError where two columns of the results would have one name."""
+    taken = set(OWN_COLUMNS)
+    for what, names in (("parameter", parameters), ("measure", measures)):
+        for name in names:
+            if name in taken:
+                raise RequestError(f"the {what} '{name}' has the name of another column of the results; rename it")
+            taken.add(name)
+
+
+def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, ArrayLike], over: str) -> StudyMotion:
+    """Return the motion: the times or driver values given, else one cycle of the driver or the run of the file."""
+    if inputs and t is not None:
+        raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+    if t is not None:
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        return StudyMotion(times, {}, over or f"t = {times[0]:.6g} to {times[-1]:.6g} s")
+    if inputs:
+        arrays = {name: _array(name, value) for name, value in inputs.items()}
+        longest = max(arrays, key=lambda name: np.size(arrays[name]))
+        values = np.atleast_1d(arrays[longest])
+        return StudyMotion(None, arrays, over or f"{longest} = {values[0]:.6g} to {values[-1]:.6g}")
+    if len(mechanism.drivers) == 1:
+        try:
+            found, over = driver_cycle(compile_plan(mechanism))
+        except KinfmuError as error:
+            raise type(error)(f"the design as written has no motion: {error}", **error.data) from None
+        if found:
+            return StudyMotion(None, found, over)
+    times = run_times(mechanism.run)
+    return StudyMotion(times, {}, f"the run of the file, t = {times[0]:.6g} to {times[-1]:.6g} s")
+
+
+def _array(name: str, value: ArrayLike) -> FloatArray | float:
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise RequestError(f"{name} must be a number or an array of numbers") from None
+    if array.ndim > 1:
+        raise RequestError(f"{name} must be a number or (n,), not of shape {array.shape}")
+    return array if array.ndim else float(array)
+
+
+def _engine(samples: int) -> str:
+    """Return the engine that pays for so many samples on this machine."""
+    from kinfmu.codegen.c.compiler import command
+
+    if samples < WORTH_COMPILING:
+        return "python"
+    try:
+        command()
+    except KinfmuError:
+        return "python"
+    return "native"
+
+
+def _identified(value: FloatArray | float) -> Any:
+    """Return a number, or what identifies an array."""
+    if not isinstance(value, np.ndarray):
+        return value
+    digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+    return {"from": float(value[0]), "to": float(value[-1]), "samples": len(value), "sha256": digest}
+
+
+def as_request(error: MechanismError) -> RequestError:
+    """Return the error of an argument of a call, in place of that of a file."""
+    return RequestError(str(error), **error.data)

@@ -1,0 +1,79 @@
+"""The picture of a study, by how its parameters vary."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinfmu.draw.contours import contours
+from kinfmu.draw.contributions import Contributed, contributions
+from kinfmu.draw.response import response
+from kinfmu.draw.scatter import MOST_COLUMNS, scatter_matrix
+from kinfmu.draw.study_panels import Quantities
+from kinfmu.draw.writing import check_suffix, write
+from kinfmu.errors import FigureError, StudyError, listed, suggestion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kinfmu.studies.result import StudyResult
+
+
+def draw(result: StudyResult, path: Path, measures: tuple[str, ...]) -> None:
+    """Draw the results of a study into a file; measures: which, default: all."""
+    check_suffix(path)
+    for name in measures:
+        if name not in result.measures:
+            near = suggestion(name, result.measures)
+            raise StudyError(f"the study has no measure '{name}'{near}; measures: {listed(result.measures)}")
+    chosen = measures or result.measures
+    kind = picture_of(result)
+    if kind == "scatter" and len(result.parameters) + len(chosen) > MOST_COLUMNS:
+        raise FigureError(
+            f"{path}: {len(result.parameters)} parameters and {len(chosen)} measures are too many for a scatter "
+            f"matrix, which holds {MOST_COLUMNS}; choose measures with --measures"
+        )
+    write(path, lambda: _drawn(result, kind, chosen))
+
+
+def picture_of(result: StudyResult) -> str:
+    """Return 'response', 'contours', 'contributions' or 'scatter'."""
+    if result.nominal.deviations:
+        return "contributions"
+    grids = ["values" in one for one in result.definition["parameters"].values()]
+    return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
+
+
+def _drawn(result: StudyResult, kind: str, measures: tuple[str, ...]) -> Figure:
+    title = result.mechanism.title or result.mechanism.name
+    if kind == "contributions":
+        return contributions([_contributed(result, name) for name in measures], f"{title}: tolerances")
+    parameters = [_column(result, name) for name in result.parameters]
+    if kind == "contours":
+        grids = [np.array(one["values"]) for one in result.definition["parameters"].values()]
+        x, y = (one._replace(values=grid) for one, grid in zip(parameters, grids, strict=True))
+        sorted_x, sorted_y = np.argsort(x.values), np.argsort(y.values)
+        shape = (len(x.values), len(y.values))
+        fields = [
+            one._replace(values=one.values.reshape(shape)[np.ix_(sorted_x, sorted_y)])
+            for one in (_column(result, name) for name in measures)
+        ]
+        return contours(x._replace(values=x.values[sorted_x]), y._replace(values=y.values[sorted_y]), fields, title)
+    columns = [_column(result, name) for name in measures]
+    if kind == "response":
+        return response(parameters[0], columns, title)
+    return scatter_matrix(parameters, columns, f"{title}: {len(result)} designs")
+
+
+def _column(result: StudyResult, name: str) -> Quantities:
+    return Quantities(name, result.units[name], result[name])
+
+
+def _contributed(result: StudyResult, name: str) -> Contributed:
+    parts = result.nominal.contributions(name)
+    known = parts if np.isfinite(list(parts.values())).all() else {}
+    return Contributed(
+        name, result.units[name], result.nominal.deviation(name), result.statistics[name].deviation, known
+    )

@@ -1,0 +1,141 @@
+"""The parts of a study on disk: each written whole, so that a study that was ended goes on where it was."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from kinfmu.errors import KinfmuError, StudyError
+from kinfmu.files.whole_file import BeingWrittenError, check_is_free, lock_for_writing, replacement
+from kinfmu.studies.definition import Study
+
+SUFFIX = ".parts"
+_MANIFEST = "study.json"
+
+
+class Parts:
+    """The folder FILE.parts next to the results FILE while a study runs.
+
+    Args:
+        target: The file of the results.
+        study: The study.
+        restart: Remove the parts of another study, or of an earlier run.
+
+    Raises:
+        StudyError: The folder belongs to another study, or a run in progress uses it.
+
+    """
+
+    def __init__(self, target: Path, study: Study, *, restart: bool = False) -> None:
+        self.target = target
+        self.folder = folder_of(target)
+        self._study = study
+        self._manifest = self.folder / _MANIFEST
+        self._lock: int | None = None
+        with _as_study_error(self.folder):
+            self.folder.mkdir(exist_ok=True)
+            self._take(restart=restart)
+
+    def _take(self, *, restart: bool) -> None:
+        """Lock the folder and make it that of the study."""
+        try:
+            check_is_free(self._manifest)
+        except BeingWrittenError:
+            raise StudyError(
+                f"{self.folder}: a study in progress writes there; wait for it, or choose another file with -o"
+            ) from None
+        own = {"fingerprint": self._study.fingerprint, **self._study.definition}
+        found = self._said()
+        if restart or found is None:
+            for path in self.folder.glob("part-*"):
+                path.unlink()
+            write_synced(self._manifest, json.dumps(own, indent=1).encode())
+        elif found.get("fingerprint") != own["fingerprint"]:
+            raise StudyError(
+                f"{self.folder} holds parts of another study{_difference(found, own)}; continue that one, choose "
+                f"another file with -o, or remove them with --restart"
+            )
+        else:
+            for path in self.folder.glob(".*"):  # what was being written when the study was killed
+                path.unlink()
+        self._lock = os.open(self._manifest, os.O_RDWR)
+        lock_for_writing(self._lock)
+
+    def _said(self) -> dict[str, Any] | None:
+        """Return what the manifest says; None without one."""
+        try:
+            said = json.loads(self._manifest.read_bytes())
+        except (OSError, ValueError):
+            if any(self.folder.glob("part-*")):
+                return {}
+            return None
+        return said if isinstance(said, dict) else {}
+
+    def __enter__(self) -> Parts:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def path(self, first: int) -> Path:
+        """Return the file of the part that begins with a design."""
+        return self.folder / f"part-{first:010}.parquet"
+
+    def missing(self) -> list[int]:
+        """Return the first designs of the parts that are still to be done."""
+        return [first for first in self._study.parts if not self.path(first).is_file()]
+
+    def write(self, first: int, data: bytes) -> None:
+        """Write a part."""
+        with _as_study_error(self.path(first)):
+            write_synced(self.path(first), data)
+
+    def remove(self) -> None:
+        """Remove the folder, after the results are written."""
+        self.__exit__()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def folder_of(target: Path) -> Path:
+    """Return the folder of the parts of a file of results."""
+    return target.with_name(target.name + SUFFIX)
+
+
+def write_synced(path: Path, data: bytes) -> None:
+    """Write a file whole, and on the disk before it gets its name."""
+    with replacement(path) as temporary, temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def _as_study_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except KinfmuError:
+        raise
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def _difference(found: dict[str, Any], own: dict[str, Any]) -> str:
+    """Return in what two studies differ, as far as their definitions say."""
+    differing = [key for key in own if key != "fingerprint" and found.get(key) != own[key]]
+    if not differing:
+        return " (the mechanism or the version of kinfmu differs)"
+    with suppress(KeyError):
+        return f" ({differing[0]}: {_short(found[differing[0]])} there, {_short(own[differing[0]])} here)"
+    return f" ({differing[0]} differs)"
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

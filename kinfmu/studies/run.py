@@ -1,0 +1,162 @@
+"""`study`: measure many designs of a mechanism, and go on where a study was ended."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from kinfmu import VERSION
+from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError
+from kinfmu.files.whole_file import replacement, suffix_of
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.valid import quoted
+from kinfmu.readings import Reading
+from kinfmu.studies.chunk import Job, run_chunk
+from kinfmu.studies.definition import SAMPLES, SEED, Study, define
+from kinfmu.studies.nominal import nominal
+from kinfmu.studies.parts import Parts
+from kinfmu.studies.result import StudyResult, is_result_of
+from kinfmu.studies.sampling import METHODS
+from kinfmu.studies.table import join, part_bytes, schema_of
+from kinfmu.studies.workers import cores, results
+
+RESULTS = ".parquet"
+Progress = Callable[[int, int], None]
+
+
+def study(
+    mechanism: Mechanism | str | Path,
+    parameters: Mapping[str, Mapping[str, Any]],
+    *,
+    measures: Iterable[Reading | str] | None = None,
+    sampling: str = METHODS[0],
+    designs: int = SAMPLES,
+    seed: int = SEED,
+    t: ArrayLike | None = None,
+    engine: str = "auto",
+    output: str | Path | None = None,
+    workers: int | None = None,
+    dask: str | None = None,
+    restart: bool = False,
+    progress: Progress | None = None,
+    **inputs: ArrayLike,
+) -> StudyResult:
+    """Measure many designs of a mechanism: parameters on a grid, in ranges, or with tolerances.
+
+    The numbers of a design follow from the seed and the number of the design alone, whoever measures it. With `output`,
+    finished parts are kept in a folder next to the file, and a study that was ended goes on from there.
+
+    Args:
+        mechanism: The mechanism, a name of the gallery, or a mechanism file.
+        parameters: For each parameter or law constant that varies, by name, one of the tables
+            {"values": ["18 mm", 20]}, a grid; {"from": 1, "to": 2, "count": 5}, a grid; {"from": 1, "to": 2}, sampled;
+            {"tolerance": 0.1, "distribution": "normal", "deviations": 3}, sampled about the value of the mechanism with
+            a standard deviation of a third of the tolerance; or "uniform". All points of the grids are combined, each
+            with the same samples.
+        measures: Measures such as `kinfmu.readings.Range("stroke", of="slider.x")`, or names of those of the mechanism.
+            Default: those of the mechanism.
+        sampling: 'sobol', scrambled Sobol points, or 'latin_hypercube'.
+        designs: Number of samples. Powers of two suit Sobol points.
+        seed: Of the random numbers.
+        t: (n,) times [s] for the laws of the file. Default, without inputs: one cycle of a single driver that turns all
+            the way round, else the run of the file.
+        engine: 'python', 'native' (generated C) or 'auto', which is native from some hundred designs on.
+        output: The Parquet file of the results. Default: none is kept.
+        workers: Processes on this machine; 1: this process. Default: one for each core.
+        dask: Address of a Dask scheduler, such as 'tcp://host:8786', whose workers have kinfmu installed; 'local': a
+            cluster on this machine. Default: processes.
+        restart: Begin again, without the parts that an earlier run or another study left.
+        progress: Called with the number of designs that are done and of all.
+        **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] and crank_speed=, as in `kinfmu.solve`.
+
+    Returns:
+        The results: a row for each design.
+
+    Raises:
+        RequestError: An argument is invalid.
+        StudyError: The parts on disk belong to another study, workers end unexpectedly, or a file cannot be written.
+        KinfmuError: The design as written cannot be planned.
+        MissingPackageError: `distributed` is not installed.
+
+    """
+    try:
+        defined = define(
+            mechanism,
+            parameters,
+            measures=measures,
+            sampling=sampling,
+            designs=designs,
+            seed=seed,
+            t=t,
+            engine=engine,
+            inputs=inputs,
+        )
+    except MechanismError as error:
+        if isinstance(mechanism, Mechanism):
+            raise RequestError(str(error), **error.data) from None
+        raise
+    return run_study(defined, output, workers=workers, dask=dask, restart=restart, progress=progress)
+
+
+def run_study(
+    study: Study,
+    output: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    dask: str | None = None,
+    restart: bool = False,
+    progress: Progress | None = None,
+) -> StudyResult:
+    """Run a study, or go on with it; arguments as in `study`."""
+    if workers is None:
+        workers = cores()
+    elif isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise RequestError(f"workers = {quoted(workers)} must be a positive whole number")
+    if output is None:
+        with tempfile.TemporaryDirectory(prefix="kinfmu-study-") as folder:
+            path = Path(folder) / f"study{RESULTS}"
+            _run(study, path, workers, dask, progress or _quiet, restart=False)
+            return StudyResult.of_bytes(path.read_bytes())
+    path = Path(output)
+    if suffix_of(path) != RESULTS:
+        raise RequestError(f"{path}: results are written as Parquet; the name must end in {RESULTS}")
+    if not path.parent.is_dir():
+        raise RequestError(f"{path}: there is no folder '{path.parent}'")
+    if restart or not is_result_of(path, study):
+        _run(study, path, workers, dask, progress or _quiet, restart=restart)
+    return StudyResult.read(path)
+
+
+def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Progress, *, restart: bool) -> None:
+    """Measure the parts that are missing, and join all parts."""
+    if find_spec("pyarrow") is None:  # else the study would end after its first part
+        raise MissingPackageError("a study needs pyarrow: pip install pyarrow")
+    with Parts(path, study, restart=restart) as parts:
+        job = Job.of(study)
+        schema = schema_of(study, nominal(study, job))
+        missing = parts.missing()
+        size = study.part_size
+        done = sum(min(size, len(study) - first) for first in set(study.parts) - set(missing))
+        progress(done, len(study))
+        packed = job.packed()
+        for first, columns in results(
+            run_chunk, lambda first: (packed, VERSION, study.part(first)), missing, workers, dask
+        ):
+            parts.write(first, part_bytes(schema, first, columns))
+            done += min(size, len(study) - first)
+            progress(done, len(study))
+        try:
+            with replacement(path) as temporary:
+                join(schema, (parts.path(first) for first in study.parts), temporary)
+        except OSError as error:
+            raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
+        parts.remove()
+
+
+def _quiet(_done: int, _count: int) -> None:
+    """Show no progress."""

@@ -1,0 +1,96 @@
+"""The summary of a study as text and as HTML."""
+
+from __future__ import annotations
+
+from html import escape
+from math import isfinite
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from kinfmu.studies.result import StudyResult
+
+MOST_CONTRIBUTIONS = 5  # of a measure
+_HEADER = ("measure", "unit", "nominal", "mean", "deviation", "min", "max", "failures")
+_FIRST_ORDER = "first order"
+
+
+def summary(result: StudyResult) -> str:
+    """Return the summary table of a study, and for tolerances what each contributes."""
+    lines = [about(result), "", *_aligned(_rows(result))]
+    if result.nominal.reason:
+        lines += ["", f"the design as written has no numbers: {result.nominal.reason}"]
+    if result.nominal.deviations:
+        lines += ["", "contributions to the variance, to first order:"]
+        lines += _aligned([_contributions(result, name) for name in result.measures], left=3)
+    failures = result.failures
+    if failures:
+        first = min(failures)
+        lines += [
+            "",
+            f"{len(failures)} of {len(result)} designs lack a measure, the first is design {first}: {failures[first]}",
+        ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def html(result: StudyResult) -> str:
+    """Return the summary table as HTML, for notebooks."""
+    head, *rows = _rows(result)
+    cells = "".join(f"<th>{escape(text)}</th>" for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows)
+    return f"<p>{escape(about(result))}</p><table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def about(result: StudyResult) -> str:
+    """Return what was studied, as a line."""
+    said = result.definition
+    how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[said["sampling"]]
+    seed = "" if said["sampling"] == "grid" else f", seed {said['seed']}"
+    varied = ", ".join(result.parameters)
+    return f"{result.mechanism.name}: {len(result)} designs ({how}{seed}) over {varied}; {said['motion']['over']}"
+
+
+def _rows(result: StudyResult) -> list[tuple[str, ...]]:
+    has_tolerances = bool(result.nominal.deviations)
+    header = list(_HEADER)
+    if has_tolerances:
+        header.insert(5, _FIRST_ORDER)
+    rows = [tuple(header)]
+    for name in result.measures:
+        found = result.statistics[name]
+        row = [name, result.units[name], _short(result.nominal.measures[name].value), _short(found.mean)]
+        row.append(_short(found.deviation, 4))
+        if has_tolerances:
+            row.append(_short(result.nominal.deviation(name), 4))
+        rows.append((*row, _short(found.low), _short(found.high), str(found.missing)))
+    return rows
+
+
+def _contributions(result: StudyResult, measure: str) -> tuple[str, ...]:
+    """Return a line: the largest contributions to a measure, and how its derivatives were found."""
+    found = result.nominal.contributions(measure)
+    method = f"(by {result.nominal.measures[measure].method})"
+    if not all(map(isfinite, found.values())):
+        return measure, "unknown: a design next to the one as written lacks the measure", method
+    shown = [f"{name} {100.0 * part:.1f} %" for name, part in found.items()]
+    others = len(shown) - MOST_CONTRIBUTIONS
+    if others > 1:
+        rest = sum(list(found.values())[MOST_CONTRIBUTIONS:])
+        shown = [*shown[:MOST_CONTRIBUTIONS], f"{others} others {100.0 * rest:.1f} %"]
+    return measure, ", ".join(shown), method
+
+
+def _short(number: float, digits: int = 6) -> str:
+    return f"{number:.{digits}g}" if isfinite(number) else "-"
+
+
+def _aligned(rows: list[tuple[str, ...]], left: int = 2) -> list[str]:
+    """Return rows as lines with columns of equal width; the first columns are aligned to the left, others right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  "
+        + "  ".join(
+            text.ljust(width) if k < left else text.rjust(width)
+            for k, (text, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    ]

@@ -1,0 +1,147 @@
+"""The rows of a study: its designs, and the measures of each."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, qmc
+
+import kinfmu
+from kinfmu.errors import StudyError
+from kinfmu.readings import Minimum, Range
+from kinfmu.studies import StudyResult
+from kinfmu.studies.definition import define
+from kinfmu.studies.sampling import Sampling
+from kinfmu.studies.variation import Interval, Tolerance
+from tests.studies.linkage import RANGES, linkage, swing
+
+
+def test_measures_are_those_of_the_closed_form_and_of_single_calls() -> None:
+    found = kinfmu.study(linkage(), RANGES, designs=20, seed=3, workers=1)
+    closed = [swing(crank, 50.0, base) for crank, base in zip(found["crank"], found["base"], strict=True)]
+    assert np.abs(found["swing"] - closed).max() < 1e-9
+    angles = np.linspace(0.0, 2.0 * np.pi, 361)
+    model = kinfmu.compile(linkage())
+    for k in (0, 7, 19):
+        run = model.solve(
+            crank_angle=angles, crank_speed=np.pi, parameters={"crank": found["crank"][k], "base": found["base"][k]}
+        )
+        for name, one in kinfmu.measure(run).items():
+            assert found[name][k] == pytest.approx(one.value, rel=1e-11)
+            columns = [f"{name}.at", f"{name}.at2"][: len(one.at)]
+            assert [found[column][k] for column in columns] == pytest.approx(one.at, abs=1e-7)
+
+
+def test_grids_are_combined_with_the_last_one_fastest_and_each_point_with_the_same_samples() -> None:
+    parameters = {
+        "base": {"values": ["40 mm", 45, "5 cm"]},
+        "crank": {"from": 15, "to": 25, "count": 2},
+        "rocker": {"tolerance": "0.1 mm"},
+    }
+    study = define(linkage(), parameters, designs=4)
+    values = study.sampling.values(0, len(study))
+    rows = list(itertools.product([40.0, 45.0, 50.0], [15.0, 25.0], range(4)))
+    assert len(study) == len(rows) == 24
+    assert list(zip(values["base"], values["crank"], strict=True)) == [row[:2] for row in rows]
+    assert np.array_equal(values["rocker"].reshape(6, 4), np.tile(values["rocker"][:4], (6, 1)))
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_the_numbers_of_a_design_do_not_depend_on_the_part_it_is_in(method: str) -> None:
+    variations = (Interval("a", "mm", 1.0, 2.0), Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0))
+    sampling = Sampling(variations, method, 1000, 5)
+    whole = sampling.values(0, 1000)
+    for first, count in ((0, 1), (1, 1), (3, 64), (511, 2), (512, 488)):
+        part = Sampling(variations, method, 1000, 5).values(first, count)
+        for name in whole:
+            assert np.array_equal(part[name], whole[name][first : first + count])
+    other = Sampling(variations, method, 1000, 6).values(0, 1000)
+    assert not np.array_equal(other["a"], whole["a"])
+
+
+def test_samples_have_their_distributions_and_fill_the_space_evenly() -> None:
+    variations = (
+        Interval("a", "mm", 1.0, 2.0),
+        Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0),
+        Tolerance("c", "mm", 3.0, 0.3, "uniform", 3.0),
+    )
+    for method in ("sobol", "latin_hypercube"):
+        found = Sampling(variations, method, 1024, 1).values(0, 1024)
+        assert kstest(found["a"], "uniform", (1.0, 1.0)).statistic < 2e-3
+        assert kstest(found["b"], "norm", (3.0, 0.1)).statistic < 2e-3
+        assert kstest(found["c"], "uniform", (2.7, 0.6)).statistic < 2e-3
+        assert variations[2].deviation == pytest.approx(found["c"].std(), rel=2e-3)
+        points = np.column_stack([found["a"] - 1.0, (found["c"] - 2.7) / 0.6])
+        evenness = qmc.discrepancy(points)
+        assert evenness < 0.2 * qmc.discrepancy(np.random.default_rng(1).random((1024, 2)))
+
+
+def test_a_design_that_does_not_close_has_no_numbers_and_a_reason() -> None:
+    found = kinfmu.study(linkage(), {"base": {"values": [40, 300, 45]}}, workers=1)
+    assert list(found.failures) == [1]
+    assert np.isfinite(found["swing"]).tolist() == [True, False, True] == found.good().tolist()
+    assert (found["solver.status"] >= 3).tolist() == [False, True, False]
+    assert found.statistics["swing"].missing == 1
+    assert "1 of 3 designs lack a measure, the first is design 1: " in str(found)
+
+
+def test_measures_of_the_call_and_times_and_law_constants() -> None:
+    measures = [Range("height", of="coupler.y"), "swing", Minimum("slowest", of="rocker.omega")]
+    t = np.linspace(0.0, 2.0, 181)
+    found = kinfmu.study(
+        linkage(), {"crank.speed": {"values": ["30 rpm", "60 rpm"]}}, measures=measures, t=t, workers=1
+    )
+    assert found.measures == ("height", "swing", "slowest")
+    assert (found.units["crank.speed"], found.units["slowest"]) == ("rad/s", "rad/s")
+    assert found["slowest"][1] == pytest.approx(2.0 * found["slowest"][0], rel=1e-7)
+
+
+def test_the_file_says_what_it_was_made_from(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    found = kinfmu.study(linkage(), RANGES, designs=8, seed=4, output=path, workers=1)
+    assert [one.name for one in tmp_path.iterdir()] == ["rows.parquet"]
+    again = StudyResult.read(path)
+    assert again.definition == found.definition
+    assert (again.definition["seed"], again.definition["designs"]) == (4, 8)
+    assert again.mechanism.parameters == linkage().parameters
+    assert again.version == kinfmu.VERSION
+    assert (again.units["crank"], again.units["swing"], again.units["swing.at2"]) == ("mm", "rad", "rad")
+    frame = again.to_pandas()
+    assert frame.attrs["units"]["fastest"] == "rad/s"
+    assert frame["design"].tolist() == list(range(8)) == again.to_polars()["design"].to_list()
+    assert np.array_equal(frame["swing"], found["swing"])
+    with pytest.raises(StudyError, match="no column 'swin'; did you mean 'swing'"):
+        again["swin"]
+
+
+def test_a_finished_study_is_not_measured_again(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    kinfmu.study(linkage(), RANGES, designs=8, output=path, workers=1)
+    calls: list[int] = []
+    again = kinfmu.study(
+        linkage(), RANGES, designs=8, output=path, workers=1, progress=lambda *done: calls.extend(done)
+    )
+    assert (calls, len(again)) == ([], 8)
+    other = kinfmu.study(linkage(), RANGES, designs=9, output=path, workers=1)
+    assert len(other) == 9
+
+
+def test_it_shows_itself_in_notebooks() -> None:
+    found = kinfmu.study(linkage(), {"base": {"from": 40, "to": 50, "count": 3}}, workers=1)
+    page = found._repr_html_()
+    assert page.count("<tr>") == 3
+    assert "<td>swing</td><td>rad</td>" in page
+    assert repr(found) == "<Study of hoeken: 3 designs; swing, fastest>"
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    other = tmp_path / "run.parquet"
+    kinfmu.log.write_table(kinfmu.solve(linkage(), crank_angle=[0.0, 0.1]), other)
+    with pytest.raises(StudyError, match="not the results of a study"):
+        StudyResult.read(other)
+    other.write_bytes(b"PAR1")
+    with pytest.raises(StudyError, match="cannot be read"):
+        StudyResult.read(other)
