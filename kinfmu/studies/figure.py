@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError, StudyError, listed, suggestion
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from kinfmu.studies.result import StudyResult
 
 
@@ -46,7 +44,8 @@ def picture_of(result: StudyResult) -> str:
     return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
 
 
-def _drawn(result: StudyResult, kind: str, measures: tuple[str, ...]) -> Figure:
+def _drawn(result: StudyResult, kind: str, measures: tuple[str, ...]) -> Any:
+    """Return the Figure of matplotlib."""
     title = result.mechanism.title or result.mechanism.name
     if kind == "contributions":
         return contributions([_contributed(result, name) for name in measures], f"{title}: tolerances")

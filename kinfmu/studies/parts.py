@@ -16,6 +16,7 @@ from kinfmu.studies.definition import Study
 
 SUFFIX = ".parts"
 _MANIFEST = "study.json"
+_END = b"PAR1"  # of a Parquet file
 
 
 class Parts:
@@ -90,7 +91,7 @@ class Parts:
 
     def missing(self) -> list[int]:
         """Return the first designs of the parts that are still to be done."""
-        return [first for first in self._study.parts if not self.path(first).is_file()]
+        return [first for first in self._study.parts if not _is_whole(self.path(first))]
 
     def write(self, first: int, data: bytes) -> None:
         """Write a part."""
@@ -101,6 +102,16 @@ class Parts:
         """Remove the folder, after the results are written."""
         self.__exit__()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _is_whole(path: Path) -> bool:
+    """Return True for a part that is there, up to the mark at its end."""
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(_END), os.SEEK_END)
+            return file.read() == _END
+    except OSError:
+        return False
 
 
 def folder_of(target: Path) -> Path:

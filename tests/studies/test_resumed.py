@@ -1,0 +1,124 @@
+"""A study that is killed goes on where it was, and its rows are the same."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import kinfmu
+from kinfmu.errors import StudyError
+from kinfmu.studies import read_study, run_study
+from tests.studies.linkage import RANGES, linkage, write
+
+STUDY = """
+mechanism = "hoeken.toml"
+designs = 480
+report = ["swing"]
+run = { from = "0 deg", to = "360 deg", samples = 91 }
+parameters.crank = { from = "15 mm", to = "25 mm" }
+parameters.base = { tolerance = "0.3 mm" }
+"""
+COMMAND = [sys.executable, "-m", "kinfmu", "study", "study.toml", "--workers", "2", "--engine", "python"]
+
+
+def killed(folder: Path, parts: int) -> int:
+    """Run the study until so many of its parts are written, and kill it; return how many there are then."""
+    process = subprocess.Popen(COMMAND, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    end = time.monotonic() + 120.0
+    while len(list(folder.glob("study.parquet.parts/part-*"))) < parts and time.monotonic() < end:
+        assert process.poll() is None
+        time.sleep(0.002)
+    process.kill()
+    process.wait()
+    return len(list(folder.glob("study.parquet.parts/part-*")))
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="counts processes in /proc")
+def test_a_study_that_is_killed_twice_has_the_same_rows(tmp_path: Path) -> None:
+    path = write(tmp_path, STUDY)
+    assert 2 <= killed(tmp_path, 2) < 15
+    assert 5 <= killed(tmp_path, 5) < 15
+    ended = subprocess.run(COMMAND, cwd=tmp_path, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert {one.name for one in tmp_path.iterdir()} == {"hoeken.toml", "study.toml", "study.parquet"}
+    alone = tmp_path / "alone.parquet"
+    run_study(read_study(path, engine="python"), alone, workers=1)
+    assert (tmp_path / "study.parquet").read_bytes() == alone.read_bytes()
+    end = time.monotonic() + 20.0
+    while _processes_in(tmp_path) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not _processes_in(tmp_path), "workers of a killed study are left"
+
+
+def _processes_in(folder: Path) -> list[str]:
+    """Return the processes whose working folder this is."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if (process / "cwd").resolve() == folder.resolve() and "zombie" not in (process / "status").read_text():
+                found.append(process.name)
+        except OSError:  # ended meanwhile, or of another user
+            continue
+    return found
+
+
+def interrupted(path: Path, designs: int = 160) -> None:
+    """Leave a study after its second part, as Ctrl-C does."""
+
+    def stop(done: int, _count: int) -> None:
+        if done >= 64:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        kinfmu.study(linkage(), RANGES, measures="swing", designs=designs, output=path, workers=1, progress=stop)
+
+
+def test_parts_that_are_whole_are_kept_and_damaged_ones_measured_again(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    interrupted(path)
+    folder = tmp_path / "rows.parquet.parts"
+    (folder / ".part-0000000064.12345678.parquet").write_bytes(b"half")
+    begins: list[int] = []
+    (folder / "part-0000000032.parquet").write_bytes(b"damaged")
+    found = kinfmu.study(
+        linkage(),
+        RANGES,
+        measures="swing",
+        designs=160,
+        output=path,
+        workers=1,
+        progress=lambda done, _: begins.append(done),
+    )
+    assert begins[0] == 32
+    assert found["design"].tolist() == list(range(160))
+    assert not folder.exists()
+
+
+def test_parts_of_another_study_are_refused_until_they_are_removed(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    interrupted(path)
+    again = {"measures": "swing", "output": path, "workers": 1}
+    with pytest.raises(StudyError) as error:
+        kinfmu.study(linkage(), RANGES, designs=170, **again)  # type: ignore[arg-type]
+    assert str(error.value) == (
+        f"{path}.parts holds parts of another study (samples: 160 there, 170 here); continue that one, choose another "
+        f"file with -o, or remove them with --restart"
+    )
+    with pytest.raises(StudyError, match=r"another study \(the mechanism or the version of kinfmu differs\)"):
+        kinfmu.study(linkage().with_parameters({"rocker": 51}), RANGES, designs=160, **again)  # type: ignore[arg-type]
+    found = kinfmu.study(linkage(), RANGES, designs=170, restart=True, **again)  # type: ignore[arg-type]
+    assert len(found) == 170
+
+
+def test_two_commands_do_not_run_one_study_at_the_same_time(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+
+    def begin_again(_done: int, _count: int) -> None:
+        with pytest.raises(StudyError, match="a study in progress writes there"):
+            kinfmu.study(linkage(), RANGES, designs=32, output=path, workers=1)
+
+    kinfmu.study(linkage(), RANGES, designs=32, output=path, workers=1, progress=begin_again)
