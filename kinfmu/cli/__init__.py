@@ -1,4 +1,4 @@
-"""The command line: kinfmu list, new, schema, check, solve, fit, study, build, simulate, review, export, recover, bench.
+"""The command line, `kinfmu`: `list`, `new`, `check`, `solve`, `fit`, `study` and others.
 
 One command per file; importing a file adds its command to the group `main`.
 """
