@@ -103,6 +103,11 @@ class Host:
         function = self.fmu.getDirectionalDerivative
         return list(function(self.of(*unknowns), self.of(*knowns), list(seed)))
 
+    def adjoint(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> list[float]:
+        """Adjoint derivatives, which FMI 3.0 has."""
+        known = self.of(*knowns)
+        return list(self.fmu.getAdjointDerivative(self.of(*unknowns), known, list(seed), len(known)))
+
     def state(self) -> Any:
         return self.fmu.getFMUstate() if self.fmi == 2 else self.fmu.getFMUState()
 

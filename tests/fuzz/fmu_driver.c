@@ -584,6 +584,33 @@ static void directional(host *h, slot *s)
     free(slope);
 }
 
+#if FMI == 3
+static void adjoint(host *h, slot *s)
+{
+    const size_t n = a_count(h) % 8, m = a_count(h) % 8;
+    bool wrong_u = false, wrong_k = false, miscounted = false;
+    unsigned *const unknowns = references(h, n), *const knowns = references(h, m);
+    double *const seed = numbers(h, n), *const slope = array_of(m, sizeof *slope);
+    unsigned *const given_u = or_null(h, unknowns, &wrong_u), *const given_k = or_null(h, knowns, &wrong_k);
+    size_t k;
+    int answer;
+    for (k = 0; k < m && !one_in(h, 6); ++k) {
+        knowns[k] = 1u + below(h, 3 * KF_DRIVERS);
+    }
+    answer = fmi3GetAdjointDerivative(s->c, given_u, n, given_k, m, or_null(h, seed, &wrong_u),
+                                      other_count(h, n, &miscounted), or_null(h, slope, &wrong_k),
+                                      other_count(h, m, &miscounted));
+    refused(h, answer, (wrong_u && n) || (wrong_k && m) || miscounted);
+    if (answer == OK) {
+        note(h, slope, m * sizeof *slope);
+    }
+    free(unknowns);
+    free(knowns);
+    free(seed);
+    free(slope);
+}
+#endif
+
 static int an_order(host *h)
 {
     static const int odd[] = {0, -1, 4, 2147483647, -2147483647 - 1};
@@ -831,7 +858,7 @@ static void modes(host *h, slot *s)
     case 12:
         answered(h, fmi3GetNumberOfVariableDependencies(s->c, reference(h), NULL));
         answered(h, fmi3GetVariableDependencies(s->c, reference(h), NULL, NULL, NULL, NULL, 3));
-        answered(h, fmi3GetAdjointDerivative(s->c, NULL, 1, NULL, 1, NULL, 1, NULL, 1));
+        adjoint(h, s);
         answered(h, fmi3ActivateModelPartition(s->c, reference(h), number(h)));
         answered(h, fmi3EnterConfigurationMode(s->c));
         answered(h, fmi3ExitConfigurationMode(s->c));

@@ -43,10 +43,10 @@ CAPABILITIES: dict[FmiVersion, dict[str, dict[str, float | bool]]] = {
     "3.0": {
         "ModelExchange": _COMMON
         | {"canGetAndSetFMUState": True, "canSerializeFMUState": True, "providesDirectionalDerivatives": True}
-        | {"providesAdjointDerivatives": False, "needsCompletedIntegratorStep": True},
+        | {"providesAdjointDerivatives": True, "needsCompletedIntegratorStep": True},
         "CoSimulation": _COMMON
         | {"canGetAndSetFMUState": True, "canSerializeFMUState": True, "providesDirectionalDerivatives": True}
-        | {"providesAdjointDerivatives": False, "canHandleVariableCommunicationStepSize": True}
+        | {"providesAdjointDerivatives": True, "canHandleVariableCommunicationStepSize": True}
         | {"maxOutputDerivativeOrder": 2, "hasEventMode": False},
     },
 }

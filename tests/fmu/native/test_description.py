@@ -64,10 +64,11 @@ def test_both_kinds_of_simulation_declare_their_capabilities(root: ET.Element, f
     can = ["canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"]
     if fmi == 3:
         can = ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"]
+        can.append("providesAdjointDerivatives")
     for kind in ("CoSimulation", "ModelExchange"):
         element = root.find(kind)
         assert element is not None
-        assert [element.get(name) for name in can] == ["true"] * 3
+        assert [element.get(name) for name in can] == ["true"] * len(can)
         assert element.get("needsExecutionTool") == element.get("canBeInstantiatedOnlyOncePerProcess") == "false"
         assert re.fullmatch(r"[A-Za-z_]\w*", element.get("modelIdentifier", ""))
     simulation = root.find("CoSimulation")

@@ -105,7 +105,9 @@ def test_arrays_that_are_null_are_an_error(start: Start, fmi: int) -> None:
         assert call(host, "GetBooleanStatus", 3, None) == ERROR
     else:
         assert call(host, directional, None, one, references, one, values, *counts) == ERROR
-        assert call(host, directional, references, one, None, one, values, one, values, one) == ERROR
+        for name in (directional, "GetAdjointDerivative"):
+            assert call(host, name, references, one, None, one, values, one, values, one) == ERROR
+            assert call(host, name, references, one, references, one, None, one, values, one) == ERROR
         assert call(host, "GetOutputDerivatives", references, one, None, values, one) == ERROR
     on = ctypes.c_int(1) if fmi == 2 else ctypes.c_bool(True)
     assert call(host, "SetDebugLogging", on, one, None) == ERROR

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ import kinfmu
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.native.sources import HEADERS, headers
 from kinfmu.solver.python.status import Status
+from tests import oracle
 from tests.fmu.conftest import Build, Start
 from tests.fmu.host import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, WARNING, Host, answer
-from tests.fmu.test_parameters import OTHERS, linkage
+from tests.fmu.test_parameters import LENGTHS, OTHERS, linkage
+from tests.oracle import Motion, mp
+from tests.sweep.test_sensitivities import Form, exact_derivative
 
 COUPLER = ("coupler.x", "coupler.vx", "coupler.ax")
 UNIT_INPUTS = ("crank_angle", "crank_speed", "crank_acceleration")
@@ -133,6 +137,72 @@ def test_directional_derivative_with_respect_to_a_law_s_constant(start: Start) -
     assert slopes == pytest.approx([-2.0 * math.sin(u), -math.sin(u) - 2.0 * speed * math.cos(u)], abs=1e-11)
     host.fmu.exitInitializationMode()  # it is tunable: the slope is there later, too
     assert host.slopes(["coupler.x", "coupler.vx"], ["crank.speed"], [1.0]) == slopes
+
+
+def _exact(form: Form, numbers: dict[str, Any], names: Sequence[str]) -> np.ndarray[Any, Any]:
+    """Derivatives of the angles of crank, coupler and rocker and of their speeds in 50 digits, (6, names)."""
+    found = [exact_derivative(form, numbers, name).rounded() for name in names]
+    return np.stack([np.concatenate([one.q[0], one.qd[0]]) for one in found], axis=1)
+
+
+ANGLES = ("crank.phi", "coupler.phi", "rocker.phi", "crank.omega", "coupler.omega", "rocker.omega")
+
+
+def test_derivatives_with_respect_to_fixed_parameters_are_exact_in_initialization(start: Start, fmi: int) -> None:
+    """Directional ones, and adjoint ones in FMI 3.0, which are refused with the name later."""
+    host = start(linkage(), initialize=False)
+    host.enter(0.0)
+    host.set({"crank_angle": 1.2, "crank_speed": 1.1})
+    exact = _exact(oracle.fourbar, dict(LENGTHS) | {"u": [1.2], "ud": 1.1}, list(LENGTHS))
+    for name, column in zip(LENGTHS, exact.T, strict=True):
+        np.testing.assert_allclose(host.slopes(ANGLES, [name], [1.0]), column, rtol=0, atol=1e-10)
+    along = np.array([0.3, -1.2, 0.5, 2.0])
+    np.testing.assert_allclose(host.slopes(ANGLES, list(LENGTHS), along.tolist()), exact @ along, rtol=0, atol=2e-10)
+    weights = np.array([1.0, -0.5, 2.0, 0.3, 0.7, -1.1])
+    if fmi == 3:
+        found = host.adjoint(ANGLES, list(LENGTHS), weights.tolist())
+        np.testing.assert_allclose(found, weights @ exact, rtol=0, atol=1e-9)
+    host.fmu.exitInitializationMode()
+    calls = [(host.slopes, [1.0])] + ([(host.adjoint, weights.tolist())] if fmi == 3 else [])
+    for function, seed in calls:
+        assert answer(function, ANGLES, ["coupler"], seed) == ERROR
+        assert "no directional derivative along coupler (value reference" in host.messages[-1][1]
+
+
+def test_derivatives_with_respect_to_tunable_parameters_are_exact(start: Start, fmi: int) -> None:
+    host = start(linkage(), "time", initialize=False)
+    host.enter(0.0)
+    host.fmu.exitInitializationMode()
+    assert host.step(0.0, 0.7) == OK
+    constants = ["crank.start", "crank.speed"]
+    given = dict(zip(("start", "speed"), host.get(*constants), strict=True))
+    t = mp.mpf(0.7)
+
+    def form(start: Any, speed: Any) -> Motion:
+        return oracle.fourbar(**LENGTHS, u=[mp.mpf(start) + mp.mpf(speed) * t], ud=speed)
+
+    exact = _exact(form, given, ["start", "speed"])
+    for name, column in zip(constants, exact.T, strict=True):
+        np.testing.assert_allclose(host.slopes(ANGLES, [name], [1.0]), column, rtol=0, atol=1e-11)
+    if fmi == 3:
+        weights = [1.0, -0.5, 2.0, 0.3, 0.7, -1.1]
+        np.testing.assert_allclose(host.adjoint(ANGLES, constants, weights), weights @ exact, rtol=0, atol=1e-10)
+        speeds = host.slopes(ANGLES, ["time"], [1.0])
+        found = host.adjoint(ANGLES, ["time", "solver.tolerance"], weights)
+        assert found == pytest.approx([np.dot(weights, speeds), 0.0], rel=1e-12, abs=1e-15)
+
+
+def test_invalid_adjoint_derivatives_are_refused(start: Start, fmi: int) -> None:
+    if fmi == 2:
+        return
+    host = start()
+    assert host.adjoint([], ["crank_angle"], []) == [0.0]
+    assert answer(host.adjoint, ["coupler.x"], ["crank_angle"], [math.inf]) == ERROR
+    assert "no adjoint derivative of coupler.x (value reference" in host.messages[-1][1]
+    assert answer(host.adjoint, ["coupler.x"], ["crank_angle"], [1.0, 2.0]) == ERROR
+    assert "1 value references, but 2 values" in host.messages[-1][1]
+    assert answer(host.adjoint, ["crank_angle"], ["crank_angle"], [1.0]) == ERROR
+    assert "crank_angle (value reference 1) has no directional derivative" in host.messages[-1][1]
 
 
 def test_variables_without_directional_derivative_are_refused_by_name(start: Start) -> None:

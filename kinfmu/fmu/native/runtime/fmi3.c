@@ -1,6 +1,8 @@
 /* FMI 3.0, co-simulation and model exchange: all functions of the standard, over instance.h. */
 #include "instance.h"
 
+#include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -212,11 +214,43 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return (fmi3Status)answer;
 }
 
+/* sensitivity = seed J, a column of J at a time: the directional derivatives of all unknowns along one known. */
+static kf_answer adjoint(kf_instance *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
+                         size_t known_count, const double *seed, double *sensitivity)
+{
+    const double one = 1.0;
+    double *const column = unknown_count < SIZE_MAX / sizeof *column ? malloc((unknown_count + 1) * sizeof *column) : NULL;
+    kf_answer answer = column == NULL ? kf_answered(instance, KF_ERROR, "getAdjointDerivative: out of memory") : KF_DONE;
+    size_t k, j;
+    for (j = 0; answer == KF_DONE && j < unknown_count; ++j) {
+        if (!isfinite(seed[j])) {
+            answer = kf_answered(instance, KF_ERROR, "no adjoint derivative of %s (value reference %u) by %g",
+                                 kf_name_of(unknowns[j]), unknowns[j], seed[j]);
+        }
+    }
+    for (k = 0; answer == KF_DONE && k < known_count; ++k) {
+        answer = kf_directional(instance, unknowns, unknown_count, &knowns[k], 1, &one, column);
+        sensitivity[k] = 0.0;
+        for (j = 0; answer == KF_DONE && j < unknown_count; ++j) {
+            sensitivity[k] += seed[j] * column[j];
+        }
+    }
+    free(column);
+    return answer;
+}
+
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    return unsupported(instance, "getAdjointDerivative: there are none; getDirectionalDerivative has the others");
+    kf_answer answer = check(instance, unknowns, nUnknowns, seed, nSeed);
+    if (answer == KF_DONE) {
+        answer = check(instance, knowns, nKnowns, sensitivity, nSensitivity);
+    }
+    if (answer == KF_DONE) {
+        answer = adjoint(common(instance), unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+    }
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
