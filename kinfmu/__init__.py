@@ -10,7 +10,8 @@ Names are imported when first used, so that `import kinfmu` takes a few millisec
 in `__init__.pyi`, which type checkers and editors read as well.
 """
 
-VERSION = "0.1.0"
+from kinfmu.version import VERSION
+
 __version__ = VERSION
 
 

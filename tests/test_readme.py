@@ -88,5 +88,5 @@ def _rows(text: str) -> list[list[str]]:
 
 def test_the_version_is_typed_once() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "kinfmu.VERSION"}
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "kinfmu.version.VERSION"}
     assert kinfmu.__version__ == kinfmu.VERSION

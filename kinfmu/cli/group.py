@@ -10,9 +10,9 @@ from typing import Any, NoReturn
 
 import click
 
-from kinfmu import VERSION
 from kinfmu.cli.messages import printable
 from kinfmu.errors import AssemblyError, KinfmuError, MechanismError, RequestError
+from kinfmu.version import VERSION
 
 ORDER = (
     "list",

@@ -14,6 +14,7 @@ from kinfmu.fmu.interface import DRIVES, Drive
 from kinfmu.laws import External
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
+from kinfmu.version import VERSION
 
 FLAVOURS = ("python", "native")
 FMI_VERSIONS: dict[int, FmiVersion] = {2: "2.0", 3: "3.0"}
@@ -62,7 +63,6 @@ def build(
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
-    from kinfmu import VERSION
     from kinfmu.plan import compile_plan
 
     path = _file(path, mechanism.name)

@@ -23,7 +23,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinfmu import VERSION
 from kinfmu.errors import MechanismError
 from kinfmu.log.cdr import NANOSECONDS, nanoseconds, zero_of
 from kinfmu.log.mcap_writer import McapWriter
@@ -34,6 +33,7 @@ from kinfmu.run import Event, Run
 from kinfmu.run.axis import axis_of
 from kinfmu.run.channels import is_drawn, select
 from kinfmu.run.verdict import sentence, status_events, unexplained
+from kinfmu.version import VERSION
 
 ROWS = 4096  # samples in a chunk of a complete run; larger chunks take more memory, smaller ones more time
 LARGEST_CHUNK = 2**26  # [bytes]; readers refuse what unpacks to more than twice that

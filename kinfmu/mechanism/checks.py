@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
@@ -12,81 +12,103 @@ from kinfmu.measures import Measure
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
-from kinfmu.mechanism.members import path_text
+from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
+from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.readings import Reading
 from kinfmu.readings.extremes import PeakAcceleration, PeakSpeed
 from kinfmu.units import METRES, CoordinateName
 
-if TYPE_CHECKING:
-    from kinfmu.mechanism.mechanism import Mechanism
-
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
-Bodies = Mapping[str, Body]  # by name
+
+class HasCoordinates(Protocol):
+    """What a mechanism has coordinates of: its moving bodies and its points of interest."""
+
+    @property
+    def coordinate_names(self) -> tuple[CoordinateName, ...]: ...
+
+    @property
+    def points(self) -> Mapping[str, str]: ...
 
 
-def check_names_and_unit(mechanism: Mechanism) -> None:
-    """Raise a MechanismError for an invalid unit or name. This comes first: paths of numbers contain names."""
-    if mechanism.length_unit not in METRES:
+def check_header(name: str, title: str, length_unit: str) -> None:
+    """Raise a MechanismError for an invalid unit, name or title."""
+    if length_unit not in METRES:
         raise MechanismError(
-            f"[units] length = {quoted(mechanism.length_unit)} is not a unit of length"
-            f"{suggestion(mechanism.length_unit, METRES)}; known: {listed(METRES)}"
+            f"[units] length = {quoted(length_unit)} is not a unit of length"
+            f"{suggestion(length_unit, METRES)}; known: {listed(METRES)}"
         )
-    check_name("name =", mechanism.name)
-    if len(mechanism.bodies) > MOST_BODIES:
-        raise MechanismError(f"[bodies] holds {len(mechanism.bodies)} bodies; {MOST_BODIES} at most")
-    check_line("title", mechanism.title)
+    check_name("name =", name)
+    check_line("title", title)
+
+
+def check_names(members: Members, points: Mapping[str, str]) -> None:
+    """Raise a MechanismError for an invalid name. This comes before other checks: paths of numbers contain names."""
+    if len(members.bodies) > MOST_BODIES:
+        raise MechanismError(f"[bodies] holds {len(members.bodies)} bodies; {MOST_BODIES} at most")
     tables: dict[str, Iterable[Body | Joint | Driver | Reading]] = {
-        "bodies": mechanism.bodies,
-        "joints": mechanism.joints,
-        "drivers": mechanism.drivers,
-        "measures": mechanism.measures,
+        "bodies": members.bodies,
+        "joints": members.joints,
+        "drivers": members.drivers,
+        "measures": members.measures,
     }
-    for table, members in tables.items():
-        _check_names(table, [member.name for member in members])
-    _check_names("points", mechanism.points)
+    for table, rows in tables.items():
+        _check_names(table, [row.name for row in rows])
+    _check_names("points", points)
 
 
-def check_members(mechanism: Mechanism) -> None:
+def check_members(
+    members: Members, parameters: Mapping[str, Parameter], expressions: Mapping[NumberPath, Expression]
+) -> None:
     """Raise a MechanismError that states table and key of the first invalid reference or value."""
-    if not mechanism.moving_bodies:
+    if not members.moving_bodies:
         raise MechanismError("[bodies] has only the ground; a mechanism needs a body that can move")
-    for body in mechanism.bodies:
+    for body in members.bodies:
         _check_body_itself(body)
-    bodies = {body.name: body for body in mechanism.bodies}
-    constraining: tuple[Joint | Driver, ...] = (*mechanism.joints, *mechanism.drivers)
+    bodies = members.bodies_by_name
+    constraining: tuple[Joint | Driver, ...] = (*members.joints, *members.drivers)
     for member in constraining:
         _check_references(bodies, member)
-        _check_values(mechanism, member)
-    for driver in mechanism.drivers:
+        _check_values(member, parameters, expressions)
+    for driver in members.drivers:
         for given in driver.inputs():
-            if given in mechanism.parameters:
+            if given in parameters:
                 raise MechanismError(f"[parameters] {given}: driver '{driver.name}' has an input of this name already")
-    for name, target in mechanism.points.items():
+
+
+def check_outputs(members: Members, points: Mapping[str, str], coordinates: str | tuple[str, ...]) -> None:
+    """Raise a MechanismError for an invalid point of interest or choice of coordinates."""
+    bodies = members.bodies_by_name
+    for name, target in points.items():
         _check_point(bodies, f"[points] {name}", target)
         if name in bodies:
             raise MechanismError(f"[points] {name}: a body has this name already, so '{name}.x' would be ambiguous")
-    if isinstance(mechanism.coordinates, str):
-        if mechanism.coordinates not in ("moving", "all"):
+    if isinstance(coordinates, str):
+        if coordinates not in ("moving", "all"):
             raise MechanismError(
-                f"[outputs] coordinates = {quoted(mechanism.coordinates)} must be 'moving', 'all' or a list of names"
+                f"[outputs] coordinates = {quoted(coordinates)} must be 'moving', 'all' or a list of names"
             )
-    else:
-        known: dict[str, None] = dict.fromkeys(mechanism.coordinate_names)
-        for name in mechanism.coordinates:
-            if name not in known:
-                raise MechanismError(
-                    f"[outputs] coordinates: {quoted(name)} is not a coordinate of this mechanism"
-                    f"{suggestion(name, known)}; coordinates: {listed(known)}"
-                )
-        if len(set(mechanism.coordinates)) < len(mechanism.coordinates):
-            raise MechanismError("[outputs] coordinates names a coordinate twice")
-    for reading in mechanism.measures:
-        _check_reading(mechanism, bodies, reading)
+        return
+    known: dict[str, None] = dict.fromkeys(members.coordinate_names)
+    for name in coordinates:
+        if name not in known:
+            raise MechanismError(
+                f"[outputs] coordinates: {quoted(name)} is not a coordinate of this mechanism"
+                f"{suggestion(name, known)}; coordinates: {listed(known)}"
+            )
+    if len(set(coordinates)) < len(coordinates):
+        raise MechanismError("[outputs] coordinates names a coordinate twice")
 
 
-def coordinate_orders(mechanism: Mechanism) -> dict[str, tuple[CoordinateName, int]]:
+def check_readings(members: Members, known: Mapping[str, Any]) -> None:
+    """Raise a MechanismError for an invalid reference or value of a measure; known: as of `coordinate_orders`."""
+    for reading in members.measures:
+        _check_reading(members, known, reading)
+
+
+def coordinate_orders(mechanism: HasCoordinates) -> dict[str, tuple[CoordinateName, int]]:
     """Return each coordinate of a body or of a point of interest, and its rates, with the coordinate and the order."""
     points = [CoordinateName(name, axis) for name in mechanism.points for axis in ("x", "y")]
     return {
@@ -94,20 +116,17 @@ def coordinate_orders(mechanism: Mechanism) -> dict[str, tuple[CoordinateName, i
     }
 
 
-def _check_reading(mechanism: Mechanism, bodies: Bodies, reading: Reading) -> None:
-    """Raise a MechanismError for a measure with an invalid reference or value."""
+def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading) -> None:
     where = f"[measures.{reading.name}] "
-    _check_fields(bodies, where, reading)
-    known: dict[str, Any] = {}
+    _check_fields(members.bodies_by_name, where, reading)
     for key in keys_of(type(reading)):
         value = getattr(reading, key.name)
         is_measured = key.takes == "measured" or (key.refers is not None and key.refers.kind == "coordinate")
         if not is_measured or value is None or isinstance(value, Measure):
             continue
-        known = known or coordinate_orders(mechanism)
         if not isinstance(value, str):
             raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
-        is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in mechanism.body_points
+        is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in members.body_points
         if value not in known and not is_point:
             raise MechanismError(
                 f"{where}{key.name}: {quoted(value)} is not a coordinate of this mechanism{suggestion(value, known)}; "
@@ -152,18 +171,20 @@ def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure 
             _check_reference(bodies, where, value, key.refers, is_pair=key.takes == "pair")
 
 
-def _check_values(mechanism: Mechanism, member: Joint | Driver) -> None:
+def _check_values(
+    member: Joint | Driver, parameters: Mapping[str, Parameter], expressions: Mapping[NumberPath, Expression]
+) -> None:
     """Run the member's own check; an error also states its expressions and the values of their parameters."""
     table = "joints" if isinstance(member, Joint) else "drivers"
     try:
         member.check()
     except MechanismError as error:
-        at_fault = {place: e for place, e in mechanism.expressions.items() if place[:2] == (table, member.name)}
+        at_fault = {place: e for place, e in expressions.items() if place[:2] == (table, member.name)}
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)
         causes = [f"{path_text(place).partition('] ')[2]} = {quoted(e.text)}" for place, e in at_fault.items()]
-        causes += [f"{name} = {float(mechanism.parameters[name].value)!r}" for name in values]
+        causes += [f"{name} = {float(parameters[name].value)!r}" for name in values]
         raise type(error)(f"{error} ({listed(causes)})", **error.data) from None
 
 

@@ -14,7 +14,14 @@ from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import GROUND_NAME, Body, RunSettings
-from kinfmu.mechanism.checks import check_members, check_names_and_unit
+from kinfmu.mechanism.checks import (
+    check_header,
+    check_members,
+    check_names,
+    check_outputs,
+    check_readings,
+    coordinate_orders,
+)
 from kinfmu.mechanism.expression import Computed, Expression
 from kinfmu.mechanism.members import Members, NumberPath
 from kinfmu.mechanism.parameters import Parameter, parameter_values
@@ -22,8 +29,6 @@ from kinfmu.mechanism.resolve import resolve
 from kinfmu.mechanism.settings import LawConstant, Settable, law_constants, with_law_constants
 from kinfmu.readings import Reading
 from kinfmu.units import CoordinateName, Quantity
-
-COORDINATES = ("x", "y", "phi")
 
 
 @dataclass(frozen=True)
@@ -76,13 +81,17 @@ class Mechanism(Displayed):
         if not any(body.is_ground for body in self.bodies):
             object.__setattr__(self, "bodies", (Body(GROUND_NAME), *self.bodies))
         object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
-        check_names_and_unit(self)
+        check_header(self.name, self.title, self.length_unit)
+        check_names(self.members, self.points)
         members, parameters, expressions = resolve(self.members, self.parameters, self.length_unit)
         for key in ("bodies", "joints", "drivers", "run", "measures"):
             object.__setattr__(self, key, getattr(members, key))
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "expressions", MappingProxyType(expressions))
-        check_members(self)
+        check_members(members, parameters, expressions)
+        check_outputs(members, self.points, self.coordinates)
+        if self.measures:
+            check_readings(members, coordinate_orders(self))
 
     def __repr__(self) -> str:
         parts = {"moving bodies": self.moving_bodies, "joints": self.joints, "drivers": self.drivers}
@@ -94,17 +103,17 @@ class Mechanism(Displayed):
     @property
     def moving_bodies(self) -> tuple[Body, ...]:
         """Bodies other than the ground, in file order."""
-        return tuple(body for body in self.bodies if not body.is_ground)
+        return self.members.moving_bodies
 
     @property
     def body_points(self) -> dict[str, tuple[float, float]]:
         """Body-fixed coordinates of every point, by 'body.point'."""
-        return {f"{body.name}.{name}": point for body in self.bodies for name, point in body.points.items()}
+        return self.members.body_points
 
     @property
     def coordinate_names(self) -> tuple[CoordinateName, ...]:
         """All generalized coordinates x, y, phi of the moving bodies, in file order."""
-        return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
+        return self.members.coordinate_names
 
     @property
     def own_parameters(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.readings import Reading
-from kinfmu.units import Quantity
+from kinfmu.units import CoordinateName, Quantity
 
 if TYPE_CHECKING:
     from kinfmu.mechanism.body import RunSettings
@@ -26,8 +26,10 @@ NumberPath = tuple[str | int, ...]
 ("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1), and
 ("measures", measure, key), ("measures", measure, "targets", number, 0 or 1)."""
 
+Bodies = Mapping[str, Body]  # by name
 Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
+COORDINATES = ("x", "y", "phi")
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
@@ -40,6 +42,21 @@ class Members:
     drivers: tuple[Driver, ...]
     run: RunSettings
     measures: tuple[Reading, ...] = ()
+
+    @property
+    def moving_bodies(self) -> tuple[Body, ...]:
+        """Bodies other than the ground, in file order."""
+        return tuple(body for body in self.bodies if not body.is_ground)
+
+    @property
+    def bodies_by_name(self) -> Bodies:
+        """All bodies by their names."""
+        return {body.name: body for body in self.bodies}
+
+    @property
+    def coordinate_names(self) -> tuple[CoordinateName, ...]:
+        """All generalized coordinates x, y, phi of the moving bodies, in file order."""
+        return tuple(CoordinateName(body.name, axis) for body in self.moving_bodies for axis in COORDINATES)
 
     @property
     def body_points(self) -> dict[str, tuple[Value, Value]]:

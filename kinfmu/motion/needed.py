@@ -11,7 +11,7 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.declared import keys_of
-from kinfmu.mechanism.mechanism import COORDINATES
+from kinfmu.mechanism.members import COORDINATES
 from kinfmu.readings import LowestMargin, Reading
 from kinfmu.units import CoordinateName
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinfmu.errors import KinfmuError
-from kinfmu.mechanism.mechanism import COORDINATES, Mechanism
+from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.members import COORDINATES
 from kinfmu.run import FloatArray, IntArray, Run
 
 if TYPE_CHECKING:

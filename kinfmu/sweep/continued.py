@@ -9,7 +9,7 @@ from typing import NamedTuple
 from kinfmu.codegen.python import load_module
 from kinfmu.errors import KinfmuError
 from kinfmu.mechanism import Mechanism, Start
-from kinfmu.mechanism.mechanism import COORDINATES
+from kinfmu.mechanism.members import COORDINATES
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Pose, failed
