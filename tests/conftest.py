@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from kinfmu.codegen.c import compiler
-from kinfmu.fmu.native import archive
+from kinfmu.fmu.native import archive, sources
 from kinfmu.sweep import library
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -38,12 +38,26 @@ def python_fmus() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """C is compiled without optimization, which gives the same numbers, and once for all workers of a run."""
+    """C is compiled without optimization, which gives the same numbers, and once for all workers of a run.
+
+    The run time of a library is compiled as one unit, in half of the time; under strict warnings, file by file as for
+    a user.
+    """
+    file_by_file = compiler.compile_files
+    run_time = {path.name for folder in (compiler.RUNTIME, sources.RUNTIME) for path in folder.glob("*.c")}
+
+    def compile_files(cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
+        if "-O0" in flags and "-shared" in flags and "-Werror" not in flags:
+            joined = [f'#include "{name}"\n' for name in compiler.units(files) if name in run_time]
+            files = {**files, "run_time.c": "".join(joined)}
+        file_by_file(cc, files, flags, output)
+
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINFMU_CACHE", str(folder / "compiled"))
+        patch.setattr(compiler, "compile_files", compile_files)
         for module, flags in SHIPPED_FLAGS.items():
             quick = ["-O0" if flag.startswith("-O") else flag for flag in flags if flag != "-march=native"]
             patch.setattr(module, "FLAGS", tuple(quick))

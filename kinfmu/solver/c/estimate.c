@@ -223,8 +223,7 @@ static bool make_source_of_track(kf_solver *solver, const kf_pose *pose, const k
 
 #endif
 
-/* Return the largest difference of two rows of outputs, in radians and sizes. */
-static double largest_gap(const double *there, const double *here)
+double kf_largest_gap(const double *there, const double *here)
 {
     double largest = 0.0;
     int k;
@@ -290,7 +289,7 @@ static bool tried(kf_solver *solver, kf_pose *pose, const double *ud, const doub
             missed[2] *= ud[0] / kf_reach[0] * (ud[0] / kf_reach[0]);
         }
         for (order = 0; order < 3; ++order) {
-            const double gap = largest_gap(rows[1][order], rows[0][order]);
+            const double gap = kf_largest_gap(rows[1][order], rows[0][order]);
             squares[order] += gap * gap + missed[order] * missed[order];
         }
         *lost = *lost || is_singular_between(pose, there, drive->held);
@@ -349,8 +348,8 @@ void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double 
     for (k = 0; k < KF_OUTPUTS; ++k) {
         largest = kf_output_is_angle[k] ? fmax(largest, fabs(outputs[k])) : largest;
     }
-    speed = fmax(speed, largest_gap(solver->scratch.rows[0][1], zeros));
-    curve = fmax(curve, largest_gap(solver->scratch.rows[0][2], zeros));
+    speed = fmax(speed, kf_largest_gap(solver->scratch.rows[0][1], zeros));
+    curve = fmax(curve, kf_largest_gap(solver->scratch.rows[0][2], zeros));
     errors[0] = KF_EPS * (1.0 + largest + KF_OFFSET) + sqrt(squares[0]);
     errors[1] = KF_ROUNDINGS * KF_EPS * speed + sqrt(squares[1]);
     errors[2] = KF_ROUNDINGS * KF_EPS * curve + sqrt(squares[2]);

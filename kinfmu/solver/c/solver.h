@@ -213,6 +213,9 @@ void kf_motion(const kf_solver *solver, kf_pose *pose, const double *ud, const d
  */
 void kf_errors(kf_solver *solver, kf_pose *pose, const double *ud, const double *udd, double errors[3]);
 
+/* The largest difference of two rows of outputs, in radians and sizes; infinite if it is not a number. */
+double kf_largest_gap(const double *there, const double *here);
+
 /* The smallest over the blocks of 1 / cond of the equilibrated block, 0 at a singular point, or of |determinant| over
  * the largest that it can be: where a row vanishes, equilibrating hides it.
  */

@@ -41,7 +41,8 @@ static void add_rates(kf_state *s, const double *v, double *rates)
     }
 }
 
-static double length_of(const double *v)
+/* The largest rate of a driver, over its reach. */
+static double largest_rate(const double *v)
 {
     double largest = 0.0;
     int k;
@@ -55,7 +56,7 @@ static double length_of(const double *v)
 static void add_bilinear(kf_state *s, const double *v, const double *w, double factor, double *row)
 {
     double sum[KF_DRIVERS], difference[KF_DRIVERS], plus[KF_ROOM(KF_OUTPUTS)], minus[KF_ROOM(KF_OUTPUTS)];
-    const double of_v = length_of(v), of_w = length_of(w);
+    const double of_v = largest_rate(v), of_w = largest_rate(w);
     int k;
     if (of_v == 0.0 || of_w == 0.0) {
         return;
@@ -279,8 +280,8 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
         driven[1] = direction.dv[k];
         driven[2] = direction.da[k];
     }
-    if (length_of(direction.du) > 0.0 && (parts & ~linear)) {
-        answer = differences(instance, direction.du, NULL, NULL, length_of(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
+    if (largest_rate(direction.du) > 0.0 && (parts & ~linear)) {
+        answer = differences(instance, direction.du, NULL, NULL, largest_rate(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
     }
     if (answer == KF_DONE) {
         answer = along_parameters(instance, seed + kf_part_first[KF_PART_PARAMETERS], parts & ~KF_BIT(KF_PART_DRIVEN));

@@ -267,21 +267,6 @@ void kf_find_drive(kf_state *s)
     }
 }
 
-/* The largest difference of two rows of outputs, in radians and sizes. */
-static double largest_gap(const double *there, const double *here)
-{
-    double largest = 0.0;
-    int k;
-    for (k = 0; k < KF_OUTPUTS; ++k) {
-        const double gap = fabs(there[k] - here[k]) / (kf_output_is_angle[k] ? 1.0 : KF_SIZE);
-        if (isnan(gap)) {
-            return INFINITY;
-        }
-        largest = fmax(largest, gap);
-    }
-    return largest;
-}
-
 /* Estimated errors of q, qd, qdd of the pose shown, with the errors of estimated rates; infinite if unknown. */
 static void find_errors(kf_state *s, double errors[3])
 {
@@ -308,8 +293,8 @@ static void find_errors(kf_state *s, double errors[3])
         s->ud[k] = ud + of_ud[k];
         kf_motion(&s->solver, pose, s->ud, s->udd, NULL, rates[1], accelerations[1]);
         s->ud[k] = ud;
-        errors[1] += largest_gap(rates[1], rates[0]);
-        errors[2] += largest_gap(accelerations[1], accelerations[0]);
+        errors[1] += kf_largest_gap(rates[1], rates[0]);
+        errors[2] += kf_largest_gap(accelerations[1], accelerations[0]);
         if (isinf(of_udd[k])) {
             errors[2] = INFINITY;
             continue;
@@ -317,7 +302,7 @@ static void find_errors(kf_state *s, double errors[3])
         s->udd[k] = udd + of_udd[k];
         kf_motion(&s->solver, pose, s->ud, s->udd, NULL, NULL, accelerations[1]);
         s->udd[k] = udd;
-        errors[2] += largest_gap(accelerations[1], accelerations[0]);
+        errors[2] += kf_largest_gap(accelerations[1], accelerations[0]);
     }
 }
 

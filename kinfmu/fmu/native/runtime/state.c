@@ -11,7 +11,7 @@
 
 static const char token[] = KF_TOKEN;
 
-#define CHECKED (sizeof token + sizeof(uint64_t)) /* where the copy begins */
+#define COPY_BEGINS (sizeof token + sizeof(uint64_t))
 
 /* FNV-1a of 64 bits: each change of a single byte changes it. */
 static uint64_t checksum(const unsigned char *bytes)
@@ -55,7 +55,7 @@ kf_answer kf_restore_state(kf_instance *instance, const void *state)
 
 size_t kf_serialized_size(void)
 {
-    return CHECKED + KF_STATE_SIZE;
+    return COPY_BEGINS + KF_STATE_SIZE;
 }
 
 kf_answer kf_serialize(kf_instance *instance, const void *state, unsigned char *bytes, size_t size)
@@ -66,8 +66,8 @@ kf_answer kf_serialize(kf_instance *instance, const void *state, unsigned char *
                       kf_serialized_size());
     }
     memcpy(bytes, token, sizeof token);
-    memcpy(bytes + CHECKED, state, KF_STATE_SIZE);
-    sum = checksum(bytes + CHECKED);
+    memcpy(bytes + COPY_BEGINS, state, KF_STATE_SIZE);
+    sum = checksum(bytes + COPY_BEGINS);
     memcpy(bytes + sizeof token, &sum, sizeof sum);
     return KF_DONE;
 }
@@ -80,7 +80,7 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
                       "has %zu", bytes ? size : 0, token, kf_serialized_size());
     }
     memcpy(&sum, bytes + sizeof token, sizeof sum);
-    if (sum != checksum(bytes + CHECKED)) {
+    if (sum != checksum(bytes + COPY_BEGINS)) {
         return kf_answered(instance, KF_ERROR, "deserializeFMUState: the state is damaged, its checksum does not fit");
     }
     if (*state == NULL) {
@@ -89,6 +89,6 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
     if (*state == NULL) {
         return kf_answered(instance, KF_ERROR, "deserializeFMUState: out of memory");
     }
-    memcpy(*state, bytes + CHECKED, KF_STATE_SIZE);
+    memcpy(*state, bytes + COPY_BEGINS, KF_STATE_SIZE);
     return KF_DONE;
 }
