@@ -312,7 +312,12 @@ class _Straight:
         ]
 
     def _residuals(self) -> list[str]:
-        writer = Writer(self.names, self.known)
+        """Return the function of the residuals, which poses are rarely asked for: they are computed once more.
+
+        They are computed from what the other stages read, so that no pose keeps numbers for them alone.
+        """
+        read = [node for node in self.exports.values() if node is not None]
+        writer = Writer(self.names, [*read, *self.prolog])
         rows, body = [], []
         for block in self.solved:
             body += writer.statements(block.residuals)

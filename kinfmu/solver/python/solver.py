@@ -56,9 +56,11 @@ class Solver:
             return self._again(start)
         singularities = start.singularities
         if self._has_one_driver:  # most samples: one trusted step, away from all that is singular
-            s = u[0] - start.u[0]
-            is_apart = singularities is None or singularities.low <= u[0] <= singularities.high
-            if is_apart and -self._longest <= s <= self._longest:
+            here = u[0]
+            s = here - start.u[0]
+            if -self._longest <= s <= self._longest and (
+                singularities is None or singularities.low <= here <= singularities.high
+            ):
                 near = trusted_step(self.model, start, UNIT_SPEED, s, u)
                 if near is not None and near.watch <= self.tolerance >= near.residual:
                     margin = near.margin

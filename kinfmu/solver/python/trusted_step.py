@@ -21,14 +21,15 @@ def trusted_step(model: Model, pose: Pose, direction: Vector, s: float, u: Vecto
     """Return one step of predict and correct, or None if it cannot be trusted to stay on the branch."""
     zd, zdd = pose.tangent or directed(model, pose, direction)
     try:
-        found = model.position(u, pose.z, zd, zdd, s)
-        if found[2] < POLISHED:
-            found = polished(model, u, found)
-        trial = Pose(u, found, pose.singularities)
+        trial = Pose(u, model.position(u, pose.z, zd, zdd, s), pose.singularities)
     except (ArithmeticError, ValueError):  # singular, diverged, or the sine of an overflow
         return None
+    margin = trial.margin
+    if margin < POLISHED:
+        trial = Pose(u, polished(model, u, trial.found()), pose.singularities)
+        margin = trial.margin
     needed = TRUST * trial.moved
-    if needed > trial.margin or needed > pose.margin or trial.margin == 0.0:
+    if needed > margin or needed > pose.margin or margin == 0.0:
         return None
     for before, after in zip(pose.determinants, trial.determinants):  # noqa: B905  one item per block
         if after < FALL * before if before > 0.0 else after > FALL * before:
