@@ -128,11 +128,11 @@ class Run(Displayed):
     inputs: Lazy[FloatArray] = Lazy()
     status: Lazy[IntArray] = Lazy()
     iterations: Lazy[IntArray] = Lazy()
-    residual: FloatArray
+    residual: Lazy[FloatArray] = Lazy()
     margin: Lazy[FloatArray] = Lazy()
     error: Lazy[FloatArray] = Lazy()
     watch_names: tuple[str, ...]
-    watch: FloatArray
+    watch: Lazy[FloatArray] = Lazy()
     length_unit: str = "m"
     mechanism_source: Lazy[Mechanism | str] = Lazy("")
     model_description: str = ""

@@ -19,8 +19,7 @@ from kinfmu.sweep.engine import Driven
 
 LARGEST_RATE = 1e100  # of drivers; squares of much larger numbers are infinite
 _LARGEST_KEPT = 1_000_000  # numbers
-_FEW = 1000  # numbers that one product checks sooner than two reductions; longer products are given to threads
-_SAFE = 1e150  # its square is finite
+_FEW = 50  # numbers that are checked sooner one by one
 _DEFAULTS = (0.0, 1.0, 0.0)  # of value (which must be given), speed and acceleration
 
 
@@ -75,16 +74,17 @@ def driven_by_inputs(
         if driver.inputs[0] not in inputs:
             raise RequestError(f"input '{driver.inputs[0]}' is missing; give times or every driver's value")
     columns = {name: column_of(name, value, rows) for name, value in inputs.items()}
-    angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
-    if wrap and not angles:
-        raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
-    columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles if wrap}
+    if wrap:
+        angles = [driver.inputs[0] for driver in drivers if driver.quantity.kind == "angle"]
+        if not angles:
+            raise RequestError(f"wrap unwraps angles, and no input is one; inputs: {listed(known)}")
+        columns |= {name: np.apply_along_axis(unwrap, -1, columns[name]) for name in angles}
     lengths = {array.shape[-1] for array in columns.values()}
     if len(lengths - {1}) > 1:
         sizes = listed(f"{name} ({array.shape[-1]})" for name, array in columns.items())
         raise RequestError(f"inputs must have equal lengths or be single numbers: {sizes}")
     n = next(iter(lengths - {1}), min(lengths, default=1))
-    is_by_design = any(array.ndim == 2 for array in columns.values())
+    is_by_design = rows > 1 and any(array.ndim == 2 for array in columns.values())
     shape = (rows, n) if is_by_design else (n,)
     for driver in drivers:
         for name in driver.inputs[1:]:
@@ -157,9 +157,6 @@ def _refuse_huge(name: str, rates: FloatArray) -> None:
 
 def _is_within(values: FloatArray, largest: float) -> bool:
     """Return True if all values are numbers of at most this size; no temporary arrays are made."""
-    if values.size < _FEW:
-        flat = values.ravel(order="K")
-        with np.errstate(over="ignore"):
-            if float(flat.dot(flat)) <= min(largest, _SAFE) ** 2:  # it decides unless values are huge
-                return True
+    if values.size <= _FEW and math.hypot(*values.ravel().tolist()) <= largest:  # NaN stays
+        return True
     return bool(values.min(initial=0.0) >= -largest and values.max(initial=0.0) <= largest)

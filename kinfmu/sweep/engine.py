@@ -17,15 +17,15 @@ class UnreachedError(KinfmuError):
 
 
 class SweepResult(NamedTuple):
-    """Per-sample diagnostics as in Run; status, iterations, margin and error are functions that return them.
+    """Per-sample diagnostics as in Run, as functions that return them.
 
     failures: the first sample of each interval without numbers, and the reason.
     """
 
     status: Callable[[], IntArray]
     iterations: Callable[[], IntArray]
-    residual: FloatArray
-    watch: FloatArray
+    residual: Callable[[], FloatArray]
+    watch: Callable[[], FloatArray]
     margin: Callable[[], FloatArray]
     error: Callable[[], FloatArray]
     failures: tuple[tuple[int, str], ...]

@@ -168,10 +168,9 @@ class Library:
         """
         count, watches = len(driven[0]), len(self.plan.watches)
         if reuse is None:
-            whole = np.empty((2, count))  # one allocation: the system provides large ones faster
-            result = LibraryResult(
-                whole[0].view(np.int32).reshape(count, 2), whole[1], np.empty((count, watches)), (), 0
-            )
+            whole = np.empty((2 + watches, count))  # one allocation: the system provides large ones faster
+            outcomes = whole[0].view(np.int32).reshape(count, 2)
+            result = LibraryResult(outcomes, whole[1], whole[2:].reshape(count, watches), (), 0)
         elif reuse.watch.shape == (count, watches):
             result = reuse
         else:
@@ -179,17 +178,14 @@ class Library:
                 f"the result to reuse has {reuse.watch.shape} samples and watches, not {(count, watches)}"
             )
         job = self._job(driven, tables)
-        job.outcomes = _start(result.outcomes)
-        job.residual, job.watches = _start(result.residual), _start(result.watch)
+        start = _start(result.outcomes)  # of the whole allocation
+        job.outcomes, job.residual, job.watches = start, start + 8 * count, start + 16 * count
         job.most_failures = MOST_FAILURES
         with self._memory(count, tolerance, parameters) as memory:
-            job.failures, job.messages = _start(memory.failures), memory.messages
+            job.failures, job.messages = memory.failures, memory.messages
             if not self._library.kf_sweep_run(memory.sweep, ctypes.byref(job)):
                 raise KinfmuError(self._refusal(count))
-            failed = [
-                (sample, _text(memory.messages + k * MESSAGE))
-                for k, sample in enumerate(memory.failures[: min(job.failure_count, MOST_FAILURES)].tolist())
-            ]
+            failed = memory.failed(job.failure_count) if job.failure_count else []
         more = job.failure_count - MOST_FAILURES
         if more > 0:
             bad = result.outcomes[:, 0] > Status.BRIDGED
@@ -311,8 +307,9 @@ class Library:
         job.u, job.ud, job.udd = map(_start, job.given)
         for k, table in enumerate(tables):
             if table is not None:
-                row, column = (stride // table.itemsize for stride in table.strides)
-                job.tables[k] = _Table(_start(table), row, column)
+                row, column = table.strides
+                place = job.tables[k]
+                place.start, place.row, place.column = _start(table), row // 8, column // 8
         return job
 
 
@@ -323,10 +320,15 @@ class _Memory:
         self.sweep = library.kf_sweep_new(TOLERANCE)
         if not self.sweep:
             raise KinfmuError(refusal)
-        self.failures = np.zeros(MOST_FAILURES, dtype=np.int64)
+        self._samples = np.zeros(MOST_FAILURES, dtype=np.int64)
         self._texts = ctypes.create_string_buffer(MOST_FAILURES * MESSAGE)
-        self.messages = ctypes.addressof(self._texts)
+        self.failures, self.messages = _start(self._samples), ctypes.addressof(self._texts)
         weakref.finalize(self, library.kf_sweep_free, self.sweep)
+
+    def failed(self, count: int) -> list[tuple[int, str]]:
+        """Return first samples and messages of so many intervals without numbers, as far as they are kept."""
+        samples = self._samples[: min(count, MOST_FAILURES)].tolist()
+        return [(sample, _text(self.messages + k * MESSAGE)) for k, sample in enumerate(samples)]
 
 
 def _start(array: NDArray[Any]) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -45,23 +45,38 @@ class NativeEngine:
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
-        plain = all(
-            table.flags.aligned and all(stride > 0 and stride % 8 == 0 for stride in table.strides) for table in tables
-        )
+        plain = all(map(_is_plain, tables))
         filled = tables if plain else [np.empty(table.shape, order="F") for table in tables]
         result = self._library.sweep(driven, filled, self._parameters, self._tolerance)
-        for table, values in zip(tables, filled, strict=True):
-            if table is not values:
+        if not plain:
+            for table, values in zip(tables, filled, strict=True):
                 table[:] = values
-        diagnosed = cache(  # both, when either is first read
+        diagnosis = _Diagnosis(
             lambda: self._library.diagnose(driven, result.outcomes, self._parameters, self._tolerance)
         )
         return SweepResult(
             status=lambda: result.outcomes[:, 0].astype(np.int64),
             iterations=lambda: result.outcomes[:, 1].astype(np.int64),
-            residual=result.residual,
-            watch=result.watch,
-            margin=lambda: diagnosed()[0],
-            error=lambda: diagnosed()[1],
+            residual=lambda: result.residual,
+            watch=lambda: result.watch,
+            margin=lambda: diagnosis.both[0],
+            error=lambda: diagnosis.both[1],
             failures=result.failures,
         )
+
+
+class _Diagnosis:
+    """Margins and errors of a sweep: both are computed when either is first read."""
+
+    def __init__(self, compute: Callable[[], tuple[FloatArray, FloatArray]]) -> None:
+        self._compute = compute
+
+    @cached_property
+    def both(self) -> tuple[FloatArray, FloatArray]:
+        return self._compute()
+
+
+def _is_plain(table: FloatArray) -> bool:
+    """Return whether the engine can fill a table: places and strides are whole numbers, and the strides positive."""
+    flags = table.flags
+    return flags.aligned and (flags.f_contiguous or all(stride > 0 and stride % 8 == 0 for stride in table.strides))

@@ -27,10 +27,12 @@ class PoseHistory:
         self._found: list[Pose | Vector | None] = []
 
     def add(self, pose: Pose) -> None:
-        """Add the next sample's pose."""
-        self._found.append(
-            None if not pose.good else pose if pose.bridge is not None or (pose.tracks and pose.status) else pose.z
-        )
+        """Add the good pose of the next sample."""
+        self._found.append(pose if pose.bridge is not None or (pose.tracks and pose.status) else pose.z)
+
+    def add_gap(self) -> None:
+        """Add a sample without numbers."""
+        self._found.append(None)
 
     def margins(self) -> FloatArray:
         """Return (n,) margins; NaN for samples without numbers."""
@@ -78,18 +80,22 @@ class PythonEngine:
         watch_count = len(solver.model.WATCHES)
         gap: Vector = (_GAP,) * (3 * m)
         motions: list[Vector] = []
-        outcomes, watches, failures = [], [], []
+        outcomes: list[Vector] = []
+        watches: list[Vector] = []
+        failures = []
         history = PoseHistory(solver, driven)
         good, failing = solver.anchor, False
         for k, (u, ud, udd) in enumerate(zip(*(map(tuple, table.tolist()) for table in driven), strict=True)):
             pose = solver.solve(good, u)
-            history.add(pose)
             if pose.good:
                 good, failing = pose, False
+                history.add(pose)
                 outcomes.append((pose.status, pose.residual, pose.iterations))
                 motions.append(solver.motion(pose, ud, udd))
-                watches.append(solver.watch(pose))
+                if watch_count:
+                    watches.append(solver.watch(pose))
             else:
+                history.add_gap()
                 if not failing:
                     failures.append((k, pose.message))
                 failing = True
@@ -99,12 +105,11 @@ class PythonEngine:
         whole = np.array(motions, dtype=float).reshape(n, 3, m)
         for k, array in enumerate(tables):
             array[:] = whole[:, k]
-        diagnostics = np.array(outcomes, dtype=float).reshape(n, 3)
         return SweepResult(
-            status=lambda: diagnostics[:, 0].astype(np.int64),
-            iterations=lambda: diagnostics[:, 2].astype(np.int64),
-            residual=diagnostics[:, 1],
-            watch=np.array(watches, dtype=float).reshape(n, watch_count),
+            status=lambda: np.array([status for status, _, _ in outcomes], dtype=np.int64),
+            iterations=lambda: np.array([iterations for _, _, iterations in outcomes], dtype=np.int64),
+            residual=lambda: np.array([residual for _, residual, _ in outcomes], dtype=float),
+            watch=lambda: np.array(watches, dtype=float).reshape(n, watch_count),
             margin=history.margins,
             error=history.errors,
             failures=tuple(failures),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import io
 import os
 import shutil
 import stat
@@ -265,3 +266,23 @@ def test_a_process_killed_while_it_writes_leaves_no_library(cache: Path) -> None
     os.utime(part, (time.time() - 2 * library_cache.STALE,) * 2)
     compiler.shared_library(EIGHT)
     assert not part.exists()
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.usefixtures("cache")
+def test_a_terminal_shows_a_line_while_the_compiler_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for files, stream, shown in (
+        (SEVEN, io.StringIO(), ""),
+        (EIGHT, Terminal(), "kinfmu: compiling C; the result is kept for the next time"),
+        (EIGHT, Terminal(), ""),  # it is in the cache now
+    ):
+        monkeypatch.setattr("sys.stderr", stream)
+        compiler.shared_library(files)
+        line, _, blank = stream.getvalue().partition("\r")
+        assert (line, blank.strip()) == (shown, "")

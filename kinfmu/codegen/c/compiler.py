@@ -14,8 +14,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -52,6 +52,8 @@ def units(files: Mapping[str, str]) -> list[str]:
 def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
     """Return a shared library of C files (and the headers that they include), by name; compile it if it is not cached.
 
+    A terminal shows a line while the compiler runs.
+
     Args:
         files: Texts by file name.
         flags: Flags of the compiler, after FLAGS.
@@ -65,7 +67,11 @@ def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: 
 
     """
     build = _Build(files, flags, target)
-    return library_cache.find(build.key, build.suffix) or library_cache.store(build.key, build.suffix, build.compile())
+    found = library_cache.find(build.key, build.suffix)
+    if found is not None:
+        return found
+    with _shown("kinfmu: compiling C; the result is kept for the next time"):
+        return library_cache.store(build.key, build.suffix, build.compile())
 
 
 def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> bytes:
@@ -100,6 +106,19 @@ def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
         raise CompilerError(
             f"the compiled library cannot be loaded: {error}; set KINFMU_CACHE to a folder where programs may run"
         ) from None
+
+
+@contextmanager
+def _shown(line: str) -> Iterator[None]:
+    """Show a line while this block runs, if stderr is a terminal."""
+    terminal = sys.stderr if sys.stderr is not None and sys.stderr.isatty() else None
+    if terminal:
+        print(line, end="\r", file=terminal, flush=True)
+    try:
+        yield
+    finally:
+        if terminal:
+            print(" " * len(line), end="\r", file=terminal, flush=True)
 
 
 class _Build:

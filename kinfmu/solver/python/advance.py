@@ -64,6 +64,8 @@ class Path:
         if -self.length <= self.distance <= self.length:
             return self.distance, self.target
         s = self.length if self.distance > 0.0 else -self.length
+        if len(self.target) == 1:
+            return s, (self.pose.u[0] + s,)
         return s, tuple([a + s * d for a, d in zip(self.pose.u, self.direction)])  # noqa: B905  one item per driver
 
     def accept(self, trial: Pose, s: float, margin: float) -> None:

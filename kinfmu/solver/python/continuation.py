@@ -74,7 +74,7 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
     slope = at_rest = (0.0,) * len(pose.z)
     s, step, block = 0.0, 1.0, -1
     for _ in range(_MOST_STEPS):
-        if s == 1.0 or values == written:
+        if values == written:
             break
         there = min(s + step, 1.0)
         p = values if there == 1.0 else tuple([a + there * (b - a) for a, b in zip(written, values, strict=True)])
@@ -85,6 +85,9 @@ def reach(module: Any, values: Vector, tolerance: float = TOLERANCE) -> Reached:
             block = error.args[0] if len(error.args) == 2 else block
         else:
             if _is_trusted(pose, trial):
+                if there == 1.0:
+                    pose, model = trial, ahead
+                    break
                 slope = tuple([(b - a) / (there - s) for a, b in zip(pose.z, trial.z, strict=True)])
                 s, pose, model, step = there, trial, ahead, 2.0 * step
                 continue

@@ -103,7 +103,7 @@ class Solver:
         """Return a failed pose at driver values that no mechanism has: not finite, or a distance below 0."""
         if not isfinite(sum(u)):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)} is not a finite number")
-        if any(u[driver] < 0.0 for driver, *_ in distances):
+        if distances and any(u[driver] < 0.0 for driver, *_ in distances):
             return failed(start, u, Status.OUTSIDE, f"{place(self.model, u)}: a distance cannot be negative")
         return None
 
