@@ -22,30 +22,29 @@ if TYPE_CHECKING:
 def draw(result: StudyResult, path: Path, measures: tuple[str, ...]) -> None:
     """Draw the results of a study into a file; measures: which, default: all."""
     check_suffix(path)
+    write(path, lambda: figure_of(result, measures))
+
+
+def figure_of(result: StudyResult, measures: tuple[str, ...] = ()) -> Any:
+    """Return the Figure of matplotlib that shows the results of a study.
+
+    Raises:
+        StudyError: A measure is unknown.
+        FigureError: There are too many columns for a scatter matrix.
+
+    """
     for name in measures:
         if name not in result.measures:
             near = suggestion(name, result.measures)
             raise StudyError(f"the study has no measure '{name}'{near}; measures: {listed(result.measures)}")
-    chosen = measures or result.measures
+    measures = measures or result.measures
     kind = picture_of(result)
-    if kind == "scatter" and len(result.parameters) + len(chosen) > MOST_COLUMNS:
+    count = len(result.parameters) + len(measures)
+    if kind == "scatter" and count > MOST_COLUMNS:
         raise FigureError(
-            f"{path}: {len(result.parameters)} parameters and {len(chosen)} measures are too many for a scatter "
-            f"matrix, which holds {MOST_COLUMNS}; choose measures with --measures"
+            f"a scatter matrix holds {MOST_COLUMNS} parameters and measures, and these are {count}: choose measures, "
+            f"on the command line with --measures"
         )
-    write(path, lambda: _drawn(result, kind, chosen))
-
-
-def picture_of(result: StudyResult) -> str:
-    """Return 'response', 'contours', 'contributions' or 'scatter'."""
-    if result.nominal.deviations:
-        return "contributions"
-    grids = ["values" in one for one in result.definition["parameters"].values()]
-    return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
-
-
-def _drawn(result: StudyResult, kind: str, measures: tuple[str, ...]) -> Any:
-    """Return the Figure of matplotlib."""
     title = result.mechanism.title or result.mechanism.name
     if kind == "contributions":
         return contributions([_contributed(result, name) for name in measures], f"{title}: tolerances")
@@ -64,6 +63,14 @@ def _drawn(result: StudyResult, kind: str, measures: tuple[str, ...]) -> Any:
     if kind == "response":
         return response(parameters[0], columns, title)
     return scatter_matrix(parameters, columns, f"{title}: {len(result)} designs")
+
+
+def picture_of(result: StudyResult) -> str:
+    """Return 'response', 'contours', 'contributions' or 'scatter'."""
+    if result.nominal.deviations:
+        return "contributions"
+    grids = ["values" in one for one in result.definition["parameters"].values()]
+    return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
 
 
 def _column(result: StudyResult, name: str) -> Quantities:

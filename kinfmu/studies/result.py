@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinfmu.display import Displayed
 from kinfmu.errors import MissingPackageError, StudyError, suggestion
 from kinfmu.mechanism import Mechanism, toml_file
 from kinfmu.run import FloatArray
 from kinfmu.studies.definition import DESIGN, REASON, Study
 from kinfmu.studies.nominal import Nominal
 from kinfmu.studies.statistics import Moments, Statistics
-from kinfmu.studies.summary import html, summary
+from kinfmu.studies.summary import summary
 from kinfmu.studies.table import metadata_of
 
 
-class StudyResult:
+class StudyResult(Displayed):
     """The results of a study; `kinfmu.study` returns them, and `StudyResult.read` reads those of a file.
 
     Columns are read when they are asked for, so that a million designs need no memory until then.
@@ -88,9 +89,6 @@ class StudyResult:
     def __str__(self) -> str:
         return summary(self)
 
-    def _repr_html_(self) -> str:
-        return html(self)
-
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a column (m,): a parameter, a measure, 'stroke.at', 'solver.status' or 'design'.
 
@@ -117,6 +115,18 @@ class StudyResult:
                 numbers, texts = batch.column(0).to_pylist(), reasons.to_pylist()
                 found |= {k: text for k, text in zip(numbers, texts, strict=True) if text is not None}
         return found
+
+    @cached_property
+    def first_failure(self) -> tuple[int, int, str] | None:
+        """How many designs lack a measure, the number of the first, and why it does; None if none does."""
+        count, first = 0, None
+        for batch in self._batches([DESIGN, REASON]):
+            known = batch.column(1).is_valid()
+            if first is None and known.true_count:
+                row = known.index(True).as_py()
+                first = (batch.column(0)[row].as_py(), batch.column(1)[row].as_py())
+            count += known.true_count
+        return None if first is None else (count, *first)
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:

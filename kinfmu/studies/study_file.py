@@ -63,7 +63,8 @@ def _study(document: dict[str, Any], folder: Path, engine: str, text: str) -> St
     mechanism = _mechanism(text_of("mechanism", document["mechanism"], "a file or a gallery name"), folder)
     own = read_measures(document, folder)
     report = document.get("report")
-    if report is not None and not (isinstance(report, list) and all(isinstance(name, str) for name in report)):
+    is_list = isinstance(report, list) and report and all(isinstance(name, str) for name in report)
+    if report is not None and not is_list:
         raise StudyError(f"report = {quoted(report)} must be a list of names of measures")
     known = {reading.name: reading for reading in (*mechanism.measures, *own)}
     wanted = [known.get(name, name) for name in (known if report is None else report)]

@@ -1,8 +1,7 @@
-"""The summary of a study as text and as HTML."""
+"""The summary of a study as text, and its rows."""
 
 from __future__ import annotations
 
-from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -16,28 +15,24 @@ _FIRST_ORDER = "first order"
 
 def summary(result: StudyResult) -> str:
     """Return the summary table of a study, and for tolerances what each contributes."""
-    lines = [about(result), "", *_aligned(_rows(result))]
+    lines = [about(result), "", *_aligned(measure_rows(result))]
     if result.nominal.reason:
         lines += ["", f"the design as written has no numbers: {result.nominal.reason}"]
     if result.nominal.deviations:
         lines += ["", "contributions to the variance, to first order:"]
         lines += _aligned([_contributions(result, name) for name in result.measures], left=3)
-    failures = result.failures
-    if failures:
-        first = min(failures)
-        lines += [
-            "",
-            f"{len(failures)} of {len(result)} designs lack a measure, the first is design {first}: {failures[first]}",
-        ]
+    failed = failures(result)
+    if failed:
+        lines += ["", failed]
     return "\n".join(line.rstrip() for line in lines)
 
 
-def html(result: StudyResult) -> str:
-    """Return the summary table as HTML, for notebooks."""
-    head, *rows = _rows(result)
-    cells = "".join(f"<th>{escape(text)}</th>" for text in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows)
-    return f"<p>{escape(about(result))}</p><table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
+def failures(result: StudyResult) -> str:
+    """Return how many designs lack a measure, and why the first does, as a line; '' if none does."""
+    if result.first_failure is None:
+        return ""
+    count, first, reason = result.first_failure
+    return f"{count} of {len(result)} designs lack a measure, the first is design {first}: {reason}"
 
 
 def about(result: StudyResult) -> str:
@@ -49,7 +44,8 @@ def about(result: StudyResult) -> str:
     return f"{result.mechanism.name}: {len(result)} designs ({how}{seed}) over {varied}; {said['motion']['over']}"
 
 
-def _rows(result: StudyResult) -> list[tuple[str, ...]]:
+def measure_rows(result: StudyResult) -> list[tuple[str, ...]]:
+    """Return the header of the summary table, and a row for each measure."""
     has_tolerances = bool(result.nominal.deviations)
     header = list(_HEADER)
     if has_tolerances:

@@ -132,8 +132,13 @@ def test_a_finished_study_is_not_measured_again(tmp_path: Path) -> None:
 def test_it_shows_itself_in_notebooks() -> None:
     found = kinfmu.study(linkage(), {"base": {"from": 40, "to": 50, "count": 3}}, workers=1)
     page = found._repr_html_()
+    assert page is not None
     assert page.count("<tr>") == 3
-    assert "<td>swing</td><td>rad</td>" in page
+    assert page.count(">swing<") == 1
+    assert page.count("<img ") == 1
+    picture = found._repr_svg_()
+    assert picture is not None
+    assert "swing [rad]" in picture
     assert repr(found) == "<Study of hoeken: 3 designs; swing, fastest>"
 
 

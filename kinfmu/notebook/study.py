@@ -1,0 +1,31 @@
+"""The results of a study: its summary, and its picture."""
+
+from __future__ import annotations
+
+from kinfmu.display import escaped, html_of, page, svg_of, table
+from kinfmu.draw.writing import svg_text
+from kinfmu.notebook.picture import picture
+from kinfmu.studies import StudyResult
+from kinfmu.studies.figure import figure_of
+from kinfmu.studies.summary import about, failures, measure_rows
+
+
+@html_of.register
+def study_html(result: StudyResult) -> str:
+    """Return the summary, the picture and the first failure of a study."""
+    header, *rows = measure_rows(result)
+    failed = failures(result)
+    shown = picture(lambda: study_svg(result), f"Picture of the study of {result.mechanism.name}")
+    return page(about(result), table(rows, header), shown, f"<p>{escaped(failed)}</p>" if failed else "")
+
+
+@svg_of.register
+def study_svg(result: StudyResult) -> str:
+    """Return the picture of a study as SVG.
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+        FigureError: There are too many parameters and measures for one picture.
+
+    """
+    return svg_text("this picture", lambda: figure_of(result, result.measures))

@@ -1,0 +1,163 @@
+"""Study files: what they say is what is measured, and each mistake has one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu.errors import KinfmuError, RequestError, StudyError
+from kinfmu.studies import read_study
+from kinfmu.studies.variation import Grid, Interval, Tolerance
+from tests.studies.linkage import linkage, write
+
+CRANK = 'mechanism = "hoeken.toml"\n[parameters]\ncrank = { from = 15, to = 25 }\n'
+WRONG = {
+    "designs = 4": "mechanism is missing: a mechanism file, such as mechanism = 'fourbar.toml', or a gallery name",
+    'mechanism = "hoken.toml"': "cannot be read (No such file or directory)",
+    'mechanism = "fourbr"\nparameters.a = { from = 1, to = 2 }': "'fourbr' is not in the gallery; did you mean '",
+    'mechanism = "hoeken.toml"': "a study needs [parameters]: which of them vary, and how",
+    'mechanism = "hoeken.toml"\nparameters.crnk = { from = 1, to = 2 }': (
+        "there is no parameter 'crnk'; did you mean 'crank'?; parameters: crank, rocker, base, crank.start, crank.speed"
+    ),
+    'mechanism = "hoeken.toml"\nparameters.crank = 3': "[parameters.crank] = 3 must be a table such as { from = 1, to",
+    "sampling.x = 1": "mechanism is missing",
+    'mechanism = "hoeken.toml"\nsample = 3': "sample: unknown key; did you mean 'samp",
+    f'sampling = "sobl"\n{CRANK}': "sampling = 'sobl' is not known; did you mean 'sobol'?; known: sobol,",
+    f"designs = 0\n{CRANK}": "designs = 0 must be a whole number from 1 to 1000000000",
+    f"designs = 2.5\n{CRANK}": "designs = 2.5 must be a whole number",
+    f"seed = -1\n{CRANK}": "seed = -1 must be a whole number from 0",
+    f'report = ["swng"]\n{CRANK}': "there is no measure 'swng'; did you mean 'swing'?; measures: swing, fastest",
+    f"report = 3\n{CRANK}": "report = 3 must be a list of names of measures",
+    f"report = []\n{CRANK}": "report = [] must be a list of names of measures",
+    f"{CRANK}[measures.more]\ntype = 'rang'": "[measures.more] type = 'rang' is not known; did you mean 'range'?",
+    f"{CRANK}[measures.more]\ntype = 'range'\nof = 'rockr.phi'": "[measures.more] of: 'rockr.phi' is not a coordinate",
+    f"{CRANK}[measures.crank]\ntype = 'range'\nof = 'rocker.phi'": (
+        "the measure 'crank' has the name of another column of the results; rename it"
+    ),
+    f"{CRANK}[run]\nstart = 0\nfrom = 1": "[run] has 'start', a time, and 'from', of a driver's values",
+    f"{CRANK}[run]\nfrom = 1": "[run] needs the key 'to'",
+    f"{CRANK}[run]\nfrom = '1 mm'\nto = 2": "[run] from = '1 mm': unit 'mm' must be one of rad, deg, rev",
+    f"{CRANK}[run]\nstop = 1\nstep = 0": "[run] must have a positive step, and stop after start",
+    f"{CRANK}[run]\nfrom = 1\nto = 2\nsamples = 1": "[run] samples = 1 must be a whole number from 2",
+    f"{CRANK}[run]\nend = 1": "[run] end: unknown key",
+    'mechanism = "hoeken.toml"\n[parameters]\n"crank.speed" = { values = [1, 2] }': (
+        "crank.speed is a constant of a law, which acts over time: give times ([run] start, stop and step"
+    ),
+}
+WRONG_PARAMETERS = {
+    "count = 3": "needs 'values', 'from' or 'tolerance'; give one of { from = 1, to = 2, count = 5 }",
+    "from = 1, tolerance = 2": "has from and tolerance, which exclude each other",
+    "form = 1, to = 2": "form: unknown key; did you mean 'from'?",
+    "from = 1": "needs the key 'to'",
+    "from = 1, to = 1": "'from' and 'to' are equal: 1",
+    "from = 1, to = 2, count = 1": "count = 1 must be a whole number from 2",
+    "from = 1, to = 2, distribution = 'normal'": "distribution: does not go with 'from'; keys with it: count, from, to",
+    "from = '1 deg', to = 2": "from = '1 deg': unit 'deg' must be one of m, mm",
+    "from = 'a', to = 2": "from = 'a' must be a number, alone or with a unit",
+    "values = []": "values = [] must be a list of numbers",
+    "values = 3": "values = 3 must be a list of numbers",
+    "tolerance = 0": "tolerance = 0 must be more than 0",
+    "tolerance = '1 s'": "tolerance = '1 s': unit 's' must be one of m, mm",
+    "tolerance = 1, distribution = 'gauss'": "distribution = 'gauss' is not known; known: normal, uniform",
+    "tolerance = 1, deviations = 0": "deviations = 0 must be a positive number",
+    "tolerance = 1, deviations = 2, distribution = 'uniform'": "deviations: only a normal distribution has them",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_mistake_is_named_with_its_place(text: str, tmp_path: Path) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(StudyError) as error:
+        read_study(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert WRONG[text] in str(error.value)
+
+
+@pytest.mark.parametrize("table", WRONG_PARAMETERS)
+def test_so_is_one_in_a_parameter(table: str, tmp_path: Path) -> None:
+    path = write(tmp_path, f'mechanism = "hoeken.toml"\nparameters.crank = {{ {table} }}')
+    with pytest.raises(StudyError) as error:
+        read_study(path)
+    assert str(error.value).startswith(f"{path}: [parameters.crank]")
+    assert WRONG_PARAMETERS[table] in str(error.value)
+
+
+@pytest.mark.parametrize("content", [b"a = ", b"\xff"])
+def test_files_that_are_no_study_are_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    with pytest.raises(StudyError, match=r"study\.toml: not"):
+        read_study(path)
+    with pytest.raises(StudyError, match=r"no\.toml: cannot be read"):
+        read_study(tmp_path / "no.toml")
+
+
+def test_the_mechanism_is_found_from_the_folder_of_the_file_or_in_the_gallery(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    path = write(folder, 'mechanism = "hoeken.toml"\ndesigns = 3\nparameters.crank = { from = "1.5 cm", to = 25 }')
+    monkeypatch.chdir(tmp_path)
+    study = read_study(path)
+    assert study.sampling.variations == (Interval("crank", "mm", 15.0, 25.0),)
+    assert len(study) == 3
+    assert (study.motion.over, len(study.motion)) == ("one turn of crank at 3.14159 rad/s", 361)
+    measures = "[measures.stride]\ntype = 'range'\nof = 'foot.x'"
+    path = write(folder, f'mechanism = "jansen_leg"\n[parameters]\na = {{ tolerance = 0.01 }}\n{measures}')
+    (tolerance,) = read_study(path).sampling.tolerances
+    assert (tolerance.nominal, tolerance.deviations) == (kinfmu.load("jansen_leg").parameters["a"].value, 3.0)
+
+
+def test_variations_and_motions_are_read_with_their_units(tmp_path: Path) -> None:
+    path = write(
+        tmp_path,
+        """
+        mechanism = "hoeken.toml"
+        [parameters]
+        crank = { from = "2 cm", to = 22, count = 3 }
+        base = { tolerance = "0.1 mm", deviations = 2, nominal = 41 }
+        rocker = { tolerance = "100 um", distribution = "uniform" }
+        [run]
+        from = "0 deg"
+        to = "90 deg"
+        samples = 10
+        speed = "60 rpm"
+        """,
+    )
+    study = read_study(path)
+    grid, normal, uniform = study.sampling.variations
+    assert grid == Grid("crank", "mm", (20.0, 21.0, 22.0))
+    assert isinstance(normal, Tolerance)
+    assert isinstance(uniform, Tolerance)
+    assert (normal.nominal, normal.deviation) == (41.0, pytest.approx(0.05))
+    assert (uniform.nominal, uniform.deviation) == (50.0, pytest.approx(0.1 / np.sqrt(3.0)))
+    assert np.allclose(study.motion.inputs["crank_angle"], np.linspace(0.0, np.pi / 2.0, 10))
+    assert study.motion.inputs["crank_speed"] == pytest.approx(2.0 * np.pi)
+    assert len(study) == 3000
+    times = read_study(write(tmp_path, f"{CRANK}[run]\nstop = '20 ms'\nstep = '5 ms'")).motion.t
+    assert times is not None
+    assert np.allclose(times, [0.0, 0.005, 0.01, 0.015, 0.02])
+
+
+def test_arguments_of_a_call_are_refused_likewise(tmp_path: Path) -> None:
+    ranges = {"crank": {"from": 15, "to": 25}}
+    with pytest.raises(RequestError, match="designs = 0 must be a whole number"):
+        kinfmu.study(linkage(), ranges, designs=0)
+    with pytest.raises(RequestError, match="workers = 0 must be a positive whole number"):
+        kinfmu.study(linkage(), ranges, workers=0)
+    with pytest.raises(RequestError, match=r"rows.csv: results are written as Parquet; the name must end in .parquet"):
+        kinfmu.study(linkage(), ranges, output="rows.csv")
+    with pytest.raises(RequestError, match="there is no folder"):
+        kinfmu.study(linkage(), ranges, output=tmp_path / "none" / "rows.parquet")
+    with pytest.raises(RequestError, match="give times or inputs, not both: t and crank_angle"):
+        kinfmu.study(linkage(), ranges, t=[0.0, 1.0], crank_angle=[0.0, 1.0])
+    with pytest.raises(RequestError, match="engine 'fast' is not known"):
+        kinfmu.study(linkage(), ranges, engine="fast")
+    with pytest.raises(RequestError, match=r"crank_angle must be a number or \(n,\)"):
+        kinfmu.study(linkage(), ranges, crank_angle=[[0.0, 1.0]])
+    with pytest.raises(KinfmuError, match="crank_agle"):
+        kinfmu.study(linkage(), ranges, designs=2, workers=1, crank_agle=[0.0, 1.0, 2.0])
