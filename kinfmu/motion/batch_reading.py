@@ -19,6 +19,7 @@ from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.measure import chosen_measures, measure, reason_without_value
 from kinfmu.motion.motion import Motion, argument_of
 from kinfmu.motion.needed import needed
+from kinfmu.motion.quintic import use_compiled
 from kinfmu.motion.track import FEWEST, FloatArray, Track
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
@@ -111,6 +112,8 @@ class BatchReading:
         size = max(1, SAMPLES_AT_ONCE // len(self._driving.times))
         parts = [slice(first, min(first + size, self._count)) for first in range(0, self._count, size)]
         is_native = self._model.is_native(self._count * len(self._driving.times))
+        if is_native:
+            use_compiled()
         if is_native and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
                 found = list(pool.map(lambda part: self._measure(part, 1), parts))

@@ -1,0 +1,216 @@
+/* Extremes and higher derivatives of quantities between samples: the arithmetic of quintic.py, operation by operation. */
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define STEPS 60    /* of a root in its interval */
+#define SAME 1e-15  /* of an interval; roots closer than this are equal */
+
+static double polynomial(const double *c, int terms, double s)
+{
+    double value = c[terms - 1];
+    int k;
+    for (k = terms - 2; k >= 0; --k) {
+        value = value * s + c[k];
+    }
+    return value;
+}
+
+static void derive(const double *c, int terms, double *derived)
+{
+    int k;
+    for (k = 1; k < terms; ++k) {
+        derived[k - 1] = c[k] * (double)k;
+    }
+}
+
+/* A root between two arguments of opposite signs: by Newton, else by halving. */
+static double root(const double *c, int terms, double low, double high)
+{
+    const bool is_rising = polynomial(c, terms, high) > polynomial(c, terms, low);
+    double c1[5], s = 0.5 * (low + high);
+    int k;
+    derive(c, terms, c1);
+    for (k = 0; k < STEPS; ++k) {
+        const double value = polynomial(c, terms, s), slope = polynomial(c1, terms - 1, s), old = s;
+        const double step = s - value / (slope == 0.0 ? INFINITY : slope);
+        if ((value < 0.0) == is_rising) {
+            low = s;
+        } else {
+            high = s;
+        }
+        s = step >= low && step <= high ? step : 0.5 * (low + high);
+        if (fabs(s - old) <= SAME) {
+            break;
+        }
+    }
+    return s;
+}
+
+/* A quantity in one design: value, rate and acceleration at the samples, of which the sign may be changed. */
+typedef struct {
+    const double *f, *v, *a;
+    double sign;
+} kf_quantity;
+
+/* The polynomial of interval k, and its slope. */
+static void take(const kf_quantity *of, int64_t k, double h, double c[6], double slope[5])
+{
+    const double f = of->sign * of->f[k], v = of->sign * of->v[k] * h, a = of->sign * of->a[k] * h * h;
+    const double df = of->sign * of->f[k + 1] - f - v - 0.5 * a;
+    const double dv = of->sign * of->v[k + 1] * h - v - a;
+    const double da = of->sign * of->a[k + 1] * h * h - a;
+    c[0] = f;
+    c[1] = v;
+    c[2] = 0.5 * a;
+    c[3] = 10.0 * df - 4.0 * dv + 0.5 * da;
+    c[4] = -15.0 * df + 7.0 * dv - da;
+    c[5] = 6.0 * df - 3.0 * dv + 0.5 * da;
+    derive(c, 6, slope);
+}
+
+/* Where to cut the interval, so that the slope changes its sign at most once on either side. */
+static double cut_of(const double slope[5])
+{
+    double curve[4];
+    if (polynomial(slope, 5, 0.0) * polynomial(slope, 5, 1.0) < 0.0) {
+        return 1.0;
+    }
+    derive(slope, 5, curve);
+    return polynomial(curve, 4, 0.0) * polynomial(curve, 4, 1.0) < 0.0 ? root(curve, 4, 0.0, 1.0) : 0.5;
+}
+
+static bool is_finite(const double *numbers, int64_t count)
+{
+    int64_t k;
+    int32_t unknown = 0;
+    for (k = 0; k < count; ++k) {
+        unknown |= !(fabs(numbers[k]) <= DBL_MAX);
+    }
+    return unknown == 0;
+}
+
+/* The largest sample: its number. */
+static int64_t largest(const kf_quantity *of, int64_t count)
+{
+    double best = of->sign * of->f[0];
+    int64_t k;
+    for (k = 1; k < count; ++k) {
+        const double f = of->sign * of->f[k];
+        best = f > best ? f : best;
+    }
+    for (k = 0; of->sign * of->f[k] != best; ++k) {
+    }
+    return k;
+}
+
+/* Mark the intervals whose control points exceed a value; the number of marks. */
+static int64_t mark(const kf_quantity *of, int64_t count, const double *h, double value, int64_t most, int64_t *marked)
+{
+    enum { AT_ONCE = 32 };
+    int64_t k, i, found = 0;
+    for (k = 0; k + 1 < count; k += AT_ONCE) {
+        const int64_t end = k + AT_ONCE < count - 1 ? k + AT_ONCE : count - 1;
+        int32_t is_higher[AT_ONCE], any = 0;
+        for (i = k; i < end; ++i) {
+            const double c0 = h[i] * (of->sign * of->v[i]) * 0.2, c5 = h[i] * (of->sign * of->v[i + 1]) * 0.2;
+            const double c1 = of->sign * of->f[i] + c0, c4 = of->sign * of->f[i + 1] - c5;
+            const double c2 = c1 + c0 + h[i] * h[i] * (of->sign * of->a[i]) * 0.05;
+            const double c3 = c4 - c5 + h[i] * h[i] * (of->sign * of->a[i + 1]) * 0.05;
+            const int32_t higher = (c1 > value) | (c2 > value) | (c3 > value) | (c4 > value);
+            is_higher[i - k] = higher;
+            any |= higher;
+        }
+        for (i = k; i < end && any != 0; ++i) {
+            if (is_higher[i - k] != 0) {
+                if (found < most) {
+                    marked[found] = i;
+                }
+                ++found;
+            }
+        }
+    }
+    return found;
+}
+
+/* The largest value of one design and its place. */
+static void maximum(const kf_quantity *of, int64_t count, const double *x, const double *h, double *value, double *at)
+{
+    enum { MOST = 64 };
+    int64_t marked[MOST], k;
+    const int64_t top = largest(of, count);
+    const double grid = of->sign * of->f[top];
+    const int64_t found = mark(of, count, h, grid, MOST, marked);
+    const int64_t visits = found <= MOST ? found : count - 1; /* too many to list: all intervals are visited */
+    int side;
+    *value = grid;
+    *at = x[top];
+    for (side = 0; side < 2; ++side) {
+        const double before = *value;
+        for (k = 0; k < visits; ++k) {
+            const int64_t i = found <= MOST ? marked[k] : k;
+            double c[6], slope[5], cut, begin, end, s, here;
+            take(of, i, h[i], c, slope);
+            cut = cut_of(slope);
+            begin = side == 0 ? 0.0 : cut;
+            end = side == 0 ? cut : 1.0;
+            if (!(polynomial(slope, 5, begin) > 0.0 && polynomial(slope, 5, end) < 0.0)) {
+                continue;
+            }
+            s = root(slope, 5, begin, end);
+            here = polynomial(c, 6, s);
+            if (here > before && here >= *value) {
+                *value = here;
+                *at = x[i] + s * h[i];
+            }
+        }
+    }
+}
+
+/* The largest values of quantities, (designs, count) with a step from design to design, and their places. */
+void kf_maxima(int64_t designs, int64_t count, const double *x, const double *h, double sign, const double *f,
+               ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *value, double *at)
+{
+    int64_t k;
+    for (k = 0; k < designs; ++k) {
+        const kf_quantity of = {f + k * f_step, v + k * v_step, a + k * a_step, sign};
+        if (is_finite(of.f, count) && is_finite(of.v, count) && is_finite(of.a, count)) {
+            maximum(&of, count, x, h, &value[k], &at[k]);
+        } else {
+            value[k] = at[k] = NAN;
+        }
+    }
+}
+
+/* A weighted sum of the numbers of three samples: k, and those before and after it in `near` and `far`. */
+static double weighted(const double *w, int64_t n, int64_t k, const double *v, const double *a, double near_change,
+                       int64_t near, double far_change, int64_t far)
+{
+    return w[k] * v[k] + w[n + k] * a[k] + w[2 * n + k] * near_change + w[3 * n + k] * v[near] + w[4 * n + k] * a[near]
+        + w[5 * n + k] * far_change + w[6 * n + k] * v[far] + w[7 * n + k] * a[far];
+}
+
+/* Third and fourth derivatives, (designs, count) without gaps, with weights (8, count). */
+void kf_higher(int64_t designs, int64_t count, bool is_closed, const double *w3, const double *w4, const double *f,
+               ptrdiff_t f_step, const double *v, ptrdiff_t v_step, const double *a, ptrdiff_t a_step, double *third,
+               double *fourth)
+{
+    const int64_t last = count - 1;
+    int64_t design, k;
+    for (design = 0; design < designs; ++design, f += f_step, v += v_step, a += a_step, third += count, fourth += count) {
+        const double turn = is_closed ? f[last] - f[0] : 0.0;
+        const int64_t before = is_closed ? last - 1 : 2, after = is_closed ? 1 : last - 2;
+        const double first[2] = {f[before] - f[0] + -1.0 * turn, f[1] - f[0]};
+        const double end[2] = {f[last - 1] - f[last], f[after] - f[last] + turn};
+        for (k = 1; k < last; ++k) {
+            third[k] = weighted(w3, count, k, v, a, f[k - 1] - f[k], k - 1, f[k + 1] - f[k], k + 1);
+            fourth[k] = weighted(w4, count, k, v, a, f[k - 1] - f[k], k - 1, f[k + 1] - f[k], k + 1);
+        }
+        third[0] = weighted(w3, count, 0, v, a, first[0], before, first[1], 1);
+        fourth[0] = weighted(w4, count, 0, v, a, first[0], before, first[1], 1);
+        third[last] = weighted(w3, count, last, v, a, end[0], last - 1, end[1], after);
+        fourth[last] = weighted(w4, count, last, v, a, end[0], last - 1, end[1], after);
+    }
+}

@@ -1,0 +1,220 @@
+"""Polynomials of degree 5 between samples (Hermite): coefficients, values, roots, extremes; all on arrays.
+
+`quintic.c` has the same arithmetic, operation by operation, so that its numbers are equal to the bit. It is used where
+many designs are measured and a compiler is found.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Rows = tuple[FloatArray, FloatArray, FloatArray]  # (m, n) values, rates and accelerations of a quantity
+
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
+_STEPS = 60  # of a root in its interval; Newton needs a few of them, halving at most 53
+_SAME = 1e-15  # of an interval; roots closer than this are equal
+_compiled: list[ctypes.CDLL] = []  # the library, once it is wanted
+
+
+@cache
+def use_compiled() -> None:
+    """Compile `quintic.c`, or find it in the cache; many designs are measured by it from then on.
+
+    Raises:
+        CompilerError: There is no compiler, or it fails.
+
+    """
+    from kinfmu.codegen.c import compiler
+
+    text = (Path(__file__).parent / "quintic.c").read_text("utf-8")
+    library = compiler.load({"quintic.c": text}, FLAGS)
+    place, count, step = ctypes.c_void_p, ctypes.c_int64, ctypes.c_ssize_t
+    table = (place, step)
+    library.kf_maxima.argtypes = (count, count, place, place, ctypes.c_double, *table * 3, place, place)
+    library.kf_higher.argtypes = (count, count, ctypes.c_bool, place, place, *table * 3, place, place)
+    library.kf_maxima.restype = library.kf_higher.restype = None
+    _compiled.append(library)
+
+
+def maxima(x: FloatArray, rows: Rows, sign: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return the largest value of each design and where it occurs; NaN for designs with unknown samples.
+
+    An interval counts if its polynomial can be larger than all samples: no polynomial exceeds its control points
+    (Bernstein), which are
+
+        f_0, f_0 + h v_0 / 5, f_0 + 2 h v_0 / 5 + h^2 a_0 / 20   and the same from the other end
+
+    Args:
+        x: (n,) arguments.
+        rows: (m, n) values, rates and accelerations.
+        sign: -1 for the largest value of the negative quantity.
+
+    Returns:
+        Largest values and their places, (m,).
+
+    """
+    if _compiled:
+        return _compiled_maxima(x, rows, sign)
+    f, v, a = (sign * row for row in rows)
+    is_known = np.logical_and.reduce([np.isfinite(row).all(axis=-1) for row in rows])
+    h = np.diff(x)
+    k = np.argmax(f, axis=1)  # of unknown samples the first
+    value, at = np.take_along_axis(f, k[:, None], 1)[:, 0].copy(), x[k]
+    c0 = h * v[:, :-1] * 0.2
+    c1 = f[:, :-1] + c0
+    c2 = c1 + c0 + h * h * a[:, :-1] * 0.05
+    c5 = h * v[:, 1:] * 0.2
+    c4 = f[:, 1:] - c5
+    c3 = c4 - c5 + h * h * a[:, 1:] * 0.05
+    highest = np.maximum(np.maximum(c1, c2), np.maximum(c3, c4))
+    design, place = np.nonzero((highest > value[:, None]) & is_known[:, None])
+    low, high = ([row[design, place + side] for row in (f, v, a)] for side in (0, 1))
+    c = coefficients(low, high, h[place])
+    slope = derived(c)
+    for begin, end in _peak_brackets(c):
+        is_peak = (polynomial(slope, begin) > 0.0) & (polynomial(slope, end) < 0.0)
+        s = root(slope[:, is_peak], begin[is_peak], end[is_peak])
+        where = x[place[is_peak]] + s * h[place[is_peak]]
+        _keep_largest(value, at, design[is_peak], polynomial(c[:, is_peak], s), where)
+    return np.where(is_known, value, np.nan), np.where(is_known, at, np.nan)
+
+
+def higher_derivatives(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_closed: bool) -> Rows:
+    """Return the third and fourth derivative at the samples, which are sums of numbers of three samples.
+
+    Args:
+        rows: (m, n) values, rates and accelerations.
+        weights: (8, n) of rate and acceleration of a sample, then of change, rate and acceleration of two others, for
+            the third derivative; and the same for the fourth.
+        is_closed: The motion goes round: the others are the neighbours; else at an end the next two samples.
+
+    Returns:
+        Second, third and fourth derivatives, (m, n) each.
+
+    """
+    if _compiled:
+        return _compiled_higher(rows, weights, is_closed=is_closed)
+    value, rate, acceleration = rows
+    n = value.shape[1]
+    near, far = neighbours(n, is_closed=is_closed)
+    data = [rate, acceleration]
+    for other, end, way in ((near, 0, -1.0), (far, -1, 1.0)):
+        change = value[:, other] - value
+        if is_closed:
+            change[:, end] += way * (value[:, -1] - value[:, 0])  # of an angle that goes round
+        data += [change, rate[:, other], acceleration[:, other]]
+    third, fourth = (np.asarray(sum(w * row for w, row in zip(ws, data, strict=True))) for ws in weights)
+    return acceleration, third, fourth
+
+
+def neighbours(n: int, *, is_closed: bool) -> tuple[IntArray, IntArray]:
+    """Return the numbers of the samples before and after each of n samples; at an open end those of the next two."""
+    near, far = np.arange(-1, n - 1), np.arange(1, n + 1)
+    near[0], far[-1] = (n - 2, 1) if is_closed else (2, n - 3)
+    return near, far
+
+
+def coefficients(low: list[FloatArray], high: list[FloatArray], h: FloatArray) -> FloatArray:
+    """Return the coefficients (6, ...) in s = 0 to 1 of the polynomial with value, rate, acceleration at both ends."""
+    f, v, a = low[0], low[1] * h, low[2] * h * h
+    df = high[0] - f - v - 0.5 * a
+    dv = high[1] * h - v - a
+    da = high[2] * h * h - a
+    return np.stack(
+        np.broadcast_arrays(
+            f, v, 0.5 * a, 10.0 * df - 4.0 * dv + 0.5 * da, -15.0 * df + 7.0 * dv - da, 6.0 * df - 3.0 * dv + 0.5 * da
+        )
+    )
+
+
+def polynomial(c: FloatArray, s: FloatArray) -> FloatArray:
+    value = c[-1]
+    for one in c[-2::-1]:
+        value = value * s + one
+    return np.asarray(value)
+
+
+def derived(c: FloatArray) -> FloatArray:
+    """Return the coefficients of the derivative by s."""
+    return c[1:] * np.arange(1.0, len(c)).reshape(-1, *[1] * (c.ndim - 1))
+
+
+def root(c: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return a root of each polynomial between two arguments of opposite signs: by Newton, else by halving."""
+    low, high = low.copy(), high.copy()
+    c1 = derived(c)
+    is_rising = polynomial(c, high) > polynomial(c, low)
+    s, is_found = 0.5 * (low + high), np.zeros(low.shape, bool)
+    for _ in range(_STEPS):
+        value = polynomial(c, s)
+        is_below = (value < 0.0) == is_rising
+        low, high = np.where(is_below, s, low), np.where(is_below, high, s)
+        slope = polynomial(c1, s)
+        step = s - value / np.where(slope == 0.0, np.inf, slope)
+        new = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        new = np.where(is_found, s, new)  # so that a root does not depend on the others
+        is_found |= np.abs(new - s) <= _SAME
+        s = new
+        if is_found.all():
+            break
+    return s
+
+
+def _peak_brackets(c: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Return two ranges of s for each polynomial, in each of which the slope changes its sign at most once.
+
+    The interval is cut where the slope has an extreme, unless its ends have slopes of opposite signs.
+    """
+    c1 = derived(c)
+    c2 = derived(c1)
+    zero, one = np.zeros(c.shape[1]), np.ones(c.shape[1])
+    is_whole = polynomial(c1, zero) * polynomial(c1, one) < 0.0
+    turns = ~is_whole & (polynomial(c2, zero) * polynomial(c2, one) < 0.0)
+    cut = np.where(is_whole, 1.0, 0.5)
+    cut[turns] = root(c2[:, turns], zero[turns], one[turns])
+    return [(zero, cut), (cut, one)]
+
+
+def _keep_largest(value: FloatArray, x: FloatArray, design: IntArray, found: FloatArray, at: FloatArray) -> None:
+    """Put the largest of the values found for each design in place of a smaller one."""
+    order = np.argsort(found, kind="stable")
+    order = order[found[order] > value[design[order]]]  # of several for one design, the last assignment stays
+    value[design[order]], x[design[order]] = found[order], at[order]
+
+
+def _compiled_maxima(x: FloatArray, rows: Rows, sign: float) -> tuple[FloatArray, FloatArray]:
+    tables = [_by_samples(row) for row in rows]
+    h, (m, n) = np.diff(x), tables[0].shape
+    x = np.ascontiguousarray(x)
+    value, at = np.empty(m), np.empty(m)
+    places = [part for table in tables for part in (_start(table), table.strides[0] // 8)]
+    _compiled[0].kf_maxima(m, n, _start(x), _start(h), sign, *places, _start(value), _start(at))
+    return value, at
+
+
+def _compiled_higher(rows: Rows, weights: tuple[FloatArray, FloatArray], *, is_closed: bool) -> Rows:
+    tables = [_by_samples(row) for row in rows]
+    m, n = tables[0].shape
+    given = [np.ascontiguousarray(one) for one in weights]
+    third, fourth = np.empty((m, n)), np.empty((m, n))
+    places = [part for table in tables for part in (_start(table), table.strides[0] // 8)]
+    _compiled[0].kf_higher(m, n, is_closed, *map(_start, given), *places, _start(third), _start(fourth))
+    return rows[2], third, fourth
+
+
+def _by_samples(row: FloatArray) -> FloatArray:
+    """Return an array whose samples follow each other in memory."""
+    return row if row.strides[1] == 8 and row.strides[0] % 8 == 0 else np.ascontiguousarray(row)
+
+
+def _start(array: NDArray[Any]) -> int:
+    place: int = array.__array_interface__["data"][0]
+    return place
