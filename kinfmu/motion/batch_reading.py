@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kinfmu.codegen.python import load_model
-from kinfmu.equations.graph import evaluate, symbols
+from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.measure import chosen_measures, measure, reason_without_value
 from kinfmu.motion.motion import Motion, argument_of
-from kinfmu.motion.needed import needed
-from kinfmu.motion.quintic import use_compiled
-from kinfmu.motion.track import FEWEST, FloatArray, Track
+from kinfmu.motion.needed import QuantityRead, needed
+from kinfmu.motion.quantity_model import quantity_model
+from kinfmu.motion.quintic import FloatArray, use_compiled
+from kinfmu.motion.track import FEWEST, Track
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.readings import Finding, LowestMargin, Reading
+from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
 from kinfmu.run.axis import TIME, axis_for
-from kinfmu.sweep import Designs, Model
-from kinfmu.sweep.designs import Batch, Driving, solve_batch
+from kinfmu.solver.python.status import Status
+from kinfmu.sweep import Model
+from kinfmu.sweep.designs import Batch, Driving, solve_batch, solve_by_library
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times
 from kinfmu.units import CoordinateName, InputName, Quantity, unit_of
 
@@ -76,7 +78,7 @@ class BatchReading:
         asked = [measures] if isinstance(measures, str) else None if measures is None else list(measures)
         self._readings = chosen_measures(mechanism, asked)
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
-        batch = Batch(model, parameters)
+        self._batch = batch = Batch(model, parameters)
         self.parameters, self._count = batch.parameters, batch.count
         driven = driven_by_inputs(model.plan.drivers, inputs, rows=batch.count) if inputs else None
         times = column_of("t", run_times(mechanism.run) if t is None else t)
@@ -87,8 +89,10 @@ class BatchReading:
         given = {name: np.asarray(value, dtype=float) for name, value in inputs.items()}
         self._model, self._driving = model, Driving(times, driven, given)
         self._tolerance, self._anew = tolerance, anew
-        names = needed(mechanism, self._readings).coordinates
-        self._columns = [k for k, name in enumerate(model.outputs) if name in names]
+        self._needed = needed(mechanism, self._readings)
+        self._quantities = {reading.name: needed(mechanism, [reading]).quantities for reading in self._readings}
+        self._columns = [k for k, name in enumerate(model.outputs) if name in self._needed.coordinates]
+        self._idle: list[tuple[FloatArray, NDArray[np.int32]]] = []  # memory of earlier parts
         self.motion, self._order = self._empty_motion()
         self._alone = self._read_alone()
         self.units = self._units_of_parameters()
@@ -112,51 +116,108 @@ class BatchReading:
         size = max(1, SAMPLES_AT_ONCE // len(self._driving.times))
         parts = [slice(first, min(first + size, self._count)) for first in range(0, self._count, size)]
         is_native = self._model.is_native(self._count * len(self._driving.times))
-        if is_native:
-            use_compiled()
-        if is_native and workers > 1:
+        if not is_native or not self._needed.quantities:
+            found = [self._measure(part) for part in parts]
+        elif self._prepare_compiled() and workers > 1:
             with ThreadPoolExecutor(workers) as pool:
-                found = list(pool.map(lambda part: self._measure(part, 1), parts))
+                found = list(pool.map(self._measure_compiled, parts))
         else:
-            found = [self._measure(part, int(is_native)) for part in parts]
+            found = [self._measure_compiled(part) for part in parts]
         for part, reasons in zip(parts, found, strict=True):
             self.reasons |= {part.start + k: reason for k, reason in reasons.items()}
 
-    def _measure(self, part: slice, threads: int) -> dict[int, str]:
-        """Solve and measure the designs of a part; return the reasons of those without values, by number in it."""
-        driving = self._driving
-        if driving.driven is not None and driving.driven[0].ndim == 3:
-            of_part = (driving.driven[0][part], driving.driven[1][part], driving.driven[2][part])
-            inputs = {name: array[part] if array.ndim == 2 else array for name, array in driving.inputs.items()}
-            driving = Driving(driving.times, of_part, inputs)
-        parameters = {name: array if len(array) == 1 else array[part] for name, array in self.parameters.items()}
-        count = part.stop - part.start
-        batch = Batch(self._model, parameters, count)
-        designs = solve_batch(batch, driving, highest=2, tolerance=self._tolerance, anew=self._anew, threads=threads)
-        self.status[part] = designs.status.max(axis=1, initial=0)
-        with np.errstate(all="ignore"):  # samples without numbers are NaN
-            return self._read(part, batch, designs)
+    def _prepare_compiled(self) -> bool:
+        """Compile the quantities that are read; True."""
+        use_compiled()
+        quantities = [one for one in self._needed.quantities if one not in self.motion.fixed]
+        model, names = quantity_model(self._model, quantities)
+        model.load_library()
+        self._compiled = Batch(model, self.parameters)
+        self._count_kept = len(quantities)
+        self.motion = replace(self.motion, outputs=model.outputs, computed=names, _tracks={})
+        return True
 
-    def _read(self, part: slice, batch: Batch, designs: Designs) -> dict[int, str]:
-        """Read the measures of a part."""
-        good = designs.good
-        is_solved = good.any(axis=1)
+    def _measure_compiled(self, part: slice) -> dict[int, str]:
+        """Solve and measure the designs of a part by compiled code; return reasons as `_measure` does."""
+        batch, driving = self._compiled.part(part), self._driving_of(part)
+        shape = (batch.count, self._count_kept, len(driving.times))
+        kept = self._idle.pop() if self._idle else (np.empty((3, *shape)), np.empty((shape[0], shape[2]), np.int32))
+        if len(kept[1]) < batch.count:
+            kept = (np.empty((3, *shape)), np.empty((shape[0], shape[2]), np.int32))
+        tables, status = [table[: batch.count].transpose(0, 2, 1) for table in kept[0]], kept[1][: batch.count]
+        with np.errstate(all="ignore"):  # samples without numbers are NaN
+            alone, found = solve_by_library(batch, driving, tables, status, self._tolerance, 1, anew=self._anew)
+            good = np.asarray(status <= Status.BRIDGED)
+            is_solved = np.asarray(good.any(axis=1))
+            is_solved[list(alone)] = False
+            self.status[part] = status.max(axis=1, initial=0)
+            reasons = {k: found[k] for k in np.flatnonzero(~is_solved).tolist() if k in found}
+            motion = self._motion_of(batch, [table[:, self._order] for table in tables])
+            self._read(part, batch, motion, good, is_solved, reasons)
+            for k in alone:
+                reason = self._read_one(self._readings, batch, k, part.start + k)
+                if reason:
+                    reasons[k] = reason
+        self._idle.append(kept)
+        return reasons
+
+    def _measure(self, part: slice) -> dict[int, str]:
+        """Solve and measure the designs of a part; return the reasons of those without values, by number in it."""
+        batch = self._batch.part(part)
+        designs = solve_batch(
+            batch, self._driving_of(part), highest=2, tolerance=self._tolerance, anew=self._anew, threads=0
+        )
+        self.status[part] = designs.status.max(axis=1, initial=0)
+        is_solved = np.asarray(designs.good.any(axis=1))
         reasons = {k: designs.reasons[k] for k in np.flatnonzero(~is_solved).tolist()}
-        motion = self._motion_of(batch, designs)
+        tables = [
+            np.ascontiguousarray(table.transpose(0, 2, 1)[:, self._columns, self._order]).transpose(0, 2, 1)
+            for table in (designs.values, designs.rates, designs.accelerations)
+            if table is not None
+        ]
+        with np.errstate(all="ignore"):  # samples without numbers are NaN
+            self._read(part, batch, self._motion_of(batch, tables), designs.good, is_solved, reasons)
+        return reasons
+
+    def _driving_of(self, part: slice) -> Driving:
+        """Return what moves the designs of a part."""
+        times, driven, given = self._driving
+        inputs = {name: array[part] if array.ndim == 2 else array for name, array in given.items()}
+        if driven is not None and driven[0].ndim == 3:
+            driven = (driven[0][part], driven[1][part], driven[2][part])
+        return Driving(
+            times, driven, {name: array[part] if array.ndim == 2 else array for name, array in inputs.items()}
+        )
+
+    def _read(
+        self,
+        part: slice,
+        batch: Batch,
+        motion: Motion,
+        good: NDArray[np.bool_],
+        is_solved: NDArray[np.bool_],
+        reasons: dict[int, str],
+    ) -> None:
+        """Read the measures of the designs of a part that are solved; add the reasons of those without values."""
+        closed_ones: dict[tuple[QuantityRead, ...], NDArray[np.bool_]] = {}
         for reading in self._readings:
             value, at = self.values[reading.name][part], self.at[reading.name][part]
             if reading.name in self._alone:
                 for k in np.flatnonzero(is_solved).tolist():
-                    reason = self._read_one(reading.name, batch, k, part.start + k, value, at)
+                    reason = self._read_one([reading], batch, k, part.start + k)
                     if reason:
                         reasons.setdefault(k, reason)
                 continue
-            closed = motion.goes_round(reading)
+            quantities = self._quantities[reading.name]
+            if quantities not in closed_ones:
+                closed_ones[quantities] = motion.goes_round(quantities)
             for is_closed in (True, False):
-                chosen = np.flatnonzero(is_solved & (closed == is_closed))
-                if not len(chosen):
+                is_chosen = is_solved & (closed_ones[quantities] == is_closed)
+                if not is_chosen.any():
                     continue
-                some = (motion if len(chosen) == len(good) else motion.of_designs(chosen)).going_round(is_closed)
+                chosen = np.flatnonzero(is_chosen)
+                some = motion if len(chosen) == len(good) else motion.of_designs(chosen)
+                some = some.going_round(is_closed)
                 try:
                     found = self._found(reading, some)
                 except RequestError as error:
@@ -165,24 +226,31 @@ class BatchReading:
                 value[chosen] = found.value
                 for column, x in enumerate(found.at):
                     at[chosen, column] = some.driven_at(x)
-            for k in np.flatnonzero(~np.isfinite(value)).tolist():
+            for k in np.flatnonzero(is_solved & ~np.isfinite(value)).tolist():
                 if k not in reasons:
                     reasons[k] = reason_without_value(self._samples(part.start + k), good[k])
-        return reasons
 
-    def _read_one(self, name: str, batch: Batch, k: int, design: int, value: FloatArray, at: FloatArray) -> str:
-        """Read a measure of one design, as `measure` does; return why it has no value."""
-        inputs: dict[str, Any] = {
-            key: array[design] if array.ndim == 2 else array for key, array in self._driving.inputs.items()
-        }
+    def _read_one(self, readings: Sequence[Reading], batch: Batch, k: int, design: int) -> str:
+        """Read measures of one design, as `measure` does; return why one has no value."""
+        given = self._driving.inputs
+        inputs: dict[str, Any] = {key: array[design] if array.ndim == 2 else array for key, array in given.items()}
         times = None if inputs else self._driving.times
         try:
             run = self._model.solve(times, parameters=batch.of(k), tolerance=self._tolerance, anew=self._anew, **inputs)
-            found = measure(run, [self._asked[name]])[name]
         except KinfmuError as error:
+            self.status[design] = Status.INCONSISTENT
             return str(error)
-        value[k], at[k] = found.value, found.at
-        return found.reason
+        self.status[design] = run.status.max(initial=0)
+        reasons = []
+        for reading in readings:
+            try:
+                found = measure(run, [self._asked[reading.name]])[reading.name]
+            except KinfmuError as error:
+                reasons.append(str(error))
+                continue
+            self.values[reading.name][design], self.at[reading.name][design] = found.value, found.at
+            reasons += [found.reason] if found.reason else []
+        return reasons[0] if reasons else ""
 
     def _found(self, reading: Reading, motion: Motion) -> Finding:
         try:
@@ -190,23 +258,17 @@ class BatchReading:
         except RequestError as error:
             raise RequestError(f"[measures.{reading.name}]: {error}") from None
 
-    def _motion_of(self, batch: Batch, designs: Designs) -> Motion:
+    def _motion_of(self, batch: Batch, tables: Sequence[FloatArray]) -> Motion:
         """Return the motion of the designs of a part."""
-        mechanism = self._model.mechanism
-        tables = [
-            np.ascontiguousarray(table.transpose(0, 2, 1)[:, self._columns, self._order]).transpose(0, 2, 1)
-            for table in (designs.values, designs.rates, designs.accelerations)
-            if table is not None
-        ]
-        known = {name: batch.parameters[name] for name in self._open}
+        motion = self.motion
+        places_bodies = not motion.computed or any(isinstance(one, PressureAngle) for one in self._readings)
+        if self._open and places_bodies:
+            given = {name: batch.parameters[name] for name in self._open}
+            motion = replace(motion, points=points_of_designs(self._model.mechanism, given))
+        fixed = {**motion.fixed, **self._fixed_of(batch)}
+        drive = motion.drive and replace(motion.drive, is_closed=False)
         return replace(
-            self.motion,
-            tables=(tables[0], tables[1], tables[2]),
-            fixed={**self.motion.fixed, **self._fixed_of(batch)},
-            points=points_of_designs(mechanism, known),
-            is_closed=False,
-            drive=replace(self.motion.drive, is_closed=False) if self.motion.drive else None,
-            _tracks={},
+            motion, tables=(tables[0], tables[1], tables[2]), fixed=fixed, is_closed=False, drive=drive, _tracks={}
         )
 
     @cached_property
@@ -216,17 +278,22 @@ class BatchReading:
 
     def _fixed_of(self, batch: Batch) -> dict[CoordinateName, FloatArray]:
         """Return coordinates that a joint holds at a constant which differs between designs, (m, 1)."""
-        plan = self._model.plan
+        names = [parameter_symbol(parameter.name) for parameter in self._model.plan.parameters]
+        rows = batch.values.tolist() if self._open_fixed else []
+        found = [evaluate(list(self._open_fixed.values()), dict(zip(names, row, strict=True))) for row in rows]
+        table = np.array(found, dtype=float).reshape(len(found), len(self._open_fixed))
+        return {name: table[:, k : k + 1] for k, name in enumerate(self._open_fixed)}
+
+    @cached_property
+    def _open_fixed(self) -> dict[CoordinateName, Node]:
+        """Constant coordinates that are read and that depend on parameters which are given, as nodes."""
         given = {parameter_symbol(name) for name in self._open}
-        nodes = {
+        read = self._needed.quantities if self.motion.computed else self._needed.coordinates
+        return {
             name: node
-            for name, node in plan.fixed_nodes.items()
-            if given.intersection(symbol.name for symbol in symbols([node]))
+            for name, node in self._model.plan.fixed_nodes.items()
+            if name in read and given.intersection(symbol.name for symbol in symbols([node]))
         }
-        names = [parameter_symbol(parameter.name) for parameter in plan.parameters]
-        rows = [evaluate(list(nodes.values()), dict(zip(names, row, strict=True))) for row in batch.values.tolist()]
-        table = np.array(rows, dtype=float).reshape(len(rows), len(nodes))
-        return {name: table[:, k : k + 1] for k, name in enumerate(nodes)}
 
     def _empty_motion(self) -> tuple[Motion, slice]:
         """Return a motion at the samples that goes round, with NaN for the first design, and the samples' order."""
@@ -268,7 +335,7 @@ class BatchReading:
         names = tuple(name for driver in plan.drivers for name in driver.inputs)
         if driven is None:
             axis = TIME
-            constants = Batch(self._model, self.parameters).constants[design % self._count]
+            constants = self._batch.constants[design]
             drive = load_model(plan).drive
             table = np.array([drive(time, tuple(constants.tolist())) for time in times.tolist()], dtype=float)
             inputs = table.reshape(len(times), 3, len(plan.drivers)).transpose(0, 2, 1)

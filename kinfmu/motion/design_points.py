@@ -9,7 +9,7 @@ import numpy as np
 from kinfmu.measures.arithmetic import Value, atan2_like, cos, sin, sqrt
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.parameters import in_order, parameter_values
-from kinfmu.motion.track import FloatArray
+from kinfmu.motion.quintic import FloatArray
 
 sin.register(np.ndarray, np.sin)
 cos.register(np.ndarray, np.cos)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from kinfmu.equations.taylor import Taylor
 from kinfmu.measures.arithmetic import sqrt
-from kinfmu.motion.track import FloatArray, IntArray, Track
+from kinfmu.motion.quintic import FloatArray, IntArray
+from kinfmu.motion.track import Track
 
 _ROUNDS = 5  # of linearizing and exchanging; the line and the circle need two or three
 _EXCHANGES = 60  # per round; each makes the smallest possible distance larger

@@ -8,37 +8,47 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.motion.track import FloatArray
-from kinfmu.units import CoordinateName
+from kinfmu.motion.track import Track
 
 _SAME_POSE = 1e-9  # [rad, sizes]; a motion whose first and last pose differ by less goes round
 _SAME_RATE = 1e-6  # of the largest; the same for rates and accelerations
+_FEW = 16  # distance of the samples that suffice in most cases
 
 
-def goes_round(names: Sequence[CoordinateName], tables: Sequence[FloatArray]) -> NDArray[np.bool_]:
-    """Return whether motions go round: pose, rates and accelerations of the last sample are those of the first.
+def goes_round(tracks: Sequence[tuple[Track, bool]]) -> NDArray[np.bool_]:
+    """Return whether motions go round: quantities, rates and accelerations of the last sample are those of the first.
+
+    They are compared with their largest values; some of the samples show most of these.
 
     Args:
-        names: Names of the k coordinates that are compared.
-        tables: Their values, rates and accelerations, (..., n, k) each.
+        tracks: One or more quantities, each with True if it is an angle, which may be whole turns further.
 
     Returns:
         (...) True for the designs that go round; False where a sample has no numbers, or nothing moves.
 
     """
-    is_angle = np.array([name.is_angle for name in names], bool)
-    values = tables[0]
-    apart = values[..., -1, :] - values[..., 0, :]
-    apart = np.where(is_angle, apart - math.tau * np.round(apart / math.tau), apart)
-    travel = values.max(axis=-2, initial=-np.inf) - values.min(axis=-2, initial=np.inf)
-    size = np.maximum(travel[..., ~is_angle].max(axis=-1, initial=0.0), 1e-300)[..., None]
-    is_same = np.all(np.abs(apart) <= _SAME_POSE * np.where(is_angle, 1.0, size), axis=-1)
-    for table in tables[1:]:
-        largest = np.maximum(table.max(axis=-2, initial=0.0), -table.min(axis=-2, initial=0.0))
-        of_kind = np.where(
-            is_angle,
-            largest[..., is_angle].max(axis=-1, initial=0.0)[..., None],
-            largest[..., ~is_angle].max(axis=-1, initial=0.0)[..., None],
-        )
-        is_same &= np.all(np.abs(table[..., -1, :] - table[..., 0, :]) <= _SAME_RATE * of_kind, axis=-1)
-    return np.asarray(is_same & (travel > 0.0).any(axis=-1))
+    is_known = np.logical_and.reduce([np.isfinite(row.sum(axis=-1)) for track, _ in tracks for row in track.rows])
+    same = _is_same(tracks, _FEW)
+    return np.asarray(is_known & (same if same.all() else _is_same(tracks, 1)))
+
+
+def _is_same(tracks: Sequence[tuple[Track, bool]], step: int) -> NDArray[np.bool_]:
+    """Compare the ends with the largest values among every so manieth sample, of angles and of other quantities."""
+    is_same, moves = np.asarray(True), np.asarray(False)
+    for order in range(3):
+        scales: dict[bool, NDArray[np.float64]] = {}
+        apart: list[tuple[NDArray[np.float64], bool]] = []
+        for track, is_angle in tracks:
+            row, some = track.rows[order], track.rows[order][..., ::step]
+            low, high = some.min(axis=-1), some.max(axis=-1)
+            difference = row[..., -1] - row[..., 0]
+            if order == 0:
+                moves = moves | (high > low)
+                difference -= math.tau * np.round(difference / math.tau) if is_angle else 0.0
+            size = high - low if order == 0 else np.maximum(high, -low)
+            scales[is_angle] = np.maximum(scales.get(is_angle, np.asarray(1e-300)), size)
+            apart.append((np.abs(difference), is_angle))
+        for difference, is_angle in apart:
+            within = _SAME_RATE * scales[is_angle] if order else _SAME_POSE * (1.0 if is_angle else scales[is_angle])
+            is_same = is_same & (difference <= within)
+    return np.asarray(is_same & moves)

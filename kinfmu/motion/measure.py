@@ -13,7 +13,8 @@ from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion.motion import Motion
-from kinfmu.readings import Reading
+from kinfmu.motion.needed import needed
+from kinfmu.readings import LowestMargin, Reading
 from kinfmu.run import Run
 from kinfmu.run.axis import HasAxis, axis_of
 from kinfmu.units import unit_of
@@ -83,9 +84,11 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> Measur
         MechanismError: A measure is invalid.
 
     """
-    motion = Motion.of_run(run)
-    chosen = chosen_measures(motion.mechanism, measures)
-    return MeasuredValues((reading.name, _value(run, motion, reading)) for reading in chosen)
+    if run.mechanism is None:
+        raise RequestError("the run holds no mechanism, so nothing can be measured on it")
+    readings = chosen_measures(run.mechanism, measures)
+    motion = Motion.of_run(run, with_margin=any(isinstance(reading, LowestMargin) for reading in readings))
+    return MeasuredValues((reading.name, _value(run, motion, reading)) for reading in readings)
 
 
 def chosen_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> tuple[Reading, ...]:
@@ -107,7 +110,8 @@ def chosen_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | No
 def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
     unit = motion.mechanism.length_unit
     try:
-        motion = motion.going_round(bool(motion.goes_round(reading)))
+        quantities = needed(motion.mechanism, [reading]).quantities
+        motion = motion.going_round(bool(motion.goes_round(quantities)))
         found = reading.read(motion.part(reading.begin, reading.end))
     except RequestError as error:
         raise RequestError(f"[measures.{reading.name}]: {error}") from None

@@ -20,9 +20,9 @@ from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
-from kinfmu.motion.needed import needed
-from kinfmu.motion.track import FEWEST, FloatArray, IntArray, Track
-from kinfmu.readings import Reading
+from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
+from kinfmu.motion.quintic import FloatArray, IntArray
+from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
 from kinfmu.units import CoordinateName, Quantity
@@ -49,6 +49,7 @@ class Motion:
         margin: (..., n) 1 / condition of the samples; None if unknown.
         is_closed: True if the motion goes round: the last sample is the first, after one period.
         window: First and last argument of the part that readings see; None: all of it.
+        computed: Outputs that are quantities which measures read, by the quantity.
 
     """
 
@@ -64,11 +65,16 @@ class Motion:
     margin: FloatArray | None = None
     is_closed: bool = False
     window: tuple[float, float] | None = None
-    _tracks: dict[str, Track] = field(default_factory=dict, repr=False)
+    computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
+    _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
+    _known: dict[str, tuple[CoordinateName, int]] = field(default_factory=dict, repr=False)  # of all parts
+    _windows: dict[tuple[float | None, float | None, bool], tuple[float, float]] = field(
+        default_factory=dict, repr=False
+    )
 
     @classmethod
-    def of_run(cls, run: Run) -> Motion:
-        """Return the motion of a run.
+    def of_run(cls, run: Run, *, with_margin: bool = True) -> Motion:
+        """Return the motion of a run; margins are computed only if they are wanted.
 
         Raises:
             RequestError: The run has too few samples or no mechanism, or its samples are not in the order of time or of
@@ -86,15 +92,15 @@ class Motion:
         if not np.all(np.diff(x) > 0.0):
             raise RequestError("the samples of the run are not in ascending or descending order")
         tables = tuple(table[order] for table in (run.values, run.rates, run.accelerations))
-        drive, driver, is_closed = None, TIME, bool(goes_round(run.outputs, tables))
+        drive, driver = None, TIME
         if len(run.input_names) == 3 or run.axis != TIME:
             column = 0 if run.axis == TIME else run.input_names.index(run.axis)
             driver = run.input_names[column].driver
             u, ud, udd = (run.inputs[order, column + k] for k in range(3))
             if per != "time":
                 ud, udd = np.ones_like(x), np.zeros_like(x)
-            drive = Track(x, u, ud, udd, is_closed)
-        return cls(
+            drive = Track(x, u, ud, udd)
+        motion = cls(
             mechanism,
             x,
             per,
@@ -104,17 +110,15 @@ class Motion:
             drive,
             mechanism.body_points,
             driver,
-            run.margin[order],
-            is_closed,
+            run.margin[order] if with_margin else None,
         )
+        outputs = [(motion.quantity_track(name), name.is_angle) for name in run.outputs]
+        return motion.going_round(bool(outputs) and bool(goes_round(outputs)))
 
-    def goes_round(self, reading: Reading) -> NDArray[np.bool_]:
-        """Return (...) whether what a measure reads goes round, whatever else moves."""
-        names = needed(self.mechanism, [reading]).coordinates
-        columns = [k for k, name in enumerate(self.outputs) if name in names]
-        if not columns:
-            return np.full(self.tables[0].shape[:-2], self.is_closed)
-        return goes_round([self.outputs[k] for k in columns], [table[..., columns] for table in self.tables])
+    def goes_round(self, quantities: Sequence[QuantityRead]) -> NDArray[np.bool_]:
+        """Return (...) whether quantities go round, whatever else moves."""
+        moving = [(self.quantity_track(one), is_angle(one)) for one in quantities if one not in self.fixed]
+        return goes_round(moving) if moving else np.full(self.tables[0].shape[:-2], self.is_closed)
 
     def going_round(self, is_closed: bool) -> Motion:
         """Return the motion as one that goes round, or does not."""
@@ -138,6 +142,13 @@ class Motion:
             margin=None,
             _tracks={},
         )
+
+    @property
+    def _orders(self) -> dict[str, tuple[CoordinateName, int]]:
+        """Each coordinate and its rates, with the coordinate and the order."""
+        if not self._known:
+            self._known.update(coordinate_orders(self.mechanism))
+        return self._known
 
     @property
     def argument(self) -> Track:
@@ -166,6 +177,8 @@ class Motion:
         """Return values of the driver at arguments (...), which may be in the period before or after the motion."""
         if self.drive is None:
             return x
+        if self.drive.is_linear:
+            return np.asarray(self.drive.rate[0] * x + (self.drive.value[0] - self.drive.rate[0] * self.drive.x[0]))
         span, travel = self.drive.span, self.drive.value[-1] - self.drive.value[0]
         turns = np.floor((x - self.x[0]) / span) if self.is_closed else np.zeros_like(x)
         found = self.drive.at((x - turns * span).reshape(-1))[0].reshape(np.shape(x))
@@ -180,6 +193,13 @@ class Motion:
         """
         if begin is None and end is None:
             return self
+        key = (begin, end, self.is_closed)
+        if key not in self._windows:
+            self._windows[key] = self._window(begin, end)
+        return replace(self, window=self._windows[key], _tracks=self._tracks)
+
+    def _window(self, begin: float | None, end: float | None) -> tuple[float, float]:
+        """Return the first and last argument between two values of the driver."""
         drive = self.argument if self.drive is None else self.drive
         ends = sorted((float(drive.value[0]), float(drive.value[-1])))
         if not (np.all(drive.rate > 0.0) or np.all(drive.rate < 0.0)):
@@ -200,7 +220,7 @@ class Motion:
             stop += drive.span
         if stop <= start:
             raise RequestError(f"'begin' {wanted[0]:.9g} must be before 'end' {wanted[1]:.9g}")
-        return replace(self, window=(start, stop), _tracks={})
+        return start, stop
 
     def require_closed(self, word: str) -> None:
         """Raise a RequestError unless the motion goes round; word: what needs that."""
@@ -209,7 +229,7 @@ class Motion:
 
     def quantity(self, of: str | Measure, order: int = 0) -> Quantity:
         """Return what a quantity, or its derivative of an order, measures."""
-        own = coordinate_orders(self.mechanism).get(of) if isinstance(of, str) else None
+        own = self._orders.get(of) if isinstance(of, str) else None
         order += own[1] if own else 0
         return Quantity(kind_of_measured(of), order, self.per if order else "time")
 
@@ -257,9 +277,11 @@ class Motion:
 
     def cosine(self, a: Vector, b: Vector) -> Track:
         """Return the cosine of the angle between two vectors."""
-        (a_x, a_y), (b_x, b_y) = a, b
-        sizes = sqrt((a_x * a_x + a_y * a_y) * (b_x * b_x + b_y * b_y))
-        return self._cut(self._as_track((a_x * b_x + a_y * b_y) / sizes))
+        return self._cut(self._as_track(cosine_between(a, b)))
+
+    def line_cosine(self, first: tuple[str, str], second: tuple[str, str]) -> Track:
+        """Return the cosine of the angle between two lines, each from a point to another."""
+        return self._cut(self.quantity_track(Cosine(first, second)))
 
     def arc_sine(self, sine: FloatArray) -> FloatArray:
         """Return the angle [rad] of a sine that may exceed 1 by rounding."""
@@ -297,35 +319,43 @@ class Motion:
         value = np.take_along_axis(margin, k[..., None], -1)[..., 0]
         return value, np.where(np.isnan(value), np.nan, x[inside][k])
 
+    def quantity_track(self, quantity: QuantityRead) -> Track:
+        """Return a quantity that measures read, without regard to the window."""
+        if quantity not in self._tracks:
+            self._tracks[quantity] = self._new_track(quantity)
+        return self._tracks[quantity]
+
+    def _new_track(self, quantity: QuantityRead) -> Track:
+        if quantity in self.computed:
+            return self._coordinate(self.computed[quantity])
+        if isinstance(quantity, CoordinateName):
+            return self._coordinate(quantity)
+        return self._as_track(value_of(quantity, self._placement))
+
     def _whole(self, of: str | Measure) -> Track:
         """Return a quantity as `track` does, without regard to the window."""
         if isinstance(of, str):
-            name, order = coordinate_orders(self.mechanism).get(of, (of, 0))
-            return _derived(self._coordinate(name), order)
-        return self._as_track(of.value(self._placement(of.bodies())))
+            name, order = self._orders.get(of, (of, 0))
+            return _derived(self.quantity_track(name), order)  # type: ignore[arg-type]  # unknown names are refused
+        return self.quantity_track(of)
 
     def _path(self, point: str) -> tuple[Track, Track]:
         """Return the world coordinates of a point, without regard to the window."""
-        x, y = self._placement((body_of(point),)).point(point)
-        return self._as_track(x), self._as_track(y)
+        return self.quantity_track(PathCoordinate(point, "x")), self.quantity_track(PathCoordinate(point, "y"))
 
     def _coordinate(self, name: str) -> Track:
         """Return the track of a coordinate."""
-        if name not in self._tracks:
-            if name in self.fixed:
-                constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
-                track = Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
-            elif name in self.outputs:
-                k = [str(output) for output in self.outputs].index(name)
-                value, rate, acceleration = (table[..., k] for table in self.tables)
-                track = Track(self.x, value, rate, acceleration, self.is_closed)
-            else:
-                raise RequestError(
-                    f"the run has no output '{name}', which a measure needs{suggestion(name, self.outputs)}; "
-                    f"outputs: {listed(self.outputs)}"
-                )
-            self._tracks[name] = track
-        return self._tracks[name]
+        if name in self.fixed:
+            constant = self.fixed[name] + np.zeros_like(self.x)  # type: ignore[index]  # a name is a text
+            return Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
+        if name not in self.outputs:
+            raise RequestError(
+                f"the run has no output '{name}', which a measure needs{suggestion(name, self.outputs)}; "
+                f"outputs: {listed(self.outputs)}"
+            )
+        k = [str(output) for output in self.outputs].index(name)
+        value, rate, acceleration = (table[..., k] for table in self.tables)
+        return Track(self.x, value, rate, acceleration, self.is_closed)
 
     def _cut(self, track: Track) -> Track:
         """Return the part of a track that is in the window."""
@@ -338,7 +368,7 @@ class Motion:
         poses = {
             body: GROUND
             if body == GROUND_NAME
-            else BodyFrame.of(*(self._coordinate(f"{body}.{axis}").taylor for axis in ("x", "y", "phi")))
+            else BodyFrame.of(*(self.quantity_track(CoordinateName(body, axis)).taylor for axis in ("x", "y", "phi")))
             for body in {*bodies, GROUND_NAME}
         }
         return Placement(poses, self.points)

@@ -7,7 +7,7 @@ Extremes and crossings of a level are those of the polynomials, not of the sampl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,11 @@ class Track:
         """Length of the motion, the period of one that goes round."""
         return float(self.x[-1] - self.x[0])
 
+    @cached_property
+    def is_linear(self) -> bool:
+        """True if the quantity of one design changes at a constant rate."""
+        return bool(np.ptp(self.rate) == 0.0) and not np.any(self.acceleration)
+
     @property
     def is_known(self) -> NDArray[np.bool_]:
         """(...) True for the designs in which every sample has numbers."""
@@ -112,12 +117,9 @@ class Track:
         g is the polynomial of degree 5 through two other samples: both neighbours, at an end the next two. Its values
         are sums of the samples' numbers with weights that depend on x only.
         """
-        near, far = neighbours(len(self.x), is_closed=self.is_closed)
-        d_near, d_far = self.x[near] - self.x, self.x[far] - self.x
-        if self.is_closed:
-            d_near[0] -= self.span
-            d_far[-1] += self.span
-        found = higher_derivatives(self._flat, _weights(d_near, d_far), is_closed=self.is_closed)
+        found = higher_derivatives(
+            self._flat, _weights(self.x.tobytes(), is_closed=self.is_closed), is_closed=self.is_closed
+        )
         shape = self.value.shape
         return found[0].reshape(shape), found[1].reshape(shape), found[2].reshape(shape)
 
@@ -250,12 +252,19 @@ class Track:
         return tuple(np.where(known, one, np.nan).reshape(shape) for one in (start, stop))  # type: ignore[return-value]
 
 
-def _weights(d_a: FloatArray, d_b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the weights (8, n) of the third and of the fourth derivative.
+@lru_cache(maxsize=8)
+def _weights(arguments: bytes, *, is_closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the weights (8, n) of the third and of the fourth derivative at n arguments, as bytes.
 
     They belong to rate and acceleration of a sample, then to change, rate and acceleration of two others at the
     distances d_a and d_b.
     """
+    x = np.frombuffer(arguments)
+    near, far = neighbours(len(x), is_closed=is_closed)
+    d_a, d_b = x[near] - x, x[far] - x
+    if is_closed:
+        d_a[0] -= x[-1] - x[0]
+        d_b[-1] += x[-1] - x[0]
     v, a, f_a, v_a, a_a, f_b, v_b, a_b = np.eye(8)[:, :, None]
     sides = []
     for d, f_d, v_d, a_d in ((d_a, f_a, v_a, a_a), (d_b, f_b, v_b, a_b)):

@@ -30,8 +30,7 @@ class TransmissionAngle(Reading):
     end: End = None
 
     def read(self, motion: Motion) -> Finding:
-        cosine = motion.cosine(motion.vector(self.coupler), motion.vector(self.output))
-        worst = cosine.largest_size()
+        worst = motion.line_cosine(self.coupler, self.output).largest_size()
         return Finding(motion.arc_sine(worst.value), ANGLE, (worst.x,))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -119,20 +120,27 @@ class Batch:
     Args:
         model: The model.
         parameters: Arrays (m,), or numbers and texts that hold for all designs, by name.
-        count: The number m of designs; default: that of the arrays.
 
     Raises:
         RequestError: A name is unknown, or arrays have other lengths.
 
     """
 
-    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str], count: int | None = None) -> None:
+    def __init__(self, model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> None:
         self.model = model
         self.plan = model.plan
         self.parameters = _arrays(model, parameters)
-        self.count = count or max((len(array) for array in self.parameters.values()), default=1)
+        self.count = max((len(array) for array in self.parameters.values()), default=1)
         self.values = self._rows(self.plan.parameters)
         self.constants = self._rows(self.plan.law_constants)
+
+    def part(self, part: slice) -> Batch:
+        """Return a batch of some of the designs."""
+        some = copy(self)
+        some.parameters = {name: array[part] if len(array) > 1 else array for name, array in self.parameters.items()}
+        some.values, some.constants = self.values[part], self.constants[part]
+        some.count = len(some.values)
+        return some
 
     def of(self, design: int) -> dict[str, float]:
         """Return the parameters of one design."""
@@ -190,7 +198,7 @@ def solve_batch(batch: Batch, driving: Driving, *, highest: int, tolerance: floa
     reasons: dict[int, str] = {}
     alone: Sequence[int] = range(batch.count)
     if threads:
-        alone, reasons = _by_library(batch, driving, tables, status, tolerance, threads, anew=anew)
+        alone, reasons = solve_by_library(batch, driving, tables, status, tolerance, threads, anew=anew)
     assembled = []
     for design in alone:
         reason, was_assembled = _alone(batch, driving, design, tables, status, tolerance, anew=anew)
@@ -211,7 +219,7 @@ def solve_batch(batch: Batch, driving: Driving, *, highest: int, tolerance: floa
     )
 
 
-def _by_library(
+def solve_by_library(
     batch: Batch,
     driving: Driving,
     tables: Wanted,

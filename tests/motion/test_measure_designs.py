@@ -11,6 +11,8 @@ import kinfmu
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.measures import AngleBetween, DistanceBetween
 from kinfmu.mechanism.toml_file import parse
+from kinfmu.motion import Track, quintic
+from kinfmu.motion.quintic import use_compiled
 from kinfmu.readings import (
     READINGS,
     Dwell,
@@ -218,6 +220,44 @@ def test_workers_and_the_size_of_parts_change_nothing(monkeypatch: pytest.Monkey
         for name in alone.values:
             np.testing.assert_array_equal(other[name], alone[name], name)
             np.testing.assert_array_equal(other.at[name], alone.at[name], name)
+
+
+@pytest.mark.parametrize("name", ["jansen_leg", "cam_roller", "five_bar"])
+def test_mechanisms_of_the_gallery(name: str) -> None:
+    """Coordinates, paths and distances as outputs of generated code, over the file's own laws."""
+    mechanism = kinfmu.load(name)
+    model = kinfmu.compile(mechanism, engine="native")
+    first, *_, last = [point for point in mechanism.body_points if not point.startswith("ground.")]
+    measures: list[Reading] = [Range(f"range_{k}", output) for k, output in enumerate(model.outputs[:6])]
+    measures += [PeakSpeed("speed", last), PeakAcceleration("acceleration", model.outputs[-1])]
+    measures += [Minimum("distance", DistanceBetween((first, last))), PathDistance("path", last, ((1.0, 2.0),))]
+    names = list(mechanism.own_parameters)[:2]
+    values = {name: float(mechanism.parameters[name].value) * np.array([1.0, 1.001, 0.999]) for name in names}
+    t = mechanism.run.start + np.linspace(0.0, 1.0, 73)
+    found = kinfmu.measure_designs(model, values, measures, t)  # type: ignore[arg-type]
+    assert found.good.all()
+    assert_as_measured(found, model, measures, t)
+
+
+def test_compiled_and_python_arithmetic_are_equal_to_the_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    x = np.cumsum(rng.uniform(0.05, 0.2, 90))
+    phase, speed = rng.uniform(0.0, 6.0, (40, 1)), rng.uniform(0.3, 25.0, (40, 1))
+    value, rate = np.sin(speed * x + phase), speed * np.cos(speed * x + phase)
+    value[3, 7] = np.nan
+    value[4] = 1.0
+    for is_closed in (True, False):
+        found = []
+        use_compiled()
+        for library in (quintic._compiled, []):
+            monkeypatch.setattr(quintic, "_compiled", library)
+            track = Track(x, value, rate, -speed * speed * np.sin(speed * x + phase), is_closed)
+            tracks = (track, track.derivative(), track.second_derivative(), track.negative())
+            found.append([*(row for one in tracks for row in one.rows), *(e for one in tracks for e in one.maximum()),
+                          *(e for one in tracks for e in one.minimum()), *tracks[2].largest_size()])  # fmt: skip
+        for compiled, plain in zip(*found, strict=True):
+            np.testing.assert_array_equal(compiled, plain)
+        assert np.isnan(found[0][-1][3])
 
 
 def test_the_result_is_a_table() -> None:
