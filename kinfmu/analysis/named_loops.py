@@ -9,7 +9,7 @@ from typing import Any
 from kinfmu.analysis.driver_path import DriverPath
 from kinfmu.analysis.grashof import Grashof, four_bar_class, slider_crank_class
 from kinfmu.analysis.loops import FourBar, SliderCrank, named_loops
-from kinfmu.analysis.transmission import TransmissionAngle, is_led_by_last, transmission_angle
+from kinfmu.analysis.transmission import TransmissionRange, is_led_by_last, transmission_angle
 from kinfmu.drivers import AngleDriver
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.mechanism import Mechanism
@@ -23,7 +23,7 @@ class NamedLoop:
 
     loop: FourBar | SliderCrank
     grashof: Grashof
-    transmission: tuple[TransmissionAngle, ...] = ()
+    transmission: tuple[TransmissionRange, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the loop as plain data."""

@@ -10,7 +10,7 @@ from kinfmu.analysis.findings import Findings
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
-from kinfmu.analysis.transmission import TransmissionAngle
+from kinfmu.analysis.transmission import TransmissionRange
 from kinfmu.analysis.values import degrees, driver_text, multiple_of_pi, value_text
 from kinfmu.errors import listed
 from kinfmu.mechanism import Mechanism
@@ -187,7 +187,7 @@ def _sign(small: float, large: float, name: str) -> str:
     return "=" if name == "change point" else "<" if small < large else ">"
 
 
-def _transmission(angle: TransmissionAngle, unit: str) -> str:
+def _transmission(angle: TransmissionRange, unit: str) -> str:
     at = [
         f"{angle.driver} at {degrees(u) if angle.kind == 'angle' else f'{round(u, 9) + 0.0:.6g} {unit}'}"
         for u in (angle.at_smallest, angle.at_largest)
@@ -201,7 +201,7 @@ def _transmission(angle: TransmissionAngle, unit: str) -> str:
     return f"transmission angle {span}: {verdict[angle.verdict]}"
 
 
-def _in_line(angle: TransmissionAngle) -> str:
+def _in_line(angle: TransmissionRange) -> str:
     """Return the position of the links at a transmission angle of 0 or 180 degrees."""
     if angle.is_slide:
         return f"{angle.coupler} is perpendicular to the slide"

@@ -21,7 +21,7 @@ Coordinates = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class TransmissionAngle:
+class TransmissionRange:
     """Extremes of the angle between coupler and output, 0 to pi; pi/2 is best, 0 and pi transmit nothing.
 
     driver, kind: whose values at_smallest and at_largest are, and whether it is an 'angle' or a 'length'; coupler,
@@ -73,7 +73,7 @@ class _Cosine(NamedTuple):
     slope: Callable[[Coordinates, Coordinates], float]
 
 
-def transmission_angle(path: DriverPath, loop: FourBar | SliderCrank) -> TransmissionAngle | None:
+def transmission_angle(path: DriverPath, loop: FourBar | SliderCrank) -> TransmissionRange | None:
     """Return the extremes of a loop's transmission angle over the path of a driver, to round-off in the driver value.
 
     None if the driver does not move the loop, or neither of its ends leads the other.
@@ -86,7 +86,7 @@ def transmission_angle(path: DriverPath, loop: FourBar | SliderCrank) -> Transmi
     if found is None:
         return None
     (least, at_least), (most, at_most), in_line_at = found
-    return TransmissionAngle(
+    return TransmissionRange(
         driver=path.name,
         kind=path.kind,
         coupler=coupler,

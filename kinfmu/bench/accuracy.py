@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from kinfmu.bench.case import Case, of_gallery
-from kinfmu.bench.engine import BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.rounds import Spread, samples_in_turn, spread
 from kinfmu.errors import MissingPackageError
@@ -28,7 +28,7 @@ class Measured(NamedTuple):
 
     case: str
     engine: str
-    setting: Setting
+    setting: EngineSetting
     is_usual: bool
     microseconds: Spread
     errors: tuple[float, float, float]
@@ -57,7 +57,7 @@ def measure(
     absent: dict[str, None] = {}
     for name in mechanisms:
         case = of_gallery(name)
-        samplers: list[tuple[BenchEngine, Setting, Sampler]] = []
+        samplers: list[tuple[BenchEngine, EngineSetting, Sampler]] = []
         for engine in engines:
             for setting in engine.settings:
                 done()
@@ -83,7 +83,7 @@ def steps(
     return len(mechanisms) * (rounds + 2 * sum(len(engine.settings) for engine in engines))
 
 
-def prepared(engine: BenchEngine, case: Case, setting: Setting, absent: dict[str, None]) -> Sampler | None:
+def prepared(engine: BenchEngine, case: Case, setting: EngineSetting, absent: dict[str, None]) -> Sampler | None:
     """Return a sampler to be measured; None if there is none, with a line in `absent` if a package is missing."""
     try:
         with warnings.catch_warnings():

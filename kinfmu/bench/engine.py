@@ -14,7 +14,7 @@ ROUND_OFF = 0.0  # tolerance: as far as rounding lets it
 PREDICTORS = ("last pose", "velocity", "velocity and acceleration")
 
 
-class Setting(NamedTuple):
+class EngineSetting(NamedTuple):
     """predictor: 0, 1 or 2 terms of the Taylor series beyond the last pose; tolerance: residual relative to the size at
     which correcting ends; corrections: their number if it is fixed; chord: the Jacobian of the prediction serves for
     all corrections of a sample, rates take that of the pose.
@@ -33,7 +33,7 @@ class Setting(NamedTuple):
         return f"{self.tolerance:.0e}" if self.tolerance else "round-off"
 
 
-USUAL = Setting()
+USUAL = EngineSetting()
 CORRECTIONS = (0, 1, 2, 3)
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12, ROUND_OFF)
 CHORD = (2, 3)  # corrections; one is the same with and without
@@ -43,16 +43,16 @@ def newton(
     corrections: Sequence[int] = CORRECTIONS,
     tolerances: Sequence[float] = TOLERANCES,
     chord: Sequence[int] = CHORD,
-) -> tuple[Setting, ...]:
+) -> tuple[EngineSetting, ...]:
     """Each predictor with numbers of corrections, with tolerances, and with chord Newton, to round-off too."""
     return tuple(
         setting
         for order in range(len(PREDICTORS))
         for setting in (
-            *(Setting(order, corrections=n) for n in corrections if order + n > 0),
-            *(Setting(order, tolerance) for tolerance in tolerances),
-            *(Setting(order, corrections=n, chord=True) for n in chord),
-            Setting(order, chord=True),
+            *(EngineSetting(order, corrections=n) for n in corrections if order + n > 0),
+            *(EngineSetting(order, tolerance) for tolerance in tolerances),
+            *(EngineSetting(order, corrections=n, chord=True) for n in chord),
+            EngineSetting(order, chord=True),
         )
     )
 
@@ -68,7 +68,7 @@ class BenchEngine:
     """
 
     name: str
-    sampler: Callable[[Case, Setting], Sampler | None]
-    settings: Sequence[Setting] = (USUAL,)
-    usual: Setting = USUAL
+    sampler: Callable[[Case, EngineSetting], Sampler | None]
+    settings: Sequence[EngineSetting] = (USUAL,)
+    usual: EngineSetting = USUAL
     laps: int = 1

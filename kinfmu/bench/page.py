@@ -10,7 +10,7 @@ from pathlib import Path
 
 from kinfmu import gallery
 from kinfmu.bench.accuracy import Measured
-from kinfmu.bench.engine import PREDICTORS, Setting
+from kinfmu.bench.engine import PREDICTORS, EngineSetting
 from kinfmu.bench.engines import ENGINES
 from kinfmu.bench.singular import DISTANCES, Near
 from kinfmu.errors import KinfmuError
@@ -133,7 +133,7 @@ def _row(one: Measured) -> tuple[str, ...]:
     )
 
 
-def row_head(engine: str, setting: Setting, *, is_usual: bool) -> tuple[str, str, str, str]:
+def row_head(engine: str, setting: EngineSetting, *, is_usual: bool) -> tuple[str, str, str, str]:
     """Return the cells that state what was measured: the usual setting of an engine is bold."""
     name = f"**{engine}**" if is_usual else engine
     if engine == "pylinkage":

@@ -19,7 +19,7 @@ import ast
 from types import ModuleType
 from typing import Any
 
-from kinfmu.bench.engine import Setting
+from kinfmu.bench.engine import EngineSetting
 from kinfmu.codegen.python import emit
 from kinfmu.errors import KinfmuError
 from kinfmu.plan import SolvePlan
@@ -27,7 +27,7 @@ from kinfmu.plan import SolvePlan
 MOST = 60  # iterations of chord Newton, which converges linearly
 
 
-def model_with(plan: SolvePlan, setting: Setting) -> Any:
+def model_with(plan: SolvePlan, setting: EngineSetting) -> Any:
     """The generated model of a plan, its parameters as written, whose `position` stops as the setting says."""
     rewriter = _Rewriter(setting)
     tree = rewriter.visit(ast.parse(emit(plan)))
@@ -40,7 +40,7 @@ def model_with(plan: SolvePlan, setting: Setting) -> Any:
 
 
 class _Rewriter(ast.NodeTransformer):
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setting: EngineSetting) -> None:
         self.setting = setting
         self.loops = 0
 

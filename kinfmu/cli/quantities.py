@@ -21,7 +21,7 @@ class Time(ArgumentType):
         return _number(text, Quantity("time"))
 
 
-class Range(ArgumentType):
+class RangeArgument(ArgumentType):
     """A range A:B:X of numbers, with units where the quantity has units; last: "N" samples or "STEP"."""
 
     def __init__(self, quantity: Quantity, last: str, length_unit: str = "m") -> None:

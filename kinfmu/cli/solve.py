@@ -12,7 +12,7 @@ from kinfmu import gallery
 from kinfmu.cli.arguments import OutputFile, mechanism_argument, names_in, outputs_option
 from kinfmu.cli.group import errors_of, main, on_interrupt
 from kinfmu.cli.messages import note, report, warn
-from kinfmu.cli.quantities import Range, is_bare
+from kinfmu.cli.quantities import RangeArgument, is_bare
 from kinfmu.cli.settings import TOLERANCE, Settings, checked_settings, set_option, tolerance_of
 from kinfmu.errors import listed
 from kinfmu.files.whole_file import suffix_of
@@ -37,7 +37,7 @@ HALF_TURN = math.pi  # [rad]; a longer step between samples is probably a wrappe
 )
 @click.option(
     "--times",
-    type=Range(Quantity("time"), "STEP"),
+    type=RangeArgument(Quantity("time"), "STEP"),
     help="Times from A to B at which the laws of the file drive, such as 0:2:0.01 [s] or 0s:2s:10ms. Default: the "
     "[run] of the file.",
 )
@@ -127,7 +127,7 @@ def _driver_values(text: str, driver: Driver, length_unit: str, wrap: bool) -> d
 
     context = click.get_current_context()
     option = next(option for option in context.command.params if option.name == "angle")
-    first, last, n = Range(driver.quantity, "N", length_unit).convert(text, option, context)
+    first, last, n = RangeArgument(driver.quantity, "N", length_unit).convert(text, option, context)
     if driver.quantity.kind == "angle":
         _note_angles(text, first, last, int(n), wrap)
     return {driver.inputs()[0]: np.linspace(first, last, int(n))}

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinfmu.fmu.layout import UNKNOWN_ERROR
+from kinfmu.fmu.layout import UNKNOWN_ERROR, Numbers
 
 Array = NDArray[np.float64]
-Numbers = tuple[float, ...]
 
 ENTRY = "resources/slavemodule.txt"  # in a python FMU
 ROWS = 1024  # samples computed at once: their arrays stay in the cache

@@ -36,7 +36,7 @@ SAMPLES_AT_ONCE = 50_000  # of designs that are solved and measured together
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SampledAxis:
     """The samples of a motion without the motion: what its axis is made of, as in Run."""
 
     t: FloatArray
@@ -329,7 +329,7 @@ class BatchReading:
             is_closed=True,
         ), order
 
-    def _samples(self, design: int) -> Samples:
+    def _samples(self, design: int) -> SampledAxis:
         """Return the samples of a design."""
         plan, (times, driven, _) = self._model.plan, self._driving
         names = tuple(name for driver in plan.drivers for name in driver.inputs)
@@ -342,7 +342,7 @@ class BatchReading:
         else:
             one = [table[design] if table.ndim == 3 else table for table in driven]
             axis, inputs = axis_for(one[0], names[::3]), np.stack(one, axis=2)
-        return Samples(times, axis, names, inputs.reshape(len(times), len(names)), plan.mechanism.length_unit)
+        return SampledAxis(times, axis, names, inputs.reshape(len(times), len(names)), plan.mechanism.length_unit)
 
     def _read_alone(self) -> set[str]:
         """Return the names of measures that are read design by design: their numbers or samples differ."""

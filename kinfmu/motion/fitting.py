@@ -26,7 +26,7 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _EQUAL = 1e-14  # of the size of the path; distances closer than this are equal
 
 
-class Shape(ABC):
+class FittedShape(ABC):
     """A line or a circle for each design, with parameters (..., p)."""
 
     parameters: FloatArray
@@ -40,7 +40,7 @@ class Shape(ABC):
         """Return (..., n, p): the change of the distance per change of the parameters, times -1."""
 
 
-class Line(Shape):
+class Line(FittedShape):
     """A line n.(x, y) = o with n = (-sin theta, cos theta); parameters o and theta."""
 
     def __init__(self, x: FloatArray, y: FloatArray) -> None:
@@ -58,7 +58,7 @@ class Line(Shape):
         return np.stack([np.ones_like(x), np.cos(theta) * x + np.sin(theta) * y], axis=-1)
 
 
-class Circle(Shape):
+class Circle(FittedShape):
     """A circle; parameters radius and centre."""
 
     def __init__(self, x: FloatArray, y: FloatArray) -> None:
@@ -108,7 +108,7 @@ def deviation(x: Track, y: Track, shape: type[Line] | type[Circle]) -> FloatArra
     return np.where(known, found, np.nan).reshape(leading)
 
 
-def _largest(shape: Shape, x: Track, y: Track) -> FloatArray:
+def _largest(shape: FittedShape, x: Track, y: Track) -> FloatArray:
     return Track.of(x, shape.distance(x.taylor, y.taylor)).largest_size().value
 
 
@@ -123,7 +123,7 @@ def _length(x: Any, y: Any) -> Any:
     return sqrt(squared) if isinstance(squared, Taylor) else np.sqrt(squared)
 
 
-def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> IntArray:
+def _exchange(shape: FittedShape, x: FloatArray, y: FloatArray, size: FloatArray) -> IntArray:
     """Fit the shape to the samples and return the numbers of those at the largest distance, (designs, p + 1)."""
     count = shape.parameters.shape[-1] + 1
     n = x.shape[-1]
@@ -155,7 +155,7 @@ def _exchange(shape: Shape, x: FloatArray, y: FloatArray, size: FloatArray) -> I
     return contacts
 
 
-def _polished(shape: Shape, x: Track, y: Track, contacts: IntArray) -> FloatArray:
+def _polished(shape: FittedShape, x: Track, y: Track, contacts: IntArray) -> FloatArray:
     """Return the parameters with contacts between the samples: extremes of the distance nearest to the samples."""
     at = x.x[contacts]
     low = x.x[np.maximum(contacts - 1, 0)]

@@ -15,7 +15,7 @@ from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, TimeDerivatives, build_block
 from kinfmu.plan.conditions import find_conditions, refuse_inconsistent, refuse_mobility, refuse_negative_distances
 from kinfmu.plan.origin import localized
-from kinfmu.plan.plan import DriverInfo, Motion, PlanParameter, SolvePlan, nodes_of, position_count
+from kinfmu.plan.plan import DriverInfo, MotionNodes, PlanParameter, SolvePlan, nodes_of, position_count
 from kinfmu.plan.structure import RowTracer, find_structure
 from kinfmu.plan.trace import Tracer, is_parameter, parameter_symbol
 from kinfmu.units import CoordinateName, Quantity
@@ -118,7 +118,7 @@ def plan_from(
 
 def _outputs(
     mechanism: Mechanism, origin: Point, tracer: Tracer, rates: TimeDerivatives, known: Mapping[str, Node]
-) -> tuple[list[Motion[CoordinateName]], int, dict[CoordinateName, Node]]:
+) -> tuple[list[MotionNodes[CoordinateName]], int, dict[CoordinateName, Node]]:
     """Return outputs (q, then points), how many are coordinates, and what is fixed among all of them."""
     if mechanism.coordinates == "moving":
         wanted = [name for name in mechanism.coordinate_names if name not in known]
@@ -145,12 +145,12 @@ def _outputs(
                 nodes.append((coordinate, value))
     positions = [node for _, node in nodes]
     motions = zip((name for name, _ in nodes), positions, rates.of(positions), rates.second(positions), strict=True)
-    return [Motion(*motion) for motion in motions], coordinate_count, fixed
+    return [MotionNodes(*motion) for motion in motions], coordinate_count, fixed
 
 
 def _chosen(
-    motions: Sequence[Motion[CoordinateName]], coordinate_count: int, outputs: Sequence[str]
-) -> tuple[list[Motion[CoordinateName]], int]:
+    motions: Sequence[MotionNodes[CoordinateName]], coordinate_count: int, outputs: Sequence[str]
+) -> tuple[list[MotionNodes[CoordinateName]], int]:
     """Return the motions of the outputs requested, and how many of these are coordinates."""
     known = [motion.name for motion in motions]
     if isinstance(outputs, str):
@@ -210,7 +210,7 @@ def _jumps(mechanism: Mechanism, tracer: Tracer) -> tuple[tuple[Node, Node], ...
     return tuple(found)
 
 
-def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion[str], ...]:
+def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[MotionNodes[str], ...]:
     """Return the law of each driver over time, with its rate and acceleration."""
     graph = tracer.graph
     time, one = graph.symbol("time"), graph.constant(1.0)
@@ -219,5 +219,5 @@ def _laws(mechanism: Mechanism, tracer: Tracer) -> tuple[Motion[str], ...]:
         target = graph.lift(driver.law.target(time, **constants))
         (rate,) = graph.derivative([target], {time: one})
         (acceleration,) = graph.derivative([rate], {time: one})
-        laws.append(Motion(driver.name, target, rate, acceleration))
+        laws.append(MotionNodes(driver.name, target, rate, acceleration))
     return tuple(laws)

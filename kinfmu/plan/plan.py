@@ -36,7 +36,7 @@ class PlanParameter(NamedTuple):
 Name = TypeVar("Name", bound=str)
 
 
-class Motion(NamedTuple, Generic[Name]):
+class MotionNodes(NamedTuple, Generic[Name]):
     """Something that moves, an output or a driver: its position, rate and acceleration as nodes."""
 
     name: Name
@@ -74,10 +74,10 @@ class SolvePlan:
     drivers: tuple[DriverInfo, ...]
     law_constants: tuple[LawConstant, ...]
     parameters: tuple[PlanParameter, ...]
-    laws: tuple[Motion[str], ...]
+    laws: tuple[MotionNodes[str], ...]
     jumps: tuple[tuple[Node, Node], ...]
     blocks: tuple[Block, ...]
-    outputs_motion: tuple[Motion[CoordinateName], ...]
+    outputs_motion: tuple[MotionNodes[CoordinateName], ...]
     coordinate_count: int
     fixed_nodes: Mapping[CoordinateName, Node]
     watches: tuple[tuple[str, Node], ...]
@@ -133,7 +133,7 @@ class SolvePlan:
         for block in self.blocks:
             scales = f"{block.row_scales} {block.determinant_scale!r} {block.usual}"
             lines.append(f"block {block.unknowns} {block.row_names} {scales} {[number[n] for n in nodes_of(block)]}")
-        motions: tuple[Motion[str] | Motion[CoordinateName], ...] = (*self.laws, *self.outputs_motion)
+        motions: tuple[MotionNodes[str] | MotionNodes[CoordinateName], ...] = (*self.laws, *self.outputs_motion)
         lines += [f"output {m.name} {[number[n] for n in m[1:]]}" for m in motions]
         lines += [f"watch {name} {number[node]}" for name, node in self.watches]
         lines += [f"fixed {name} {number[node]}" for name, node in self.fixed_nodes.items()]

@@ -15,7 +15,7 @@ from kinfmu.measures import Measure
 from kinfmu.units import Quantity
 
 Motion = Any  # kinfmu.motion.Motion, which is made of numpy's arrays; this package uses the standard library only
-Numbers = Any  # (...) an array with one number per design
+PerDesign = Any  # (...) an array with one number per design
 
 Measured = Annotated[
     str | Measure, "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle"
@@ -27,9 +27,9 @@ End = Annotated[float | None, LawQuantity("argument"), "value of the driver at t
 class Finding(NamedTuple):
     """What a reading found: numbers (...), what they measure, the arguments of the motion where they occur."""
 
-    value: Numbers
+    value: PerDesign
     quantity: Quantity
-    at: tuple[Numbers, ...] = ()
+    at: tuple[PerDesign, ...] = ()
 
 
 class Reading(ABC):

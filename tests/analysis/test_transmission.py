@@ -10,7 +10,7 @@ import pytest
 
 import kinfmu
 from kinfmu import AngleDriver, ConstantSpeed
-from kinfmu.analysis.transmission import TransmissionAngle
+from kinfmu.analysis.transmission import TransmissionRange
 from tests.analysis.linkages import five_bar_arm, pushed_crank
 from tests.mechanisms import bar_linkage, fourbar, reference_fourbar, six_bar, slider_crank
 
@@ -20,7 +20,7 @@ def opposite(side: float, b: float, c: float) -> float:
     return math.acos((b * b + c * c - side * side) / (2 * b * c))
 
 
-def only(mechanism: kinfmu.Mechanism) -> TransmissionAngle:
+def only(mechanism: kinfmu.Mechanism) -> TransmissionRange:
     (named,) = kinfmu.check(mechanism).loops
     (angle,) = named.transmission
     return angle

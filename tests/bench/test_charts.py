@@ -12,7 +12,7 @@ import pytest
 
 from kinfmu.bench.accuracy import Measured
 from kinfmu.bench.charts import draw, near_singular, work_precision
-from kinfmu.bench.engine import Setting
+from kinfmu.bench.engine import EngineSetting
 from kinfmu.bench.rounds import spread
 from kinfmu.bench.singular import DISTANCES, Near
 from kinfmu.draw.writing import write
@@ -24,7 +24,9 @@ SLOW, ODD, QUICK = "readable reference", "scipy fsolve", "kinfmu"
 def curve(engine: str, order: int, points: list[tuple[float, float]], case: str = "slider_crank") -> list[Measured]:
     """What is measured of an engine with one predictor: errors and microseconds, the last setting its usual one."""
     return [
-        Measured(case, engine, Setting(order, 10.0**-k), (error, time) == points[-1], spread([time]), (error, 0.0, 0.0))
+        Measured(
+            case, engine, EngineSetting(order, 10.0**-k), (error, time) == points[-1], spread([time]), (error, 0.0, 0.0)
+        )
         for k, (error, time) in enumerate(points)
     ]
 

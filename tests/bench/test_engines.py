@@ -12,7 +12,7 @@ from kinfmu.bench import singular
 from kinfmu.bench.accuracy import largest, prepared
 from kinfmu.bench.case import Case, of_gallery
 from kinfmu.bench.charts import LOOKS
-from kinfmu.bench.engine import BenchEngine, Setting
+from kinfmu.bench.engine import BenchEngine, EngineSetting
 from kinfmu.bench.engines import (
     CASADI,
     ENGINES,
@@ -46,7 +46,7 @@ def test_newton_to_round_off_agrees_with_the_50_digits(engine: BenchEngine, case
 
 
 def test_fsolve_is_as_good_as_its_tolerance(case: Case) -> None:
-    rough, fine = (largest(case, FSOLVE.sampler(case, Setting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
+    rough, fine = (largest(case, FSOLVE.sampler(case, EngineSetting(0, xtol)))[0] for xtol in (1e-3, 1e-15))
     assert fine <= ROUND_OFF
     assert fine <= rough <= 1e-2
 
@@ -88,7 +88,7 @@ def test_without_a_compiler_the_native_engine_is_reported_in_one_line(monkeypatc
 
     monkeypatch.setattr("kinfmu.bench.engines.native.Library", none_found)
     absent: dict[str, None] = {}
-    assert prepared(NATIVE, of_gallery("slider_crank"), Setting(), absent) is None
+    assert prepared(NATIVE, of_gallery("slider_crank"), EngineSetting(), absent) is None
     assert list(absent) == ["kinfmu native: no C compiler is found"]
 
 
@@ -112,7 +112,9 @@ def test_numpy_newton_is_not_asked_for_what_it_cannot_state() -> None:
 def test_better_predictors_need_fewer_corrections_for_the_same_error() -> None:
     crank_rocker = of_gallery("crank_rocker")
     for engine in (GENERATED, READABLE):
-        errors = [largest(crank_rocker, engine.sampler(crank_rocker, Setting(k, corrections=1)))[0] for k in range(3)]
+        errors = [
+            largest(crank_rocker, engine.sampler(crank_rocker, EngineSetting(k, corrections=1)))[0] for k in range(3)
+        ]
         assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
 
 
@@ -121,7 +123,7 @@ def test_the_engine_of_the_readable_reference_equals_it_to_the_bit(case: Case) -
     u, ud, udd = (np.array(table[0]) for table in (case.u, case.ud, case.udd))
     solution = solve_reference(system, case.rows, case.start_coordinates, u, ud, udd)
     chosen = [system.coordinates.index(name) for name in case.columns]
-    sampler = READABLE.sampler(case, Setting(0))
+    sampler = READABLE.sampler(case, EngineSetting(0))
     assert sampler(1)[0] == [*solution.q[chosen], *solution.qd[chosen], *solution.qdd[chosen]]
 
 
@@ -193,7 +195,7 @@ def test_kinfmu_keeps_its_digits_through_the_point_and_stays_on_the_branch(
     point: singular.Point, engine: BenchEngine
 ) -> None:
     case = singular.case_of(point)
-    sampler = engine.sampler(case, Setting())
+    sampler = engine.sampler(case, EngineSetting())
     assert sampler is not None
     q, qd, qdd = case.errors(sampler(len(case.t))).max(axis=0)
     assert q <= 1e-13

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from kinfmu.bench import stopping
-from kinfmu.bench.engine import Setting
+from kinfmu.bench.engine import EngineSetting
 from kinfmu.bench.stopping import model_with
 from kinfmu.codegen.python import load_model
 from kinfmu.errors import KinfmuError
@@ -30,7 +30,9 @@ def beside(model: Any, off: float = 0.05) -> tuple[Any, ...]:
 
 @every_kind
 def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
-    found, shipped = (beside(model) for model in (model_with(plan_of(name), Setting()), load_model(plan_of(name))))
+    found, shipped = (
+        beside(model) for model in (model_with(plan_of(name), EngineSetting()), load_model(plan_of(name)))
+    )
     assert found[:7] == shipped[:7]
 
 
@@ -38,15 +40,15 @@ def test_round_off_is_the_shipped_rule_to_the_bit(name: str) -> None:
 @pytest.mark.parametrize("corrections", [0, 1, 2, 3])
 def test_a_fixed_number_of_corrections_is_made_in_every_block(name: str, corrections: int) -> None:
     plan = plan_of(name)
-    found = beside(model_with(plan, Setting(corrections=corrections)))
+    found = beside(model_with(plan, EngineSetting(corrections=corrections)))
     assert found[4] == corrections * sum(bool(block.unknowns) for block in plan.blocks)
 
 
 @every_kind
 def test_each_correction_brings_the_residual_down_and_newton_faster_than_chord(name: str) -> None:
     plan = plan_of(name)
-    full = [beside(model_with(plan, Setting(corrections=n)))[3] for n in range(4)]
-    chord = [beside(model_with(plan, Setting(corrections=n, chord=True)))[3] for n in range(4)]
+    full = [beside(model_with(plan, EngineSetting(corrections=n)))[3] for n in range(4)]
+    chord = [beside(model_with(plan, EngineSetting(corrections=n, chord=True)))[3] for n in range(4)]
     assert full[:2] == chord[:2]  # the first correction is the same
     for k in (1, 2):
         assert full[k + 1] < 0.05 * full[k]
@@ -58,7 +60,7 @@ def test_correcting_ends_at_the_tolerance_and_not_long_after(name: str) -> None:
     plan = plan_of(name)
     counts = []
     for tolerance in (1e-3, 1e-6, 1e-9):
-        found = beside(model_with(plan, Setting(tolerance=tolerance)))
+        found = beside(model_with(plan, EngineSetting(tolerance=tolerance)))
         assert found[3] <= tolerance
         counts.append(found[4])
     shipped = beside(load_model(plan))[4]
@@ -70,7 +72,7 @@ def test_correcting_ends_at_the_tolerance_and_not_long_after(name: str) -> None:
 @every_kind
 def test_chord_newton_ends_at_the_same_pose_with_the_rates_of_that_pose(name: str) -> None:
     plan = plan_of(name)
-    chord, full = model_with(plan, Setting(chord=True)), load_model(plan)
+    chord, full = model_with(plan, EngineSetting(chord=True)), load_model(plan)
     found, exact = beside(chord), beside(full)
     assert found[4] > exact[4]
     assert found[0] == pytest.approx(exact[0], rel=0, abs=1e-12)
@@ -83,7 +85,7 @@ def test_code_without_the_loop_that_is_known_is_refused(monkeypatch: pytest.Monk
     source = stopping.emit(plan_of("crank_rocker"))
     monkeypatch.setattr(stopping, "emit", lambda _: source.replace("for iteration in", "for attempt in"))
     with pytest.raises(KinfmuError, match=r"crank_rocker: the generated code has no loop `for iteration in range"):
-        model_with(plan_of("crank_rocker"), Setting())
+        model_with(plan_of("crank_rocker"), EngineSetting())
     monkeypatch.setattr(stopping, "emit", lambda _: source.replace("if error <=", "if last > 0.0 or error <="))
     with pytest.raises(KinfmuError, match=r"stops by another rule than is known here: last > 0\.0 or error"):
-        model_with(plan_of("crank_rocker"), Setting())
+        model_with(plan_of("crank_rocker"), EngineSetting())

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.errors import MissingPackageError
 from kinfmu.measures import arithmetic
 
 FINEST = 1e-13
 
 
-def _sampler(case: Case, setting: Setting) -> Sampler:
+def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     """`fast_newton` from the last pose, rates by linear solves; the tolerance is `abstol` of the relative residual."""
     try:
         import casadi
@@ -65,6 +65,6 @@ def _step(casadi: Any, case: Case, tolerance: float) -> Any:
 CASADI = BenchEngine(
     "CasADi",
     _sampler,
-    settings=tuple(Setting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST)),
-    usual=Setting(0, FINEST),
+    settings=tuple(EngineSetting(0, tolerance) for tolerance in (1e-3, 1e-6, 1e-9, FINEST)),
+    usual=EngineSetting(0, FINEST),
 )

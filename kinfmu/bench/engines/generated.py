@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting, newton
+from kinfmu.bench.engine import GAP, BenchEngine, EngineSetting, Sampler, newton
 from kinfmu.bench.stopping import model_with
 
 
-def _sampler(case: Case, setting: Setting) -> Sampler:
+def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     """`position` of the generated model from one sample to the next, and the rates as it gives them."""
     model = model_with(case.plan, setting)
     start = case.start

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.errors import CompilerError, MissingPackageError
 from kinfmu.sweep.library import Library
 
 LAPS = 50  # how often a call takes the samples
 
 
-def _sampler(case: Case, _setting: Setting) -> Sampler:
+def _sampler(case: Case, _setting: EngineSetting) -> Sampler:
     """What `kinfmu.solve(engine="native")` runs on: a call takes the samples there and back, again and again.
 
     What a call costs once, such as the path from the anchor to the first sample, counts as little as in a long sweep.

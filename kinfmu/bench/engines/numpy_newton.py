@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, EngineSetting, Sampler
 from kinfmu.drivers import AngleDriver, DistanceDriver
 from kinfmu.joints import Distance, Revolute, Translational
 from kinfmu.measures.placement import body_of
@@ -29,7 +29,7 @@ MOST = 25  # iterations
 PointOf = tuple[int, float, float]  # number of the body, s_x, s_y
 
 
-def _sampler(case: Case, setting: Setting) -> Sampler | None:
+def _sampler(case: Case, setting: EngineSetting) -> Sampler | None:
     """Newton with an analytic Jacobian and `numpy.linalg.solve`, over all coordinates; rates by two more solves."""
     try:
         equations = _Equations(case)
@@ -233,6 +233,6 @@ class _Equations:
 NUMPY_NEWTON = BenchEngine(
     "numpy Newton",
     _sampler,
-    settings=tuple(Setting(order, tolerance) for order in range(3) for tolerance in (1e-3, 1e-9, CLOSED)),
-    usual=Setting(2, CLOSED),
+    settings=tuple(EngineSetting(order, tolerance) for order in range(3) for tolerance in (1e-3, 1e-9, CLOSED)),
+    usual=EngineSetting(2, CLOSED),
 )

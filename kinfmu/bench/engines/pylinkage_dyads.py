@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import BenchEngine, EngineSetting, Sampler
 from kinfmu.errors import MissingPackageError
 from kinfmu.run import FloatArray
 from kinfmu.units import CoordinateName
@@ -20,7 +20,7 @@ from kinfmu.units import CoordinateName
 Bodies = Mapping[str, tuple[str, str]]  # two points of each moving body, its frame's origin and one on its x-axis
 
 
-def _sampler(case: Case, _setting: Setting) -> Sampler | None:
+def _sampler(case: Case, _setting: EngineSetting) -> Sampler | None:
     """`step_fast_with_kinematics`; it has no tolerance, and takes crank-driven chains of dyads only."""
     if case.name not in _LINKAGES:
         return None
@@ -138,4 +138,4 @@ _LINKAGES: dict[str, Callable[[Case, float, float], tuple[dict[str, Any], Bodies
 }
 
 
-PYLINKAGE = BenchEngine("pylinkage", _sampler, settings=(Setting(0),), usual=Setting(0))
+PYLINKAGE = BenchEngine("pylinkage", _sampler, settings=(EngineSetting(0),), usual=EngineSetting(0))

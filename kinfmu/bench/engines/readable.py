@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, ROUND_OFF, BenchEngine, Sampler, Setting, newton
+from kinfmu.bench.engine import GAP, ROUND_OFF, BenchEngine, EngineSetting, Sampler, newton
 from kinfmu.equations.reference import Solution
 from kinfmu.equations.system import FloatArray, System
 from kinfmu.errors import PoseError
@@ -16,7 +16,7 @@ FLOOR = 1e-14  # residual relative to the size at which kinfmu.equations.referen
 MOST = 60  # iterations
 
 
-def _sampler(case: Case, setting: Setting) -> Sampler:
+def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     """Newton and the two linear solves with numpy on the rows kept, as `equations.reference` does."""
     system, rows, q0 = case.system, case.rows, case.start_coordinates
     chosen = [system.coordinates.index(name) for name in case.columns]
@@ -47,7 +47,7 @@ def solved(
     u: FloatArray,
     ud: FloatArray,
     udd: FloatArray,
-    setting: Setting,
+    setting: EngineSetting,
 ) -> Solution:
     """One sample from a predicted q; at round-off that of `equations.reference`. Raises PoseError, LinAlgError."""
     chosen = list(rows)

@@ -12,7 +12,7 @@ from itertools import chain
 from typing import Any
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, EngineSetting, Sampler
 from kinfmu.codegen.python import load_model
 from kinfmu.mechanism import Parameter
 from kinfmu.plan import compile_plan
@@ -31,7 +31,7 @@ def _distinct(case: Case) -> Any:
     return load_model(compile_plan(distinct, case.columns))
 
 
-def _sampler(case: Case, setting: Setting) -> Sampler:
+def _sampler(case: Case, setting: EngineSetting) -> Sampler:
     """MINPACK's hybrid method with its own difference quotients; the tolerance is `xtol`."""
     from scipy.optimize import fsolve
 
@@ -65,6 +65,6 @@ def _sampler(case: Case, setting: Setting) -> Sampler:
 FSOLVE = BenchEngine(
     "scipy fsolve",
     _sampler,
-    settings=tuple(Setting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST)),
-    usual=Setting(0, DEFAULT),
+    settings=tuple(EngineSetting(0, xtol) for xtol in (1e-3, 1e-6, DEFAULT, 1e-11, FINEST)),
+    usual=EngineSetting(0, DEFAULT),
 )

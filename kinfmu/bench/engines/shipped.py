@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from kinfmu.bench.case import Case, Motion
-from kinfmu.bench.engine import GAP, BenchEngine, Sampler, Setting
+from kinfmu.bench.engine import GAP, BenchEngine, EngineSetting, Sampler
 from kinfmu.codegen.python import load_model
 from kinfmu.solver.python import Solver
 
 
-def _sampler(case: Case, _setting: Setting) -> Sampler:
+def _sampler(case: Case, _setting: EngineSetting) -> Sampler:
     """What `kinfmu.solve` and the FMU run on: second order prediction, Newton to round-off, every step judged."""
     solver = Solver(load_model(case.plan))
     start = solver.solve(solver.anchor, case.u[0])

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from .linear import reciprocal_condition
 from .pose import AT_REST, EPS, STEEP, UNDECIDED, UNIT_SPEED, Found, Model, Pose, Vector, evaluated, tangent_of
-from .tracks import MIXED, Track, held_blocks, rates_in_time
+from .tracks import MIXED, TrackModel, held_blocks, rates_in_time
 from .worst_case_step import worst_case_step
 
 ROUNDINGS = 2.0  # of a row's terms, and of what is formed of them
@@ -277,7 +277,9 @@ def _of_bridge(model: Model, pose: Pose, driven: DriverMotion, rates: UnknownRat
     return Source(moved, none, none, first, second)
 
 
-def _of_track(model: Model, pose: Pose, track: Track, own: Pose, driven: DriverMotion, rates: UnknownRates) -> Source:
+def _of_track(
+    model: Model, pose: Pose, track: TrackModel, own: Pose, driven: DriverMotion, rates: UnknownRates
+) -> Source:
     """Return the source of the bridge of one track, in time."""
     at_unit_speed = _driver_motion(own, UNIT_SPEED, AT_REST)
     along = _rates(track, own, at_unit_speed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-Samples = tuple[float, float, float]  # f, f', f'' at a node
+FunctionValues = tuple[float, float, float]  # f, f', f'' at a point
 
 
 class Hermite:
@@ -17,7 +17,7 @@ class Hermite:
 
     __slots__ = ("_terms",)
 
-    def __init__(self, nodes: tuple[float, ...], samples: tuple[Samples, ...]) -> None:
+    def __init__(self, nodes: tuple[float, ...], samples: tuple[FunctionValues, ...]) -> None:
         repeated = [x for x in nodes for _ in range(3)]
         known = [sample for sample in samples for _ in range(3)]
         column = [sample[0] for sample in known]
@@ -34,7 +34,7 @@ class Hermite:
             coefficients.append(column[0])
         self._terms = tuple(zip(reversed(coefficients), reversed(repeated), strict=True))  # as they are evaluated
 
-    def __call__(self, x: float) -> Samples:
+    def __call__(self, x: float) -> FunctionValues:
         """Return p, p', p'' at x."""
         value = slope = curve = 0.0
         for coefficient, node in self._terms:
@@ -46,10 +46,10 @@ class Hermite:
 
 
 @cache  # few combinations of nodes and places are ever asked for
-def weights(nodes: tuple[float, ...], x: float) -> tuple[Samples, ...]:
+def weights(nodes: tuple[float, ...], x: float) -> tuple[FunctionValues, ...]:
     """Return the weights of f, f' and f'' of each node in the value of the interpolating polynomial at x."""
-    zero: Samples = (0.0, 0.0, 0.0)
-    unit: tuple[Samples, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    zero: FunctionValues = (0.0, 0.0, 0.0)
+    unit: tuple[FunctionValues, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rows = []
     for k in range(len(nodes)):
         column = []

@@ -7,11 +7,11 @@ from .limit import Limit, limit_beyond, limit_message
 from .pose import Pose, Vector, evaluated, failed
 from .span import REGULAR
 from .status import Status
-from .tracks import Track, Tracks, on_track, rates_in_time
+from .tracks import TrackModel, Tracks, on_track, rates_in_time
 from .trusted_step import BENT, keeps_branch, trusted_step
 
 
-def advance_mixed(tracks: Tracks, mixed: Track, start: Pose, target: Vector) -> Pose:
+def advance_mixed(tracks: Tracks, mixed: TrackModel, start: Pose, target: Vector) -> Pose:
     """Return the pose at `target`; blocks that depend on several drivers follow the tracks in trusted steps.
 
     The path is straight, as in `advance`, but at each step the tracks are solved first, and the other blocks are
@@ -43,7 +43,7 @@ def advance_mixed(tracks: Tracks, mixed: Track, start: Pose, target: Vector) -> 
     return end
 
 
-def _mixed_step(tracks: Tracks, mixed: Track, pose: Pose, u: Vector, target: Vector) -> Pose | None:
+def _mixed_step(tracks: Tracks, mixed: TrackModel, pose: Pose, u: Vector, target: Vector) -> Pose | None:
     """Return one step of all blocks, or a failed pose if the tracks end before it.
 
     None if the blocks that depend on several drivers cannot be trusted to stay on their branch.
@@ -66,7 +66,7 @@ def _mixed_step(tracks: Tracks, mixed: Track, pose: Pose, u: Vector, target: Vec
     return there
 
 
-def _mixed_limit(tracks: Tracks, mixed: Track, path: Path) -> Limit:
+def _mixed_limit(tracks: Tracks, mixed: TrackModel, path: Path) -> Limit:
     """Return where the path of the blocks that depend on several drivers ends, just beyond its last pose."""
     pose, direction = path.pose, path.direction
     slopes, _ = rates_in_time(tracks.model, pose, direction, (0.0,) * len(direction))

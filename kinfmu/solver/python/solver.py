@@ -16,7 +16,7 @@ from .singularity_map import restored_map
 from .span import REGULAR
 from .status import Status
 from .survey import surveyed
-from .tracks import MIXED, Track, Tracks, on_track, rates_in_time, tracks_of
+from .tracks import MIXED, TrackModel, Tracks, on_track, rates_in_time, tracks_of
 from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_step
 
 TOLERANCE = 1e-9  # residual relative to the size above which a sample is not ok
@@ -42,7 +42,7 @@ class Solver:
         self._tracks: Tracks | None = None
         if tracks:  # the tolerance applies to the whole pose only
             solvers = [None if one is None else Solver(one, inf, on_track(one, self.anchor)) for one in tracks]
-            mixed = Track(model, MIXED, u, self.anchor.z) if MIXED in model.BLOCK_DRIVERS else None
+            mixed = TrackModel(model, MIXED, u, self.anchor.z) if MIXED in model.BLOCK_DRIVERS else None
             self._tracks = Tracks(model, tolerance, solvers, mixed)
         self._longest: float = LONGEST_STEP * model.REACH[0] if self._has_one_driver else 0.0
 

@@ -25,7 +25,7 @@ from .trusted_step import LONGEST_STEP, keeps_branch, straight_path, trusted_ste
 MIXED = -1  # in place of a block's driver: it depends on several
 
 
-class Track:
+class TrackModel:
     """The blocks of a model that depend on one of its drivers, as a model with that driver alone.
 
     driver: its index; MIXED: the blocks that depend on several drivers, as a model with all drivers. u, z: driver
@@ -69,7 +69,7 @@ class Track:
             ends.append(ends[-1] + high - low)
         self.BLOCKS = tuple(pairwise(ends))
 
-    def with_rest(self, z: Vector, slopes: Vector) -> Track:
+    def with_rest(self, z: Vector, slopes: Vector) -> TrackModel:
         """Return the same blocks while the rest of the model is at other unknowns and moves.
 
         Args:
@@ -182,7 +182,7 @@ class Tracks:
     """
 
     def __init__(
-        self, model: Model, tolerance: float, solvers: Sequence[TrackSolver | None], mixed: Track | None
+        self, model: Model, tolerance: float, solvers: Sequence[TrackSolver | None], mixed: TrackModel | None
     ) -> None:
         self.model = model
         self.mixed = mixed
@@ -277,12 +277,12 @@ class Tracks:
         return pose
 
 
-def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[Track | None, ...]:
+def tracks_of(model: Model, u: Vector, z: Vector) -> tuple[TrackModel | None, ...]:
     """Return the track of each driver, None where no block depends on it alone; an empty row if there is no track."""
     by = getattr(model, "BLOCK_DRIVERS", ())
     if not by or max(by) == MIXED:
         return ()
-    return tuple([Track(model, k, u, z) if k in by else None for k in range(len(u))])
+    return tuple([TrackModel(model, k, u, z) if k in by else None for k in range(len(u))])
 
 
 def held_blocks(pose: Pose) -> int:
@@ -294,7 +294,7 @@ def held_blocks(pose: Pose) -> int:
     return held
 
 
-def on_track(track: Track, pose: Pose) -> Pose:
+def on_track(track: TrackModel, pose: Pose) -> Pose:
     """Return the track's part of a pose of the whole mechanism."""
     if track.driver == MIXED:
         determinants = tuple([pose.determinants[k] for k in track.blocks])
