@@ -13,7 +13,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.members import COORDINATES
 from kinfmu.motion.needed import QuantityRead, is_angle, value_of
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.plan import Motion
+from kinfmu.plan.plan import MotionNodes
 from kinfmu.plan.trace import is_parameter, parameter_symbol
 from kinfmu.sweep import Model
 from kinfmu.units import CoordinateName
@@ -66,7 +66,7 @@ def _nodes(plan: SolvePlan, quantities: Sequence[QuantityRead]) -> list[Node]:
     ]
 
 
-def _motion(plan: SolvePlan, name: CoordinateName, position: Node) -> Motion[CoordinateName]:
+def _motion(plan: SolvePlan, name: CoordinateName, position: Node) -> MotionNodes[CoordinateName]:
     """Return a quantity with its rate and acceleration; those of coordinates and of drivers are symbols."""
     graph = position.graph
     derivatives: Mapping[str, tuple[str, ...]] = {
@@ -82,4 +82,4 @@ def _motion(plan: SolvePlan, name: CoordinateName, position: Node) -> Motion[Coo
             both[rate] = acceleration
     (rate,) = graph.derivative([position], first)
     (acceleration,) = graph.derivative([rate], both)
-    return Motion(name, position, rate, acceleration)
+    return MotionNodes(name, position, rate, acceleration)
