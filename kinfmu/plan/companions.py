@@ -84,7 +84,8 @@ def with_companions(
             continue
         own = {k for k, block in enumerate(found) if implying[index] & set(block.all_rows)}
         needs = _needs(found, home, meets)
-        hull = _hull({k for k in met | own if found[k].unknowns}, needs)
+        members = {k for k in met | own if found[k].unknowns}
+        hull = _hull(members | {k for k in met if _behind({k}, needs) & members}, needs)
         last = found[max(met)]
         if last.unknowns:
             joined = replace(last, companions=(*last.companions, index))

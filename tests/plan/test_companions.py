@@ -12,6 +12,8 @@ import kinfmu
 from kinfmu import Mechanism
 from kinfmu.plan import SolvePlan, compile_plan
 from tests.mechanisms import reference_fourbar, wheels
+from tests.open_lengths import with_open_lengths
+from tests.stress.trial import trial
 
 QUARTER = math.pi / 2
 LOCOMOTIVE = {"A": (0, 1, 0.0), "B": (0, 1, QUARTER)}
@@ -102,3 +104,15 @@ def test_fmus_of_coupled_wheels_are_regular_at_every_angle(tmp_path: Path, flavo
     assert (run.status == 0).all()
     assert run["wheel1.phi"] == pytest.approx(run["wheel0.phi"], abs=1e-14)
     assert run["wheel1.alpha"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_what_a_row_of_a_joined_block_meets_is_computed_before_it() -> None:
+    """A bar on the ground whose pivot has lengths: its y follows from its angle, which the joined block solves."""
+    mechanism = with_open_lengths(trial(26, "redundant parallelograms").drawn.mechanism)
+    plan = compile_plan(mechanism)
+    (block,) = [block for block in plan.blocks if len(block.residuals) > len(block.unknowns)]
+    assert "bar.y" in dict(block.assigned)
+    for engine in ("python", "native"):
+        run = kinfmu.compile(mechanism, engine=engine).solve(drive_angle=np.linspace(0.0, 6.0, 40))
+        assert run.good.all()
+        np.testing.assert_allclose(run["bar.phi"], run["crank.phi"], atol=1e-12)
