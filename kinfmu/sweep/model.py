@@ -278,7 +278,8 @@ class Model:
 
         Returns:
             Positions and rates (n, outputs) and their derivatives (n, outputs, parameters), with a status for every
-            sample. Samples that are not reached or are interpolated across a singular point are NaN.
+            sample. Samples that are not reached are NaN; where samples are interpolated across a singular point, so are
+            the derivatives with respect to parameters that remove it.
 
         Raises:
             RequestError: A name is unknown, a value is invalid, or the model has no parameters.

@@ -22,6 +22,7 @@ from kinfmu.simd.sensitivity import empty_results, is_printable, load_native_sen
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.designs import Solvable
+from kinfmu.sweep.interpolated import SPACING, Columns, interpolated
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
@@ -47,8 +48,9 @@ class Sensitivities(Displayed):
         rates_by: (n, outputs, parameters) derivatives of the rates.
         status: (n,) of the samples, as in a Run. Numbers of samples with status 0 are exact to round-off; with status
             1, near a singular point, they have fewer digits. Samples with status 2 are interpolated across a singular
-            point, where derivatives with respect to lengths need not exist: they are NaN, as are those with a status
-            of 3 to 5, which are not reached.
+            point, within 1e-7 of the largest number nearby. There only parameters that keep the singular point have
+            derivatives, such as a factor of all lengths or a law constant; those of other parameters do not exist and
+            are NaN, and with several drivers all are. Samples with a status of 3 to 5 are not reached and are NaN.
         refused: Parameters that cannot change by themselves, with the reason: a redundant row would not close. Their
             derivatives are NaN.
 
@@ -107,8 +109,25 @@ class SensitivityModel:
         plan, by_law = self._model.plan, not inputs
         names = _names("outputs", outputs, plan.outputs)
         chosen = self._chosen(wrt, by_law=by_law)
-        setting = self._model.arguments.setting(parameters or {})
+        given = parameters or {}
         run = self._poses.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, anew=anew, **inputs)
+        found = self._found(run, names, given, chosen, by_law=by_law)
+        if len(plan.drivers) > 1 or not (run.status == Status.BRIDGED).any():
+            return found
+
+        def again(x: FloatArray) -> Sensitivities:
+            times, moved = (x, {}) if by_law else (None, {plan.drivers[0].inputs[0]: x})
+            other = self._poses.solve(times, parameters=parameters, tolerance=tolerance, anew=anew, **moved)
+            return self._found(other, names, given, chosen, by_law=by_law)
+
+        _fill_bridges(plan, found, run, again, by_law=by_law)
+        return found
+
+    def _found(
+        self, run: Run, names: tuple[str, ...], settings: Settings, chosen: tuple[str, ...], *, by_law: bool
+    ) -> Sensitivities:
+        """Return the sensitivities at the samples of a run; NaN where it is interpolated."""
+        plan, setting = self._model.plan, self._model.arguments.setting(settings)
         given: dict[str, FloatArray | float] = dict(zip(run.input_names, run.inputs.T, strict=True))
         given["time"] = run.t
         for k, name, rate in self._unknowns:
@@ -116,7 +135,7 @@ class SensitivityModel:
             given[rate] = run.rates[:, k]
         given |= zip(self._symbols, setting.values or self._model.arguments.written, strict=True)
         given |= zip(self._law_symbols, setting.constants, strict=True)
-        stage, gap_names = self._stage(names, chosen, by_law, frozenset(parameters or ()))
+        stage, gap_names = self._stage(names, chosen, by_law, frozenset(settings))
         native = self._native(stage) if self._poses.is_native(len(run.t)) else None
         return _evaluated(plan, stage, native, gap_names, names, chosen, run, given)
 
@@ -161,6 +180,39 @@ def plan_of_unknowns(plan: SolvePlan) -> SolvePlan:
     local, _ = localized(plan.mechanism)
     open_ones = [parameter.name for parameter in plan.parameters]
     return compile_plan(replace(local, coordinates="moving"), plan.unknowns, open_ones)
+
+
+def _fill_bridges(
+    plan: SolvePlan, found: Sensitivities, run: Run, again: Callable[[FloatArray], Sensitivities], *, by_law: bool
+) -> None:
+    """Fill the samples of bridges with interpolated numbers where these have derivatives.
+
+    again: the sensitivities at other times, or at driver values at speed 1.
+    """
+    n, m = found.values.shape
+    u, ud = run.inputs[:, 0], run.inputs[:, 1]
+    reach = 1.0 if plan.drivers[0].quantity.kind == "angle" else plan.size
+    with np.errstate(divide="ignore"):
+        spacing = SPACING * reach / (np.abs(ud) if by_law else np.ones(n))
+    known = np.full((n, m), np.nan)
+    for k, name in enumerate(found.outputs):
+        if name in run.outputs:
+            known[:, k] = run.values[:, run.outputs.index(name)]
+    angles = {name for name in plan.outputs if name.is_angle}
+    least = np.array([1.0 if name in angles else plan.size for name in found.outputs])
+    scales = np.array([scale_of(plan, name) for name in found.parameters])
+
+    def solve(x: FloatArray) -> Columns:
+        other = again(x)
+        values = np.concatenate([other.values, other.values_by.reshape(len(x), -1)], axis=1)
+        return Columns(values, np.concatenate([other.rates, other.rates_by.reshape(len(x), -1)], axis=1), other.status)
+
+    whole = np.concatenate([least, (least[:, None] / scales).ravel()])
+    for group, values, slopes in interpolated(run.t if by_law else u, spacing, found.status, known, whole, solve):
+        speed = 1.0 if by_law else ud[group, None]
+        found.values[group], found.rates[group] = values[:, :m], slopes[:, :m] * speed
+        found.values_by[group] = values[:, m:].reshape(len(group), m, -1)
+        found.rates_by[group] = (slopes[:, m:] * speed).reshape(len(group), m, -1)
 
 
 def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:

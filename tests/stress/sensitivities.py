@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 import kinfmu
-from kinfmu.errors import AmbiguousStartError
+from kinfmu.errors import AmbiguousStartError, InconsistentError, MobilityError
 from kinfmu.mechanism.toml_text import text
 from tests.open_lengths import with_open_lengths
 from tests.power_series import Series, mp, sin_cos
@@ -31,6 +31,7 @@ from tests.stress.families import Draw
 from tests.stress.trial import trial
 
 WRONG = 1e-10  # of the largest number of its kind, or of the derivative of a length or an angle of size 1
+FAR = 1000  # sizes from the origin; lengths that are parameters are doubles
 REGULAR = 0.02  # margin; nearer to a singular point less than 1e-10 is left of doubles
 SAMPLES, LENGTHS = 2, 8  # at most, of each mechanism
 STEP = mp.mpf("1e-30")
@@ -189,6 +190,11 @@ def compared(seed: int, family: str | None = None) -> Comparison:
     except AmbiguousStartError:
         result.skipped = "ambiguous start"
         return result
+    except (InconsistentError, MobilityError):
+        if max(map(abs, one.drawn.frame.at)) < FAR * one.drawn.frame.scale:
+            raise
+        result.skipped = "rows that are redundant in decimals are not in doubles so far from the origin"
+        return result
     u, ud, _ = one.inputs
     rng = Draw(seed)
     names = [driver.inputs for driver in model.plan.drivers]
@@ -312,7 +318,7 @@ def main() -> int:
     print(
         f"{len(found)} mechanisms, {sum(one.compared for one in found)} lengths compared, "
         f"{sum(one.refused for one in found)} refused; worst relative error {worst.worst:.2g} "
-        f"(seed {worst.seed}, {worst.family}); {len(skipped)} mechanisms without regular samples; "
+        f"(seed {worst.seed}, {worst.family}); {len(skipped)} mechanisms skipped; "
         f"{sum(one.blurred for one in found)} derivatives that are not determined to 1e-10 by lengths in doubles; "
         f"{len(faulty)} at fault"
     )

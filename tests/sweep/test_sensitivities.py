@@ -218,15 +218,68 @@ def test_reference_four_bar_with_its_redundant_row() -> None:
     found = model.sensitivities(crank_angle=angles, crank_speed=3.0)
     assert found.status.tolist() == [0] * len(ANGLES) + [2]
     assert not found.refused
-    c, s = np.cos(ANGLES), np.sin(ANGLES)
+    c, s = np.cos(angles), np.sin(angles)
     expected = {"coupler.x": (c, -3.0 * s), "coupler.y": (s, 3.0 * c), "coupler.phi": (0.0, 0.0), "A.x": (c, -3.0 * s)}
     for output, (value, rate) in expected.items():
-        np.testing.assert_allclose(found.of(output, "r")[:-1], value + 0.0 * c, atol=1e-12)
-        np.testing.assert_allclose(found.rate_of(output, "r")[:-1], rate + 0.0 * c, atol=1e-12)
-    np.testing.assert_allclose(found.of("coupler.x", "s")[:-1], 1.0, atol=1e-12)
-    np.testing.assert_allclose(found.of("A.x", "s")[:-1], 2.0, atol=1e-12)
-    assert np.isnan(found.values_by[-1]).all()  # a change point: interpolated, and lengths would remove it
-    assert np.isnan(found.rates_by[-1]).all()
+        np.testing.assert_allclose(found.of(output, "r"), value + 0.0 * c, atol=1e-12)
+        np.testing.assert_allclose(found.rate_of(output, "r"), rate + 0.0 * c, atol=1e-10)  # interpolated at pi
+    np.testing.assert_allclose(found.of("coupler.x", "s"), 1.0, atol=1e-12)
+    np.testing.assert_allclose(found.of("A.x", "s"), 2.0, atol=1e-12)
+    np.testing.assert_allclose(found.values[-1], model.solve(crank_angle=[math.pi]).values[0], atol=1e-12)
+
+
+def crossing(scaled: bool) -> Mechanism:
+    """A four-bar with a change point where 4 + 2 = 3 + 3: all lengths by a factor, or each by itself."""
+    lengths = {"ground": 4.0, "crank": 1.0, "coupler": 3.0, "rocker": 2.0}
+    q = oracle.fourbar(**lengths, u=[1.0]).rounded().q[0]
+    written = text(started(lengths, 1.0, q, (0.0, 0.0)))
+    if scaled:
+        for name, value in lengths.items():
+            written = re.sub(rf'(?m)^{name} = ".*"$', f'{name} = "{value!r} * scale"', written)
+        written = written.replace("[parameters]", '[parameters]\nscale = "1 m"')
+    return parse(written)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_parameters_that_keep_a_change_point_have_derivatives_there(engine: str) -> None:
+    """A factor of all lengths changes no angle; lengths by themselves remove the change point."""
+    angles = np.array([0.5, 3.1, math.pi - 1e-3, math.pi, math.pi + 1e-9, 3.2, 4.0])
+    for scaled in (True, False):
+        model = kinfmu.compile(crossing(scaled), engine=engine)
+        found = model.sensitivities(crank_angle=angles, crank_speed=1.5)
+        bridged = found.status == 2
+        assert 3 <= bridged.sum() <= 5
+        assert not found.refused
+        run = model.solve(crank_angle=angles, crank_speed=1.5)
+        if not scaled:
+            for name in ("ground", "coupler"):
+                assert np.isnan(found.of("coupler.phi", name)[bridged]).all()
+                assert np.isfinite(found.of("coupler.phi", name)[~bridged]).all()
+            np.testing.assert_allclose(found.of("coupler.x", "crank"), np.cos(angles), atol=1e-11)
+            continue
+        for angle, speed in (("coupler.phi", "coupler.omega"), ("rocker.phi", "rocker.omega")):
+            np.testing.assert_allclose(found.of(angle, "scale"), 0.0, atol=1e-9)
+            np.testing.assert_allclose(found.rate_of(angle, "scale"), 0.0, atol=1e-8)
+            np.testing.assert_allclose(found.rates[:, found.outputs.index(angle)], run[speed], rtol=0, atol=1e-8)
+        for name, rate in (("M.x", "M.vx"), ("M.y", "M.vy")):
+            np.testing.assert_allclose(found.of(name, "scale"), run[name], rtol=0, atol=1e-9)
+            np.testing.assert_allclose(found.rate_of(name, "scale"), run[rate], rtol=0, atol=1e-8)
+
+
+def test_law_constants_have_derivatives_at_a_change_point() -> None:
+    """z(u), u = start + speed t: derivatives are those over the driver value."""
+    model = kinfmu.compile(crossing(False))
+    t = (math.pi - 1.0) / model.plan.law_constants[1].value + np.array([-0.01, 0.0, 1e-6, 0.02])
+    run = model.solve(t)
+    found = model.sensitivities(t, wrt=["crank.start", "crank.speed"])
+    assert (found.status == 2).all()
+    names = [constant.name for constant in model.plan.law_constants]
+    speed = model.plan.law_constants[names.index("crank.speed")].value
+    by_driver = run["coupler.omega"] / speed
+    np.testing.assert_allclose(found.of("coupler.phi", "crank.start"), by_driver, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.of("coupler.phi", "crank.speed"), by_driver * t, rtol=0, atol=1e-8)
+    bend = run["coupler.alpha"] / speed
+    np.testing.assert_allclose(found.rate_of("coupler.phi", "crank.start"), bend, rtol=0, atol=1e-7)
 
 
 def test_a_length_that_opens_a_redundant_row_is_refused_with_its_name() -> None:
