@@ -16,6 +16,7 @@ from kinfmu.sweep import library
 
 GOLDEN = Path(__file__).parent / "golden"
 
+FILE_BY_FILE = compiler.compile_files
 SHIPPED_FLAGS = {module: module.FLAGS for module in (compiler, archive, library)}
 
 settings.register_profile("kinfmu", deadline=None, derandomize=True, database=None, max_examples=40)
@@ -40,17 +41,15 @@ def python_fmus() -> Iterator[None]:
 def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """C is compiled without optimization, which gives the same numbers, and once for all workers of a run.
 
-    The run time of a library is compiled as one unit, in half of the time; under strict warnings, file by file as for
-    a user.
+    The run time of a library is compiled as one unit, in half of the time.
     """
-    file_by_file = compiler.compile_files
     run_time = {path.name for folder in (compiler.RUNTIME, sources.RUNTIME) for path in folder.glob("*.c")}
 
     def compile_files(cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
-        if "-O0" in flags and "-shared" in flags and "-Werror" not in flags:
+        if "-O0" in flags and "-shared" in flags:
             joined = [f'#include "{name}"\n' for name in compiler.units(files) if name in run_time]
             files = {**files, "run_time.c": "".join(joined)}
-        file_by_file(cc, files, flags, output)
+        FILE_BY_FILE(cc, files, flags, output)
 
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
@@ -66,7 +65,8 @@ def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 
 @pytest.fixture
 def optimized(monkeypatch: pytest.MonkeyPatch) -> None:
-    """C is compiled with the flags of the package, as for a user."""
+    """C is compiled with the flags of the package and file by file, as for a user."""
+    monkeypatch.setattr(compiler, "compile_files", FILE_BY_FILE)
     for module, flags in SHIPPED_FLAGS.items():
         monkeypatch.setattr(module, "FLAGS", flags)
 

@@ -32,9 +32,10 @@ def _files(mechanism: kinfmu.Mechanism, version: str) -> dict[str, str]:
     return sources(plan, interface(plan, has_time=version == "3.0"), version, "{token}") | headers(version)
 
 
+@pytest.mark.usefixtures("optimized")
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 @pytest.mark.parametrize("name", ["fourbar", "five_bar", "settable"])
-def test_c_is_clean_under_strict_warnings(name: str, version: str) -> None:
+def test_each_file_of_c_is_clean_under_strict_warnings(name: str, version: str) -> None:
     mechanism = linkage() if name == "settable" else kinfmu.load(name)
     assert compiler.shared_library(_files(mechanism, version), STRICT).exists()
 
