@@ -11,7 +11,7 @@ import numpy as np
 from kinfmu.errors import MechanismError
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
-from kinfmu.sweep import Model, run_times
+from kinfmu.sweep import run_times
 from kinfmu.units import Quantity
 
 SAMPLES = 181  # of the path that untimed points are compared with, over one turn or over the run
@@ -76,8 +76,3 @@ def argument_of(mechanism: Mechanism, choice: str | None) -> Argument:
         values = [float(driver.law.at(t)) for t in run_times(run).tolist()]
         start, end = min(values), max(values)
     return Argument(driver.name, driver.quantity, driver.inputs()[0], start, end)
-
-
-def turns_round(model: Model, argument: Argument) -> bool:
-    """Return whether the mechanism as written reaches every sample of the motion."""
-    return bool(model.solve(**argument.keywords(argument.values(None, None))).good.all())

@@ -83,9 +83,9 @@ class Equations:
 
     def __init__(self, problem: FitProblem, engine: str = "python") -> None:
         self.problem, self.engine = problem, engine
+        self.measuring = problem.measuring.on(engine) if problem.measuring else None
         outputs = dict.fromkeys(name for one in problem.sampled for name in (*one.outputs, one.over) if name)
         self.outputs = tuple(outputs)
-        self._columns = {name: k for k, name in enumerate(self.outputs)}
         self.names = tuple(problem.bounds)
         self._ranges = np.array([bounds.high - bounds.low for bounds in problem.bounds.values()])
 
@@ -94,6 +94,11 @@ class Equations:
         """The model of the sampled targets; with the native engine it is compiled when it is first used."""
         parameters = [name for name in self.problem.parameters if name in self.problem.mechanism.parameters]
         return Model(compile_plan(self.problem.traced, self.outputs, parameters), self.engine)
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        """Columns of the outputs: the plan has them in an order of its own."""
+        return {str(name): k for k, name in enumerate(self._model.outputs)}
 
     def at(self, z: FloatArray) -> tuple[Evaluation, FloatArray]:
         """Return the evaluation and the Jacobian (r, n) by z, without the rows of measures, which are 0.
@@ -106,7 +111,7 @@ class Equations:
         parameters = {name: values[name] for name in self.problem.parameters}
         try:
             rows = self._rows(values, parameters)
-            measuring = self.problem.measuring
+            measuring = self.measuring
             measured = measuring.values(parameters) if measuring else np.empty(0)
         except RequestError:
             raise
@@ -132,17 +137,22 @@ class Equations:
 
     def with_measures(self, z: FloatArray, found: Evaluation, jacobian: FloatArray) -> FloatArray:
         """Return the Jacobian with the rows of measures, which cost two motions for each unknown."""
-        measuring = self.problem.measuring
+        measuring = self.measuring
         if measuring is None:
             return jacobian
-        slopes = measuring.slopes(lambda moved: self._parameters(moved), z)
         ordered = sorted(range(len(measuring.aims)), key=lambda k: measuring.aims[k].value is None)
         start = sum(one.errors.size for one in found.rows)
+        active = {
+            row: aim
+            for row, k in enumerate(ordered, start=start)
+            if (aim := measuring.aims[k]).value is not None or aim.error(float(found.measured[k])) != 0.0
+        }
+        if not active:
+            return jacobian
         jacobian = jacobian.copy()
-        for row, k in enumerate(ordered, start=start):
-            aim = measuring.aims[k]
-            is_active = aim.value is not None or aim.error(float(found.measured[k])) != 0.0
-            jacobian[row] = aim.root * slopes[k] if is_active else 0.0
+        slopes = measuring.slopes(self._parameters, z, list(active.values()))
+        for (row, aim), slope in zip(active.items(), slopes, strict=True):
+            jacobian[row] = aim.root * slope
         return jacobian
 
     def _parameters(self, z: FloatArray) -> dict[str, float]:

@@ -19,6 +19,7 @@ from kinfmu.synthesis.team import Team
 
 STARTS = 16
 _DRAWN, _SHORT = 16, 3  # designs that are drawn, and short searches, for each whole search
+_DESIGNS = 110  # that are solved for each whole search, roughly
 _POLISHED = 8  # optima that are computed to round-off
 Progress = Callable[[int, int], None]  # done, of
 
@@ -77,7 +78,7 @@ def fit(
         if progress is not None:
             progress(done, steps)
 
-    with Team(problem, engine, workers) as team:
+    with Team(problem, engine, _DESIGNS * starts, workers) as team:
         drawn = team.results("draw", list(start_points(problem, _DRAWN * starts, seed)), advance)
         for one in drawn:
             refused.update(one.refused)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,7 +14,7 @@ from kinfmu.laws import ConstantSpeed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.valid import quoted
-from kinfmu.motion import measure
+from kinfmu.motion import measure_designs
 from kinfmu.readings import LowestMargin, Reading
 from kinfmu.run import FloatArray
 from kinfmu.sweep import Model
@@ -53,15 +54,18 @@ class Measuring:
     """The measures of a problem.
 
     Args:
-        model: The mechanism with all outputs.
-        argument: What the samples go by.
+        model: The mechanism with the outputs that the measures need.
+        inputs: What moves it, as arguments of `Model.solve`.
         aims: Measures with values or limits.
 
     """
 
-    def __init__(self, model: Model, argument: Argument, aims: Sequence[Aim]) -> None:
-        self.model, self.argument, self.aims = model, argument, tuple(aims)
-        self._readings = [_renamed(aim.reading, aim.name) for aim in aims]
+    def __init__(self, model: Model, inputs: Mapping[str, Any], aims: Sequence[Aim]) -> None:
+        self.model, self.inputs, self.aims = model, inputs, tuple(aims)
+
+    def on(self, engine: str) -> Measuring:
+        """Return the same measures of motions that another engine solves."""
+        return Measuring(Model(self.model.plan, engine), self.inputs, self.aims)
 
     def values(self, parameters: Mapping[str, float]) -> FloatArray:
         """Return the measured values (aims,).
@@ -70,28 +74,47 @@ class Measuring:
             KinfmuError: The design cannot be assembled, or a measure has no value.
 
         """
-        found = _measured(self.model, self.argument, self._readings, parameters)
-        return np.array([found[aim.name].value for aim in self.aims])
+        found = self._measured({name: np.array([value]) for name, value in parameters.items()}, self.aims)
+        for aim, value in zip(self.aims, found[:, 0], strict=True):
+            if not np.isfinite(value):
+                raise KinfmuError(f"measure '{aim.name}' has no value: some samples are not reached")
+        return found[:, 0]
 
-    def slopes(self, value_of: Callable[[FloatArray], Mapping[str, float]], z: FloatArray) -> FloatArray:
-        """Return the derivatives of the values by the unknowns as parts of their ranges, (aims, n).
+    def slopes(
+        self, parameters_of: Callable[[FloatArray], Mapping[str, float]], z: FloatArray, aims: Sequence[Aim]
+    ) -> FloatArray:
+        """Return the derivatives of some values by the unknowns as parts of their ranges, (aims, n).
 
-        value_of: The parameters of unknowns.
+        parameters_of: The parameters of unknowns.
         """
-        columns = []
-        for k in range(len(z)):
-            ends = []
-            for side in (1.0, -1.0):
-                moved = z.copy()
-                moved[k] = min(max(z[k] + side * STEP, 0.0), 1.0)
-                ends.append((moved[k], moved))
-            (above, high), (below, low) = ends
-            try:
-                difference = self.values(value_of(high)) - self.values(value_of(low))
-            except KinfmuError:  # at the edge of what can be assembled
-                difference = np.zeros(len(self.aims))
-            columns.append(difference / (above - below))
-        return np.array(columns).T
+        steps = np.minimum(z + STEP, 1.0), np.maximum(z - STEP, 0.0)
+        moved = [np.where(np.eye(len(z), dtype=bool)[k], step, z) for k in range(len(z)) for step in steps]
+        designs = [parameters_of(one) for one in moved]
+        values = self._measured({name: np.array([one[name] for one in designs]) for name in designs[0]}, aims)
+        slopes = (values[:, 0::2] - values[:, 1::2]) / (steps[0] - steps[1])
+        return np.asarray(np.nan_to_num(slopes))  # 0 at the edge of what can be assembled
+
+    def _measured(self, parameters: Mapping[str, FloatArray], aims: Sequence[Aim]) -> FloatArray:
+        """Return the values (aims, m) of designs; NaN where there is none."""
+        margins = [aim for aim in aims if isinstance(aim.reading, LowestMargin)]  # of the samples: nothing to refine
+        others = [aim for aim in aims if aim not in margins]
+        found: dict[str, FloatArray] = {}
+        if others:
+            readings = [_renamed(aim.reading, aim.name) for aim in others]
+            found |= measure_designs(self.model, parameters, readings, anew=False, **self.inputs).values
+        if margins:
+            rows = zip(*(values.tolist() for values in parameters.values()), strict=True)
+            lowest = np.array([self._lowest_margin(dict(zip(parameters, row, strict=True))) for row in rows])
+            found |= {aim.name: lowest for aim in margins}
+        return np.array([found[aim.name] for aim in aims])
+
+    def _lowest_margin(self, parameters: Mapping[str, float]) -> float:
+        """Return the lowest margin of a design's samples; NaN if one of them is not reached."""
+        try:
+            run = self.model.solve(parameters=parameters, anew=False, **self.inputs)
+        except KinfmuError:
+            return math.nan
+        return float(run.margin.min()) if run.good.all() else math.nan
 
 
 def measuring_of(
@@ -110,13 +133,13 @@ def measuring_of(
     if not both:
         return None
     readings = [_reading(where, one, mechanism) for where, one in both]
-    plain = replace(mechanism, coordinates="all", measures=())
-    model = compiled(plain)
     named = [_renamed(reading, one.name) for (_, one), reading in zip(both, readings, strict=True)]
-    found = _measured(model, argument, named, {}, require=False)
+    model = compiled(replace(mechanism, coordinates="all", measures=()))
+    inputs = _inputs(model, argument)
+    units = measure_designs(model, {}, named, **inputs).units
     aims = []
     for (where, one), reading in zip(both, readings, strict=True):
-        unit = found[one.name].unit
+        unit = units[one.name]
         quantity = Quantity("number") if unit == "1" else quantity_in(unit, mechanism.length_unit)
         limits = {
             key: None if (value := getattr(one, key, None)) is None else _number(where, key, value, quantity, mechanism)
@@ -126,7 +149,7 @@ def measuring_of(
             raise MechanismError(f"{where} needs 'minimum' or 'maximum', or both")
         root = float(read_weights(f"{where} weight", one.weight, 1)[0]) ** 0.5
         aims.append(Aim(one.name, reading, **limits, root=root, unit=unit))
-    return Measuring(model, argument, aims)
+    return Measuring(model, inputs, aims)
 
 
 def _renamed(reading: Reading, name: str) -> Reading:
@@ -154,23 +177,16 @@ def _reading(where: str, one: Any, mechanism: Mechanism) -> Reading:
     return own[one.of]
 
 
-def _measured(
-    model: Model,
-    argument: Argument,
-    readings: Sequence[Reading],
-    parameters: Mapping[str, float],
-    *,
-    require: bool = True,
-) -> dict[str, Any]:
-    """Measure a design over the motion; a driver moves at the speed of its law, if that is constant."""
+def _inputs(model: Model, argument: Argument) -> dict[str, Any]:
+    """Return the motion that is measured: a turn of the driver if the mechanism as written makes one, else its run.
+
+    The driver turns at the speed of its law, if that is constant.
+    """
+    if not (argument.input and argument.is_turn):
+        return {}
     inputs = argument.keywords(argument.values(None, None, SAMPLES))
-    if argument.input:
-        law = model.mechanism.drivers[0].law
-        speed = float(law.speed) if isinstance(law, ConstantSpeed) else 0.0
-        inputs[model.mechanism.drivers[0].inputs()[1]] = speed or 1.0
-    run = model.solve(parameters=parameters, anew=False, **inputs)
-    found = measure(run, readings)
-    missing = next((one for one in found.values() if one.reason), None)
-    if require and missing is not None:
-        raise KinfmuError(f"measure '{missing.name}' has no value: {missing.reason}")
-    return dict(found)
+    if not model.solve(**inputs).good.all():
+        return {}
+    (driver,) = model.mechanism.drivers
+    speed = float(driver.law.speed) if isinstance(driver.law, ConstantSpeed) else 0.0
+    return {**inputs, driver.inputs()[1]: speed or 1.0}

@@ -13,12 +13,14 @@ import numpy as np
 
 from kinfmu.errors import CompilerError, RequestError
 from kinfmu.run import FloatArray
+from kinfmu.synthesis.argument import SAMPLES
 from kinfmu.synthesis.equations import Equations, NotAssembledError
 from kinfmu.synthesis.problem import FitProblem
 from kinfmu.synthesis.search import FINE, LONG, SHORT, Found, search
 
 Task = Literal["draw", "short", "long", "fine"]
 Advance = Callable[[int], None]
+WORTH = 2.0  # [s] in Python, from which compiling pays
 _EFFORTS = {"short": SHORT, "long": LONG, "fine": FINE}
 _equations: Equations  # of a process of the team
 
@@ -34,6 +36,7 @@ class Team:
     Args:
         problem: The problem.
         engine: 'auto', 'python' or 'native'; 'auto' is native where a compiler is found.
+        designs: How many are solved, roughly.
         workers: Number of processes; None: one for each core.
 
     Raises:
@@ -41,10 +44,10 @@ class Team:
 
     """
 
-    def __init__(self, problem: FitProblem, engine: str, workers: int | None) -> None:
+    def __init__(self, problem: FitProblem, engine: str, designs: int, workers: int | None) -> None:
         if workers is not None and not (isinstance(workers, int) and workers > 0):
             raise RequestError(f"workers = {workers!r} must be a positive whole number")
-        self.equations = _equations_of(problem, engine)
+        self.equations = _equations_of(problem, engine, designs)
         self.workers = workers or cores()
         self._pool: ProcessPoolExecutor | None = None
 
@@ -77,9 +80,9 @@ class Team:
         return self._pool.map(_work, [task] * len(starts), starts, chunksize=chunk)
 
 
-def _equations_of(problem: FitProblem, engine: str) -> Equations:
-    """Return the equations with an engine that works on this machine."""
-    if engine == "python" or not problem.sampled:
+def _equations_of(problem: FitProblem, engine: str, designs: int) -> Equations:
+    """Return the equations with an engine that works on this machine; 'auto': native where that pays for compiling."""
+    if engine == "python" or (engine == "auto" and _in_python(problem) * designs < WORTH):
         return Equations(problem, "python")
     equations = Equations(problem, "native")
     try:
@@ -91,6 +94,13 @@ def _equations_of(problem: FitProblem, engine: str) -> Equations:
             raise
         return Equations(problem, "python")
     return equations
+
+
+def _in_python(problem: FitProblem) -> float:
+    """Return the time of a design in Python [s], roughly; samples far apart take longer than those of a motion."""
+    timed = sum(len(target.wanted) for target in problem.sampled)
+    untimed = sum(SAMPLES for target in problem.sampled if not target.is_timed)
+    return 5e-4 + 6e-5 * timed + 8e-6 * untimed + (0.02 if problem.measuring else 0.0)
 
 
 def _join(problem: FitProblem, engine: str) -> None:
