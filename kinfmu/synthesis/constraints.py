@@ -1,7 +1,8 @@
 """Constraints: conditions that a fitted mechanism shall meet, as penalties on what violates them.
 
-A violation v adds weight * v**2 to the sum that is minimised. Every result states the value of each constraint, its
-limit and whether it holds.
+A violation v adds weight * v**2 to the sum that is minimised. At the end of a search the limits are shifted until the
+violation vanishes (method of multipliers; Nocedal and Wright 2006, chapter 17), so that the weight need not be large.
+Every result states the value of each constraint, its limit and whether it holds.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import ClassVar
 from kinfmu.readings import Reading
 
 Numeral = float | str
-WEIGHT = 1e6
+WEIGHT = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,6 +43,8 @@ class Evaluation:
         measured: Values of measures, in the order of the problem.
         excess: By how much Grashof's conditions are met, one array for each constraint.
         residuals: Of targets and penalties, weighted (r,).
+        target_count: Number of residuals that are no penalties.
+        violations: By how much limits are exceeded, in the order of the penalties; negative within them.
 
     """
 
@@ -50,7 +52,8 @@ class Evaluation:
     measured: FloatArray
     excess: tuple[FloatArray, ...]
     residuals: FloatArray
-    target_count: int  # of residuals that are no penalties
+    target_count: int
+    violations: FloatArray
 
     @property
     def squares(self) -> float:
@@ -87,6 +90,7 @@ class Equations:
         outputs = dict.fromkeys(name for one in problem.sampled for name in (*one.outputs, one.over) if name)
         self.outputs = tuple(outputs)
         self.names = tuple(problem.bounds)
+        self.shifts = np.zeros_like(self.penalty_roots)  # of the limits, while a search makes violations vanish
         self._ranges = np.array([bounds.high - bounds.low for bounds in problem.bounds.values()])
 
     @cached_property
@@ -117,23 +121,34 @@ class Equations:
             raise
         except KinfmuError as error:
             raise NotAssembledError(str(error)) from None
-        excess = [one.excess(parameters, self.names) for one in self.problem.lengths]
-        residuals = [(one.errors * one.target.scale * one.target.roots).ravel() for one in rows]
-        blocks = [one.jacobian for one in rows]
+        lengths = [one.excess(parameters, self.names) for one in self.problem.lengths]
         aims = measuring.aims if measuring else ()
-        at_last = [(aim, found) for aim, found in zip(aims, measured, strict=True) if aim.value is None]
-        first = [(aim, found) for aim, found in zip(aims, measured, strict=True) if aim.value is not None]
-        residuals.append(np.array([aim.root * aim.error(float(found)) for aim, found in first]))
-        target_count = sum(map(len, residuals))
-        residuals.append(np.array([aim.root * aim.error(float(found)) for aim, found in at_last]))
-        blocks.append(np.zeros((len(aims), len(self.names))))
-        for constraint, (met, slopes) in zip(self.problem.lengths, excess, strict=True):
-            violated = met < 0.0
-            residuals.append(constraint.root * np.where(violated, met, 0.0))
-            blocks.append(constraint.root * np.where(violated[:, None], slopes, 0.0))
+        errors = [
+            aim.root * (found - aim.value) for aim, found in zip(aims, measured, strict=True) if aim.value is not None
+        ]
+        limits = [aim.excess(found)[0] for aim, found in zip(aims, measured, strict=True) if aim.value is None]
+        violations = np.concatenate([np.array(limits), *(-met for met, _ in lengths)])
+        penalties = self.penalty_roots * np.maximum(violations + self.shifts, 0.0)
+        weighted = [(one.errors * one.target.scale * one.target.roots).ravel() for one in rows]
+        targets = np.concatenate([*weighted, np.array(errors)])
+        slopes = [-slopes for _, slopes in lengths]
+        blocks = [*(one.jacobian for one in rows), np.zeros((len(aims), len(self.names))), *slopes]
         jacobian = np.vstack(blocks) * self._ranges
-        found = Evaluation(rows, measured, tuple(met for met, _ in excess), np.concatenate(residuals), target_count)
+        first = len(targets) + len(limits)
+        active = penalties[len(limits) :] > 0.0
+        jacobian[first:] *= (self.penalty_roots[len(limits) :] * active)[:, None]
+        excess = tuple(met for met, _ in lengths)
+        found = Evaluation(
+            rows, measured, excess, np.concatenate([targets, penalties]), len(targets), np.asarray(violations)
+        )
         return found, jacobian
+
+    @cached_property
+    def penalty_roots(self) -> FloatArray:
+        """Square roots of the weights of the penalties: of limits of measures, then of Grashof's conditions."""
+        aims = self.measuring.aims if self.measuring else ()
+        lengths = [np.full(one.count, one.root) for one in self.problem.lengths]
+        return np.concatenate([np.array([aim.root for aim in aims if aim.value is None]), *lengths])
 
     def with_measures(self, z: FloatArray, found: Evaluation, jacobian: FloatArray) -> FloatArray:
         """Return the Jacobian with the rows of measures, which cost two motions for each unknown."""
@@ -142,17 +157,19 @@ class Equations:
             return jacobian
         ordered = sorted(range(len(measuring.aims)), key=lambda k: measuring.aims[k].value is None)
         start = sum(one.errors.size for one in found.rows)
-        active = {
-            row: aim
-            for row, k in enumerate(ordered, start=start)
-            if (aim := measuring.aims[k]).value is not None or aim.error(float(found.measured[k])) != 0.0
-        }
-        if not active:
+        factors = {}  # of the slopes of a measure in a row
+        for row, k in enumerate(ordered, start=start):
+            aim, value = measuring.aims[k], float(found.measured[k])
+            if aim.value is not None:
+                factors[row, k] = aim.root
+            elif found.residuals[row] > 0.0:
+                factors[row, k] = aim.root * aim.excess(value)[1]
+        if not factors:
             return jacobian
         jacobian = jacobian.copy()
-        slopes = measuring.slopes(self._parameters, z, list(active.values()))
-        for (row, aim), slope in zip(active.items(), slopes, strict=True):
-            jacobian[row] = aim.root * slope
+        slopes = measuring.slopes(self._parameters, z, [measuring.aims[k] for _, k in factors])
+        for ((row, _), factor), slope in zip(factors.items(), slopes, strict=True):
+            jacobian[row] = factor * slope
         return jacobian
 
     def _parameters(self, z: FloatArray) -> dict[str, float]:

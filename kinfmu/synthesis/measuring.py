@@ -41,13 +41,11 @@ class Aim:
     root: float  # square root of the weight
     unit: str
 
-    def error(self, found: float) -> float:
-        """Return the deviation from the value, or what exceeds a limit; 0 within the limits."""
-        if self.value is not None:
-            return found - self.value
-        if self.minimum is not None and found < self.minimum:
-            return found - self.minimum
-        return found - self.maximum if self.maximum is not None and found > self.maximum else 0.0
+    def excess(self, found: float) -> tuple[float, float]:
+        """Return by how much the nearer limit is exceeded, negative within the limits, and its derivative: 1 or -1."""
+        low = -math.inf if self.minimum is None else self.minimum - found
+        high = -math.inf if self.maximum is None else found - self.maximum
+        return (low, -1.0) if low > high else (high, 1.0)
 
 
 class Measuring:

@@ -204,7 +204,7 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
             TargetErrors(
                 target.name,
                 target.type,
-                target.outputs,
+                target.shown,
                 tuple("rad" if is_angle else unit for is_angle in target.angles),
                 argument,
                 row.arguments,
@@ -218,7 +218,7 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
     aims: Any = problem.measuring.aims if problem.measuring else ()
     for aim, value in zip(aims, found.measured, strict=True):
         if aim.value is not None:
-            error = np.array([[aim.error(float(value))]])
+            error = np.array([[float(value) - aim.value]])
             size = abs(float(error[0, 0]))
             reached = np.array([[float(value)]])
             result.append(
@@ -255,7 +255,7 @@ def _conditions(problem: FitProblem, found: Evaluation) -> list[Condition]:
             continue
         limits = [f"at least {aim.minimum:.6g}"] if aim.minimum is not None else []
         limits += [f"at most {aim.maximum:.6g}"] if aim.maximum is not None else []
-        violation = abs(aim.error(float(value)))
+        violation = max(0.0, aim.excess(float(value))[0])
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
         shown = "" if aim.unit == "1" else f" {aim.unit}"
         text = f"{aim.reading.type} = {float(value):.6g}{shown}, {' and '.join(limits)}{shown}"

@@ -30,6 +30,7 @@ class Sampled:
         name: Name of the target.
         type: Its type in files.
         outputs: Names of the d outputs.
+        shown: The same as the user named them.
         angles: (d,) which of them are angles.
         wanted: (m, d), without `offset`.
         scale: (d,) factors of the errors: 1, of an angle among lengths a length.
@@ -46,6 +47,7 @@ class Sampled:
     name: str
     type: str
     outputs: tuple[str, ...]
+    shown: tuple[str, ...]
     angles: tuple[bool, ...]
     wanted: FloatArray
     scale: FloatArray
@@ -156,6 +158,7 @@ def sampled(
     return Sampled(
         **common,
         outputs=outputs,
+        shown=tuple(f"{target.of}.{name.rpartition('.')[2]}" for name in outputs),
         angles=tuple(name.endswith(".phi") for name in outputs),
         wanted=wanted,
         scale=scale,
@@ -191,6 +194,7 @@ def _function(
     return Sampled(
         **{**common, **more},
         outputs=(target.of,),
+        shown=(target.of,),
         angles=(coordinates[target.of],),
         wanted=points[:, 1:],
         scale=np.ones(1),

@@ -24,6 +24,8 @@ class Effort(NamedTuple):
     most: int
 
 
+_SHIFTS = 20  # most rounds of the method of multipliers
+_VANISHED = 1e-7  # relative change of the shifts at which they end
 SHORT, LONG, FINE = Effort(1e-6, 12), Effort(1e-6, 150), Effort(1e-15, 300)
 
 
@@ -93,19 +95,28 @@ def search(equations: Equations, z: FloatArray, effort: Effort) -> Found:
     z = np.clip(z, 1e-9, 1.0 - 1e-9)  # strictly within the bounds
     if not np.isfinite(residuals(z)).all():
         return Found(None, np.inf, tried, refused)
-    result = least_squares(
-        residuals,
-        z,
-        jac=jacobian,
-        bounds=(0.0, 1.0),
-        method="trf",
-        x_scale="jac",
-        ftol=effort.tolerance,
-        xtol=effort.tolerance,
-        gtol=effort.tolerance,
-        max_nfev=effort.most,
-    )
-    return Found(result.x, 2.0 * float(result.cost), tried, refused)
+    try:
+        for _ in range(_SHIFTS if effort is FINE else 1):
+            last.clear()
+            z = least_squares(
+                residuals,
+                z,
+                jac=jacobian,
+                bounds=(0.0, 1.0),
+                method="trf",
+                x_scale="jac",
+                ftol=effort.tolerance,
+                xtol=effort.tolerance,
+                gtol=effort.tolerance,
+                max_nfev=effort.most,
+            ).x
+            found, _ = equations.at(z)
+            before, equations.shifts = equations.shifts, np.maximum(found.violations + equations.shifts, 0.0)
+            if np.abs(equations.shifts - before).max(initial=0.0) <= _VANISHED * np.abs(before).max(initial=_VANISHED):
+                break
+    finally:
+        equations.shifts = np.zeros_like(equations.shifts)
+    return Found(z, equations.at(z)[0].total, tried, refused)
 
 
 def distinct(found: Sequence[tuple[Found, int]]) -> list[tuple[Found, int]]:

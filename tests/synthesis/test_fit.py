@@ -1,0 +1,201 @@
+"""The search: the same result whatever the number of workers, refused designs, constraints, files and messages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import kinfmu
+from kinfmu.cli import main
+from kinfmu.mechanism import toml_text
+from kinfmu.synthesis import (
+    FunctionTarget,
+    GrashofConstraint,
+    MarginConstraint,
+    MeasureConstraint,
+    MeasureTarget,
+    PathTarget,
+    PoseTarget,
+)
+from tests.synthesis.fourbars import LENGTHS, four_bar
+
+POINTS = [(0.5, 2.3), (0.0, 2.3), (-0.4, 1.9), (-0.4, 1.5)]
+PATH = PathTarget(name="curve", of="coupler.X", points=POINTS, step="30 deg", start="120 deg")
+BOUNDS = {"crank": (0.5, 2.5), "coupler": (2.0, 5.0), "px": (0.5, 3.0), "py": ("50 cm", 3)}
+
+
+def _problem(**changes: Any) -> kinfmu.FitProblem:
+    given: dict[str, Any] = {"mechanism": four_bar(), "unknowns": BOUNDS, "targets": [PATH], **changes}
+    return kinfmu.FitProblem(**given)
+
+
+def test_the_result_does_not_depend_on_the_number_of_workers() -> None:
+    alone, together = (kinfmu.fit(_problem(), starts=2, workers=n, engine="python") for n in (1, 2))
+
+    assert alone.parameters == together.parameters
+    assert alone.optima == together.optima
+    assert (alone.tried, alone.refused) == (together.tried, together.refused)
+
+
+def test_designs_that_do_not_close_are_counted_with_their_reason() -> None:
+    result = kinfmu.fit(_problem(unknowns={**BOUNDS, "crank": (0.5, 6.0)}), starts=2, engine="python")
+
+    assert sum(result.refused.values()) > 0
+    assert all(isinstance(reason, str) and reason for reason in result.refused)
+    assert np.isfinite(result.residuals).all()
+    assert result.tried > sum(result.refused.values())
+
+
+def test_no_design_that_closes_is_one_line_with_the_reason() -> None:
+    far = four_bar(ground=40.0)
+    with pytest.raises(kinfmu.KinfmuError, match=r"none of 16 designs .* can be assembled"):
+        kinfmu.fit(_problem(mechanism=four_bar(), unknowns={"crank": (5.5, 6.0)}), starts=1, engine="python")
+    with pytest.raises(kinfmu.KinfmuError, match="does not close"):
+        kinfmu.fit(_problem(mechanism=far), starts=1, engine="python")
+
+
+def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
+    free = kinfmu.fit(_problem(), starts=1, engine="python")
+    swing = kinfmu.readings.Range("s", of="rocker.phi")
+    bound = kinfmu.fit(
+        _problem(
+            constraints=[
+                GrashofConstraint(name="turns", links=["ground", "crank", "coupler", "rocker"], gap="1 m"),
+                MeasureConstraint(name="swing", of=swing, maximum="30 deg"),
+                MarginConstraint(name="margin", minimum=0.1),
+            ]
+        ),
+        starts=1,
+        engine="python",
+    )
+
+    lengths = sorted(bound.mechanism.parameters[name].value for name in ("ground", "crank", "coupler", "rocker"))
+    run = kinfmu.solve(bound.mechanism, crank_angle=np.linspace(0.0, 2.0 * np.pi, 721))
+    assert bound.squares > free.squares
+    assert bound.holds
+    assert lengths[1] + lengths[2] - lengths[0] - lengths[3] >= 1.0 - 1e-6
+    assert kinfmu.measure(run, [swing])["s"].value <= np.radians(30.0) + 1e-6
+    assert [condition.name for condition in bound.conditions] == ["turns", "swing", "margin"]
+
+
+def test_a_constraint_that_cannot_hold_is_reported() -> None:
+    impossible = GrashofConstraint(name="turns", links=["ground", "crank", "coupler", "rocker"], gap=9.0)
+
+    result = kinfmu.fit(_problem(constraints=[impossible]), starts=1, engine="python")
+
+    assert not result.holds
+    assert result.conditions[0].violation > 1.0
+    assert "turns: VIOLATED by" in str(result)
+
+
+def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
+    (tmp_path / "bar.toml").write_text(toml_text.text(four_bar()), encoding="utf-8")
+    (tmp_path / "points.csv").write_text("x [m], y [cm]\n0.5, 230\n0.0, 230\n-0.4, 190\n-0.4, 150\n", encoding="utf-8")
+    (tmp_path / "fit.toml").write_text(
+        'mechanism = "bar.toml"\n[unknowns]\ncrank = [0.5, 2.5]\ncoupler = [2, 5]\npx = [0.5, 3]\npy = ["50 cm", 3]\n'
+        '[targets.curve]\ntype = "path"\nof = "coupler.X"\nfile = "points.csv"\nstep = "30 deg"\nstart = "120 deg"\n',
+        encoding="utf-8",
+    )
+    out, figure = tmp_path / "out.toml", tmp_path / "out.svg"
+
+    done = CliRunner().invoke(
+        main, ["fit", str(tmp_path / "fit.toml"), "-o", str(out), "--figure", str(figure), "--starts", "1",
+               "--workers", "1"],
+    )  # fmt: skip
+
+    assert done.exit_code == 0, done.output
+    expected = kinfmu.fit(_problem(), starts=1)
+    saved = kinfmu.load(str(out))
+    assert {name: saved.parameters[name].value for name in BOUNDS} == pytest.approx(dict(expected.parameters))
+    assert "curve: wanted" in figure.read_text(encoding="utf-8")
+    assert "<table>" in expected._repr_html_()
+
+
+def _path(**keys: Any) -> dict[str, Any]:
+    return {"targets": [PathTarget(**{"name": "t", "of": "coupler.X", "points": POINTS, **keys})]}
+
+
+def _poses(**keys: Any) -> dict[str, Any]:
+    return {"targets": [PoseTarget(**{"name": "p", "of": "rocker", "poses": [(0, 0, 0)], "length": 1.0, **keys})]}
+
+
+def _grashof(*links: str) -> dict[str, Any]:
+    return {"constraints": [GrashofConstraint(name="g", links=links)]}
+
+
+CASES: list[tuple[dict[str, Any], str]] = [
+    ({"unknowns": {"cranck": (0, 1)}}, r"\[unknowns\] .*'cranck'; did you mean 'crank'"),
+    ({"unknowns": {"crank": (2, 1)}}, r"\[unknowns\] crank = \(2, 1\): the low bound must be below"),
+    ({"unknowns": {"crank": 1}}, r"\[unknowns\] crank = 1 must be bounds \[low, high\]"),
+    ({"unknowns": {"crank": ("1 deg", 2)}}, r"\[unknowns\] crank = '1 deg': unit 'deg' must be one of"),
+    ({"unknowns": {}}, "needs unknowns"),
+    ({"unknowns": {"crank.speed": (1, 2)}}, r"crank.speed is a law constant, .* over = 'time'"),
+    ({"targets": []}, "needs targets"),
+    ({"targets": [PATH, PATH]}, "two targets or constraints have the name 'curve'"),
+    (_path(of="coupler.Z"), "'coupler.Z' is not a point; did you mean"),
+    (_path(points=[(1, 2, 3)]), r"list \[\[x, y\], ...\]; number 1 is"),
+    (_path(at=[1]), "at must be a list of 4 values of crank"),
+    (_path(start=1), "start needs 'at' or 'step'"),
+    (_path(weight=-1.0), "weights must be positive"),
+    (_poses(of="rokker"), "moving body; did you mean 'rocker'"),
+    (_poses(length=0), "length = 0 must be positive"),
+    ({"targets": [FunctionTarget(name="f", of="rocker.ph", points=[(0, 1)])]}, "did you mean 'rocker.phi'"),
+    ({"targets": [MeasureTarget(name="m", of="stroke", value=1)]}, "'stroke' is not a measure"),
+    (_grashof("crank"), "must be four lengths"),
+    (_grashof("crank", "coupler", "rocker", "groun"), "did you mean 'ground'"),
+    ({"over": "tme"}, "over = 'tme' must be 'driver' or 'time'"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), CASES, ids=[message for _, message in CASES])
+def test_messages_name_the_place_and_what_would_be_valid(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(kinfmu.KinfmuError, match=message) as caught:
+        _problem(**changes)
+    assert "\n" not in str(caught.value)
+
+
+TARGET = 'mechanism = "crank_rocker"\n[targets.t]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("targetz = 1", "targetz: unknown key; did you mean 'targets'"),
+        ("", "mechanism is missing"),
+        ('mechanism = "fourba"', "did you mean 'fourbar'"),
+        ('mechanism = "none.toml"', "none.toml: cannot be read"),
+        (TARGET + 'type = "pth"', r"\[targets.t\] type = 'pth' is not known; did you mean 'path'"),
+        (TARGET + 'type = "path"\nof_ = 1', r"\[targets.t\] of_: unknown key; did you mean 'of'"),
+        (TARGET + 'type = "path"\nof = "a"', "needs the key 'points' or 'file'"),
+    ],
+)
+def test_messages_about_files(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "fit.toml"
+    path.write_text(text, encoding="utf-8")
+
+    with pytest.raises(kinfmu.KinfmuError, match=message) as caught:
+        kinfmu.synthesis.read_problem(path)
+    assert str(caught.value).startswith(str(path))
+
+    done = CliRunner().invoke(main, ["fit", str(path)])
+    assert done.exit_code == 1
+    assert done.output.count("\n") == 1
+
+
+def test_law_constants_are_unknowns_over_time() -> None:
+    times = np.array([0.1, 0.4, 0.9])
+    speed = 1.7
+    run = kinfmu.solve(four_bar(), crank_angle=np.pi / 3.0 + speed * times)
+    points = np.column_stack([times, run["rocker.phi"]])
+    target = FunctionTarget(name="f", of="rocker.phi", points=points)
+
+    result = kinfmu.fit(
+        _problem(unknowns={"crank.speed": (0.5, 3.0)}, targets=[target], over="time"), starts=1, engine="python"
+    )
+
+    assert result.parameters["crank.speed"] == pytest.approx(speed, abs=1e-9)
+    assert LENGTHS["crank"] == result.mechanism.parameters["crank"].value
