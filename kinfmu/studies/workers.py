@@ -78,7 +78,8 @@ def _processes(count: int) -> Iterator[tuple[Executor, int]]:
     try:
         yield pool, count
     except BrokenProcessPool:
-        raise StudyError("a worker process ended unexpectedly; was it killed, or is there too little memory?") from None
+        reason = "a worker process ended unexpectedly: it was killed, or there is too little memory"
+        raise StudyError(f"{reason}; finished parts are kept, and the same command goes on from there") from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
