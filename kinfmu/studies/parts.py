@@ -114,6 +114,15 @@ def _is_whole(path: Path) -> bool:
         return False
 
 
+def remove_finished(target: Path, study: Study) -> None:
+    """Remove the parts of a study whose results are written, if it was killed before it removed them."""
+    folder = folder_of(target)
+    with suppress(OSError, ValueError):
+        said = json.loads((folder / _MANIFEST).read_bytes())
+        if said.get("fingerprint") == study.fingerprint:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 def folder_of(target: Path) -> Path:
     """Return the folder of the parts of a file of results."""
     return target.with_name(target.name + SUFFIX)

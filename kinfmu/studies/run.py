@@ -19,7 +19,7 @@ from kinfmu.readings import Reading
 from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.nominal import nominal
-from kinfmu.studies.parts import Parts
+from kinfmu.studies.parts import Parts, remove_finished
 from kinfmu.studies.result import StudyResult, is_result_of
 from kinfmu.studies.sampling import METHODS
 from kinfmu.studies.table import join, part_bytes, schema_of
@@ -129,6 +129,8 @@ def run_study(
         raise RequestError(f"{path}: there is no folder '{path.parent}'")
     if restart or not is_result_of(path, study):
         _run(study, path, workers, dask, progress or _quiet, restart=restart)
+    else:
+        remove_finished(path, study)
     return StudyResult.read(path)
 
 

@@ -7,12 +7,13 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
+from kinfmu import VERSION
 from kinfmu.errors import MissingPackageError, StudyError
 
 AHEAD = 3  # parts given to each core before they are due; more would only fill the memory
@@ -126,6 +127,12 @@ def _cluster(address: str, workers: int) -> Iterator[tuple[Executor, int]]:
     try:
         with client:
             yield client.get_executor(pure=False), max(1, sum(client.ncores().values()))
+    except ModuleNotFoundError as error:
+        raise StudyError(f"the workers of the Dask cluster need kinfmu {VERSION} ({error}): install it there") from None
+    except CancelledError:
+        raise StudyError(
+            "the Dask cluster was lost; the same command goes on with the parts that are missing"
+        ) from None
     except distributed.KilledWorker as error:
         raise StudyError(f"Dask workers ended several times at the same part: {error}") from None
     finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import time
@@ -96,6 +97,18 @@ def test_parts_that_are_whole_are_kept_and_damaged_ones_measured_again(tmp_path:
     assert begins[0] == 32
     assert found["design"].tolist() == list(range(160))
     assert not folder.exists()
+
+
+def test_parts_that_a_finished_study_left_are_removed(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    interrupted(path)
+    folder = tmp_path / "rows.parquet.parts"
+    shutil.copytree(folder, tmp_path / "copy")
+    again = {"measures": "swing", "designs": 160, "output": path, "workers": 1}
+    kinfmu.study(linkage(), RANGES, **again)  # type: ignore[arg-type]
+    shutil.move(tmp_path / "copy", folder)
+    kinfmu.study(linkage(), RANGES, **again)  # type: ignore[arg-type]
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 
 def test_parts_of_another_study_are_refused_until_they_are_removed(tmp_path: Path) -> None:

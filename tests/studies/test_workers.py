@@ -11,12 +11,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import kinfmu
 from kinfmu.errors import StudyError
 from kinfmu.studies import run_study
-from kinfmu.studies.chunk import run_chunk
+from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import define
 from tests.studies.linkage import RANGES, linkage
 
@@ -50,6 +51,18 @@ def test_the_engine_is_part_of_the_study_and_gives_the_same_numbers() -> None:
     assert both[0] == pytest.approx(both[1], rel=1e-12)
     native = [define(linkage(), RANGES, designs=40, engine=engine).fingerprint for engine in ("python", "native")]
     assert native[0] != native[1]
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_the_numbers_of_a_design_do_not_depend_on_those_measured_with_it(engine: str) -> None:
+    study = define(linkage(), RANGES, designs=40, engine=engine)
+    job = Job.of(study)
+    whole = job.measure(study.sampling.values(0, 40))
+    for first, count in ((0, 1), (1, 7), (8, 32)):
+        part = job.measure(study.sampling.values(first, count))
+        for name in study.measures:
+            assert np.array_equal(part.values[name], whole.values[name][first : first + count])
+            assert np.array_equal(part.at[name], whole.at[name][first : first + count])
 
 
 @needs_dask
@@ -94,6 +107,24 @@ def test_a_worker_of_a_cluster_that_is_killed_does_not_change_them(
     assert study(tmp_path, dask=address, progress=kill_one) == rows
     assert 0 < killed[0] < DESIGNS
     assert (workers[0].wait(), workers[1].poll()) == (-signal.SIGKILL, None)
+
+
+@needs_dask
+@quiet
+def test_a_cluster_that_is_lost_ends_the_study_with_its_parts_kept(tmp_path: Path) -> None:
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+    ) as cluster:
+
+        def lose(done: int, _count: int) -> None:
+            if done:
+                cluster.close()
+
+        with pytest.raises(StudyError, match="the Dask cluster was lost; the same command goes on"):
+            study(tmp_path, dask=cluster.scheduler_address, progress=lose)
+    assert len(list(tmp_path.glob("rows.parquet.parts/part-*"))) >= 1
 
 
 @needs_dask
