@@ -16,7 +16,7 @@ from kinfmu.analysis.values import law_values, value_text
 from kinfmu.equations.system import size_of
 from kinfmu.errors import listed
 from kinfmu.joints import Fixed, Revolute
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
@@ -57,7 +57,7 @@ def _texts(member: object) -> set[object]:
     found: set[object] = set()
     for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
         value = getattr(member, entry.name)
-        if isinstance(value, Measure):
+        if isinstance(value, PoseQuantity):
             found |= _texts(value)
         else:
             found |= {value} if isinstance(value, str) else {*value} if isinstance(value, tuple) else set()

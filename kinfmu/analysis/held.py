@@ -8,7 +8,7 @@ from typing import ClassVar
 from kinfmu.drivers import Driver
 from kinfmu.equations.system import FloatArray
 from kinfmu.joints import Held
-from kinfmu.measures import CoordinateOf, Measure
+from kinfmu.measures import CoordinateOf, PoseQuantity
 from kinfmu.measures.arithmetic import decimal_sum
 from kinfmu.mechanism import Mechanism, Start
 from kinfmu.plan import SolvePlan, compile_plan
@@ -19,7 +19,7 @@ from kinfmu.plan.origin import in_world
 class HeldDriver(Held):
     """The quantity of a driver, held at a value.
 
-        Phi = measure - value, or the row that the measure defines in its place        (1 row)
+        Phi = quantity - value, or the row that the quantity defines in its place        (1 row)
 
     Only `check` uses it: the range of one driver is found with the others at their start values.
     """
@@ -32,12 +32,12 @@ class HeldDriver(Held):
     value: float = field(metadata={"internal": True})
 
     def moved(self, dx: float, dy: float) -> HeldDriver:
-        measure = self.driver.measured()
-        if not isinstance(measure, CoordinateOf):
+        quantity = self.driver.measured()
+        if not isinstance(quantity, CoordinateOf):
             return self
-        return replace(self, value=decimal_sum(self.value, dx if measure.axis == "x" else dy))
+        return replace(self, value=decimal_sum(self.value, dx if quantity.axis == "x" else dy))
 
-    def measured(self) -> tuple[Measure, float]:
+    def measured(self) -> tuple[PoseQuantity, float]:
         return self.driver.measured(), self.value
 
 

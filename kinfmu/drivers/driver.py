@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from kinfmu.laws import ConstantSpeed, Law
-from kinfmu.measures import AngleBetween, CoordinateOf, DistanceBetween, Measure, PositionAlong
+from kinfmu.measures import AngleBetween, CoordinateOf, DistanceBetween, PoseQuantity, PositionAlong
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Axis, BodyName, BodyPair, Placement, PointName, PointPair
 from kinfmu.units import InputName, Quantity, Radians
@@ -16,7 +16,7 @@ from kinfmu.units import InputName, Quantity, Radians
 class Driver(ABC):
     """One driving row Phi(q, t): a measured quantity follows u(t).
 
-        Phi = measure - u(t)        (1 row; a measure may define its own row)
+        Phi = quantity - u(t)        (1 row; a quantity may define its own row)
 
     A leaf is a frozen dataclass with fields `name`, its own keys, and last `law`. `noun` names the input of an FMU:
     a driver `crank` with noun `angle` has the inputs `crank_angle`, `crank_speed` and `crank_acceleration`.
@@ -28,7 +28,7 @@ class Driver(ABC):
     law: Law
 
     @abstractmethod
-    def measured(self) -> Measure:
+    def measured(self) -> PoseQuantity:
         """Return the driven quantity."""
 
     def bodies(self) -> tuple[str, ...]:

@@ -65,9 +65,9 @@ class System:
             for label, scale, kind in zip(joint.labels, joint.scales(), joint.kinds(), strict=True)
         ]
         for driver in mechanism.drivers:
-            measure = driver.measured()
-            scale = measure.scale(self.size) * per_length[measure.kind]
-            rows.append(Row(driver.name, driver.noun, scale, measure.kind))
+            quantity = driver.measured()
+            scale = quantity.scale(self.size) * per_length[quantity.kind]
+            rows.append(Row(driver.name, driver.noun, scale, quantity.kind))
         self.rows = tuple(rows)
         self.joint_row_count = len(rows) - len(mechanism.drivers)
         self.scales: FloatArray = np.array([row.scale for row in rows])  # (m,)

@@ -10,7 +10,7 @@ from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Joint
 from kinfmu.laws import Law
 from kinfmu.laws.law import TURN
-from kinfmu.measures import AngleBetween, Measure, PositionAlong
+from kinfmu.measures import AngleBetween, PoseQuantity, PositionAlong
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import BodyName, BodyPair, Placement, PointPair, body_of
 from kinfmu.units import Length, Radians
@@ -19,11 +19,11 @@ _SAMPLES = 24  # angles in a turn at which the size of a lift is sampled
 
 
 class Cam(Joint):
-    """A cam and follower: a measure of the follower depends on the cam's angle relative to the body that holds both.
+    """A cam and follower: a quantity of the follower depends on the cam's angle relative to the body that holds both.
 
-        Phi = measure - offset - f(phi_k - phi_i)        (1 row, scale 1)
+        Phi = quantity - offset - f(phi_k - phi_i)        (1 row, scale 1)
 
-    A leaf defines the bodies and the measure of the follower.
+    A leaf defines the bodies and the quantity of the follower.
     """
 
     cam: str
@@ -36,8 +36,8 @@ class Cam(Joint):
         return self.bodies()[0]
 
     @abstractmethod
-    def follower(self) -> Measure:
-        """Return the measure of the follower."""
+    def follower(self) -> PoseQuantity:
+        """Return the quantity of the follower."""
 
     @property
     def law_kinds(self) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 from kinfmu.joints.joint import Joint
 from kinfmu.laws import Law
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value
 from kinfmu.measures.placement import Placement
 
@@ -16,15 +16,15 @@ class Coupling(Joint):
 
         Phi = output - f(input)        (1 row, scale 1)
 
-    After Haug (1989), relative constraints; measures may be absolute too.
+    After Haug (1989), relative constraints; quantities may be absolute too.
     """
 
     type: ClassVar[str] = "coupling"
     labels: ClassVar[tuple[str, ...]] = ("coupled",)
 
     name: str
-    input: Annotated[Measure, "the independent measure, such as the angle of a body"]
-    output: Annotated[Measure, "the dependent measure, such as the position of a point along an axis"]
+    input: Annotated[PoseQuantity, "the independent quantity, such as the angle of a body"]
+    output: Annotated[PoseQuantity, "the dependent quantity, such as the position of a point along an axis"]
     law: Annotated[Law, "f, in the unit of the output over that of the input"]
 
     @property

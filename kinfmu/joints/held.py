@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from kinfmu.errors import MechanismError
 from kinfmu.joints.joint import Condition, Joint
-from kinfmu.measures import AngleBetween, CoordinateOf, DistanceBetween, Measure, OffsetFrom
+from kinfmu.measures import AngleBetween, CoordinateOf, DistanceBetween, OffsetFrom, PoseQuantity
 from kinfmu.measures.arithmetic import Value, decimal_sum
 from kinfmu.measures.placement import Axis, BodyName, BodyPair, Placement, PointName, PointPair
 from kinfmu.units import Length, Radians
@@ -19,29 +19,29 @@ SHORTEST = 1e-30  # [length]; squares of shorter lengths lose their digits
 class Held(Joint):
     """One measured quantity, held at a value.
 
-        Phi = measure - value        (1 row; a measure may define its own row)
+        Phi = quantity - value        (1 row; a quantity may define its own row)
 
     Leaves define `measured`.
     """
 
     @abstractmethod
-    def measured(self) -> tuple[Measure, float]:
-        """Return the measure and the value at which it is held."""
+    def measured(self) -> tuple[PoseQuantity, float]:
+        """Return the quantity and the value at which it is held."""
 
     def bodies(self) -> tuple[str, ...]:
         return self.measured()[0].bodies()
 
     def residual(self, at: Placement) -> tuple[Value, ...]:
-        measure, value = self.measured()
-        return (measure.row(at, value),)
+        quantity, value = self.measured()
+        return (quantity.row(at, value),)
 
     def scales(self) -> tuple[float, ...]:
-        measure, value = self.measured()
-        return (measure.scale(value),)
+        quantity, value = self.measured()
+        return (quantity.scale(value),)
 
     def gaps(self, residual: tuple[float, ...]) -> tuple[float, ...]:
-        measure, value = self.measured()
-        return (measure.gap(residual[0], value),)
+        quantity, value = self.measured()
+        return (quantity.gap(residual[0], value),)
 
     def kinds(self) -> tuple[str, ...]:
         return (self.measured()[0].kind,)

@@ -1,17 +1,23 @@
-"""Measures: quantities of a pose that a joint holds, a driver drives or a coupling relates."""
+"""Quantities of a pose that a joint holds, a driver drives or a coupling relates."""
 
 from __future__ import annotations
 
-from kinfmu.measures.measure import AngleBetween, CoordinateOf, DistanceBetween, Measure, OffsetFrom, PositionAlong
+from kinfmu.measures.measure import AngleBetween, CoordinateOf, DistanceBetween, OffsetFrom, PoseQuantity, PositionAlong
 
-MEASURES: tuple[type[Measure], ...] = (AngleBetween, CoordinateOf, DistanceBetween, PositionAlong, OffsetFrom)
+POSE_QUANTITIES: tuple[type[PoseQuantity], ...] = (
+    AngleBetween,
+    CoordinateOf,
+    DistanceBetween,
+    PositionAlong,
+    OffsetFrom,
+)
 
 __all__ = [
-    "MEASURES",
+    "POSE_QUANTITIES",
     "AngleBetween",
     "CoordinateOf",
     "DistanceBetween",
-    "Measure",
     "OffsetFrom",
+    "PoseQuantity",
     "PositionAlong",
 ]

@@ -1,4 +1,4 @@
-"""Measures: quantities of a pose that a joint can hold, a driver can drive, or a coupling can relate."""
+"""Quantities of a pose that a joint can hold, a driver can drive, or a coupling can relate."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinfmu.measures.placement import Axis, BodyName, Placement, PointName, Poin
 from kinfmu.units import Radians
 
 
-class Measure(ABC):
+class PoseQuantity(ABC):
     """One number of a pose, in plain arithmetic.
 
     A leaf is a frozen dataclass; its fields are keys of the table that names it, such as
@@ -45,7 +45,7 @@ class Measure(ABC):
 
 
 @dataclass(frozen=True)
-class AngleBetween(Measure):
+class AngleBetween(PoseQuantity):
     """Angle of a body relative to another or to the world: phi_of - phi_to, with whole turns."""
 
     type: ClassVar[str] = "angle"
@@ -62,7 +62,7 @@ class AngleBetween(Measure):
 
 
 @dataclass(frozen=True)
-class CoordinateOf(Measure):
+class CoordinateOf(PoseQuantity):
     """World coordinate of a point."""
 
     type: ClassVar[str] = "coordinate"
@@ -81,7 +81,7 @@ class CoordinateOf(Measure):
 
 
 @dataclass(frozen=True)
-class DistanceBetween(Measure):
+class DistanceBetween(PoseQuantity):
     """Distance L = |d| of two points.
 
     The row d.d - L^2 needs no root and is smooth for every d.
@@ -113,7 +113,7 @@ class DistanceBetween(Measure):
 
 
 @dataclass(frozen=True)
-class _OnSlide(Measure):
+class _OnSlide(PoseQuantity):
     """Where a point b lies against an axis through another point a: d = r_b - r_a, and e fixed in a's body."""
 
     kind: ClassVar[str] = "length"

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
@@ -122,7 +122,7 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
     for key in keys_of(type(reading)):
         value = getattr(reading, key.name)
         is_measured = key.takes == "measured" or (key.refers is not None and key.refers.kind == "coordinate")
-        if not is_measured or value is None or isinstance(value, Measure):
+        if not is_measured or value is None or isinstance(value, PoseQuantity):
             continue
         if not isinstance(value, str):
             raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
@@ -161,11 +161,11 @@ def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
-def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Measure | Reading) -> None:
+def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | PoseQuantity | Reading) -> None:
     """Check the references in its fields; messages put `before` in front of the key."""
     for key in keys_of(type(member)):
         where, value = f"{before}{key.name}", getattr(member, key.name)
-        if isinstance(value, Measure):
+        if isinstance(value, PoseQuantity):
             _check_fields(bodies, f"{where}.", value)
         elif key.refers is not None and not (value is None and key.default is None):
             _check_reference(bodies, where, value, key.refers, is_pair=key.takes == "pair")

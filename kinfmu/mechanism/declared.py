@@ -13,7 +13,7 @@ from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from kinfmu.laws import Law, LawQuantity, Segment
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import Reference
 from kinfmu.units import Quantity
 
@@ -22,8 +22,8 @@ REQUIRED = MISSING
 _PLAIN: dict[Any, Takes] = {
     bool: "truth",
     Law: "law",
-    Measure: "measure",
-    str | Measure: "measured",
+    PoseQuantity: "measure",
+    str | PoseQuantity: "measured",
     tuple[float, ...]: "numbers",
     tuple[tuple[float, float], ...]: "points",
     tuple[Segment, ...]: "segments",

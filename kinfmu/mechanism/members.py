@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
 from kinfmu.laws import Law, LawQuantity
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism.body import Body, Point, Start
 from kinfmu.mechanism.declared import keys_of
@@ -113,7 +113,7 @@ def _member(member: Any, place: NumberPath, change: Change) -> Any:
             values[key.name] = change((*place, key.name), part, key.measures)
         elif isinstance(part, Law):
             values[key.name] = _law(part, member.law_kinds, (*place, key.name), change)
-        elif isinstance(part, Measure):
+        elif isinstance(part, PoseQuantity):
             values[key.name] = _member(part, (*place, key.name), change)
     return _replaced(member, values)
 
@@ -138,8 +138,8 @@ def _reading(reading: Reading, driver_kind: str, change: Change) -> Reading:
 
 
 def kind_of_measured(of: object) -> str:
-    """Return 'length' or 'angle': what a measured quantity is, a coordinate by its name or a Measure."""
-    if isinstance(of, Measure):
+    """Return 'length' or 'angle': what a measured quantity is, a coordinate by its name or a PoseQuantity."""
+    if isinstance(of, PoseQuantity):
         return of.kind
     return "angle" if isinstance(of, str) and of.rpartition(".")[2] in ("phi", "omega", "alpha") else "length"
 

@@ -13,7 +13,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, LawQuantity, Spline
 from kinfmu.laws.sequence import DWELL
-from kinfmu.measures import MEASURES
+from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
@@ -102,7 +102,7 @@ def _definitions() -> Schema:
         "body": _body(),
         "segment": _segment(),
         **{f"law_{law.type}": _law(law) for law in LAWS},
-        "measure": {"oneOf": [_member(cls, (), "measure") for cls in MEASURES]},
+        "measure": {"oneOf": [_member(cls, (), "measure") for cls in POSE_QUANTITIES]},
         "measured": {"anyOf": [_ref("point"), _ref("measure")]},
         "reading": {"oneOf": [_member(cls, ()) for cls in READINGS]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},

@@ -12,7 +12,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError, listed
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, Segment, Spline
-from kinfmu.measures import MEASURES, Measure
+from kinfmu.measures import POSE_QUANTITIES, PoseQuantity
 from kinfmu.mechanism.body import Body, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.mechanism import Mechanism
@@ -44,7 +44,7 @@ _TOKEN = re.compile(
     r"""|[^\w"'#-]++""",
     re.DOTALL,
 )
-_MEASURE = '{ measure = "angle", of = "rocker" }'  # in messages
+_QUANTITY = '{ measure = "angle", of = "rocker" }'  # in messages
 _SEGMENT = ("law", "rise", "duration")
 _TABLES = (
     "name",
@@ -232,9 +232,9 @@ def _value(where: str, value: Any, takes: Takes) -> Any:
     if takes == "truth" and not isinstance(value, bool):
         raise MechanismError(f"{where} = {quoted(value)} must be true or false")
     if takes == "measured" and not isinstance(value, dict):
-        return text_of(where, value, "a coordinate such as 'rocker.phi' or a table such as " + _MEASURE)
+        return text_of(where, value, "a coordinate such as 'rocker.phi' or a table such as " + _QUANTITY)
     if takes in ("measure", "measured"):
-        return _measure(where, value)
+        return _pose_quantity(where, value)
     if takes == "segments":
         return _segments(where, value)
     if takes == "pair":
@@ -252,14 +252,14 @@ def _value(where: str, value: Any, takes: Takes) -> Any:
     return value
 
 
-def _measure(where: str, table: Any) -> Measure:
-    """Return a measure from a table such as { measure = "angle", of = "rocker" }."""
+def _pose_quantity(where: str, table: Any) -> PoseQuantity:
+    """Return a quantity of a pose from a table such as { measure = "angle", of = "rocker" }."""
     if not isinstance(table, dict):
-        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_MEASURE}")
-    cls = class_of_type(where, table, "measure", MEASURES)
+        raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_QUANTITY}")
+    cls = class_of_type(where, table, "measure", POSE_QUANTITIES)
     check_keys(where, table, ("measure", *table_keys(cls)))
-    measure: Measure = cls(**_values(where, cls, table, None))
-    return measure
+    quantity: PoseQuantity = cls(**_values(where, cls, table, None))
+    return quantity
 
 
 def _segments(where: str, value: Any) -> tuple[Segment, ...]:

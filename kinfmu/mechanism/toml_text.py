@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from kinfmu.laws.sequence import DWELL
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.mechanism.body import RunSettings
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Computed
@@ -75,7 +75,7 @@ def _parameter(name: str, parameter: Parameter, mechanism: Mechanism) -> str:
 def _toml(value: object) -> str:
     if isinstance(value, Computed):
         value = value.expression.text
-    if isinstance(value, Measure):
+    if isinstance(value, PoseQuantity):
         keys = {key.name: getattr(value, key.name) for key in keys_of(type(value))}
         table = {"measure": value.type} | {key: part for key, part in keys.items() if part is not None}
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in table.items()) + " }"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinfmu.equations.taylor import Taylor
 from kinfmu.errors import RequestError, listed, suggestion
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
 from kinfmu.mechanism import Mechanism
@@ -227,30 +227,30 @@ class Motion:
         if not self.is_closed:
             raise RequestError(f"{word} needs a motion that goes round: its last pose must be the first")
 
-    def quantity(self, of: str | Measure, order: int = 0) -> Quantity:
+    def quantity(self, of: str | PoseQuantity, order: int = 0) -> Quantity:
         """Return what a quantity, or its derivative of an order, measures."""
         own = self._orders.get(of) if isinstance(of, str) else None
         order += own[1] if own else 0
         return Quantity(kind_of_measured(of), order, self.per if order else "time")
 
-    def ratio_quantity(self, of: str | Measure, to: str | None, *, inverse: bool = False) -> Quantity:
+    def ratio_quantity(self, of: str | PoseQuantity, to: str | None, *, inverse: bool = False) -> Quantity:
         """Return what the ratio of two speeds measures."""
         kinds = [kind_of_measured(of), self.driver_quantity.kind if to is None else kind_of_measured(to)]
         over, under = kinds[::-1] if inverse else kinds
         return Quantity("number") if over == under else Quantity(over, 1, under)
 
-    def track(self, of: str | Measure) -> Track:
+    def track(self, of: str | PoseQuantity) -> Track:
         """Return a quantity over the motion: a coordinate, a rate of one, or a measured quantity."""
         return self._cut(self._whole(of))
 
-    def derivative(self, of: str | Measure, order: Literal[1, 2]) -> Track:
+    def derivative(self, of: str | PoseQuantity, order: Literal[1, 2]) -> Track:
         """Return the speed (order 1) or acceleration (2) of a quantity; of a point 'body.point' its magnitude."""
         if isinstance(of, str) and of in self.mechanism.body_points:
             x, y = (_derived(track, order).taylor for track in self._path(of))
             return self._cut(self._as_track(sqrt(x * x + y * y)))
         return self._cut(_derived(self._whole(of), order))
 
-    def speed_ratio(self, of: str | Measure, to: str | None) -> Track:
+    def speed_ratio(self, of: str | PoseQuantity, to: str | None) -> Track:
         """Return the speed of a quantity over that of another; to: a coordinate, None: the driver."""
         if to is None and self.drive is None:
             raise RequestError("a ratio of speeds needs the key 'to' where several drivers move")
@@ -332,7 +332,7 @@ class Motion:
             return self._coordinate(quantity)
         return self._as_track(value_of(quantity, self._placement))
 
-    def _whole(self, of: str | Measure) -> Track:
+    def _whole(self, of: str | PoseQuantity) -> Track:
         """Return a quantity as `track` does, without regard to the window."""
         if isinstance(of, str):
             name, order = self._orders.get(of, (of, 0))

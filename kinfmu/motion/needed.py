@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.placement import Placement, PointPair, body_of
 from kinfmu.mechanism import Mechanism
@@ -30,7 +30,7 @@ class Cosine(NamedTuple):
     second: PointPair
 
 
-QuantityRead = CoordinateName | Measure | PathCoordinate | Cosine
+QuantityRead = CoordinateName | PoseQuantity | PathCoordinate | Cosine
 
 
 class Needed(NamedTuple):
@@ -72,7 +72,7 @@ def _quantities(mechanism: Mechanism, known: dict[str, CoordinateName], reading:
         return [*_poses(known, [reading.cam, *map(body_of, points)])]
     found: list[QuantityRead] = []
     for value in (getattr(reading, "of", None), getattr(reading, "to", None)):
-        if isinstance(value, Measure):
+        if isinstance(value, PoseQuantity):
             found.append(value)
         elif value in known:
             found.append(known[value])
@@ -85,7 +85,7 @@ def _coordinates(known: dict[str, CoordinateName], quantity: QuantityRead) -> li
     """Return the coordinates of which a quantity is made."""
     if isinstance(quantity, CoordinateName):
         return [quantity]
-    if isinstance(quantity, Measure):
+    if isinstance(quantity, PoseQuantity):
         return _poses(known, quantity.bodies())
     points = [quantity.point] if isinstance(quantity, PathCoordinate) else [*quantity.first, *quantity.second]
     return _poses(known, map(body_of, points))
@@ -103,9 +103,11 @@ def cosine_between(a: tuple[Value, Value], b: tuple[Value, Value]) -> Value:
     return (a_x * b_x + a_y * b_y) / sqrt((a_x * a_x + a_y * a_y) * (b_x * b_x + b_y * b_y))
 
 
-def value_of(quantity: Measure | PathCoordinate | Cosine, placement: Callable[[Sequence[str]], Placement]) -> Value:
+def value_of(
+    quantity: PoseQuantity | PathCoordinate | Cosine, placement: Callable[[Sequence[str]], Placement]
+) -> Value:
     """Return a quantity that is made of coordinates, in any arithmetic; placement: of bodies by their names."""
-    if isinstance(quantity, Measure):
+    if isinstance(quantity, PoseQuantity):
         return quantity.value(placement(quantity.bodies()))
     if isinstance(quantity, PathCoordinate):
         return placement((body_of(quantity.point),)).point(quantity.point)["xy".index(quantity.axis)]

@@ -11,14 +11,15 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from kinfmu.laws import LawQuantity
-from kinfmu.measures import Measure
+from kinfmu.measures import PoseQuantity
 from kinfmu.units import Quantity
 
 Motion = Any  # kinfmu.motion.Motion, which is made of numpy's arrays; this package uses the standard library only
 PerDesign = Any  # (...) an array with one number per design
 
 Measured = Annotated[
-    str | Measure, "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle"
+    str | PoseQuantity,
+    "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle",
 ]
 Begin = Annotated[float | None, LawQuantity("argument"), "value of the driver where the part of the motion begins"]
 End = Annotated[float | None, LawQuantity("argument"), "value of the driver at the end of the part"]

@@ -9,7 +9,7 @@ from typing import Any
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, LawQuantity
-from kinfmu.measures import MEASURES
+from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.readings import READINGS
 from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
@@ -19,7 +19,7 @@ SHAPES = {
     "numbers": "list of numbers",
     "points": "list of `[x, u]`",
     "segments": "list of tables",
-    "measure": "a measure",
+    "measure": "a measured quantity",
     "measured": "a coordinate, a rate or a quantity",
     "law": "a law, with its keys",
 }
@@ -36,7 +36,7 @@ def sections() -> dict[str, str]:
         "units": _units(),
         "joints": "\n".join(_types(JOINTS, "type")),
         "drivers": "\n".join(_types(DRIVERS, "type")),
-        "measures": "\n".join(_types(MEASURES, "measure")),
+        "measures": "\n".join(_types(POSE_QUANTITIES, "measure")),
         "laws": "\n".join(_types(LAWS, "law")),
     }
 

@@ -20,7 +20,7 @@ from kinfmu.joints import CamRoller, Coupling, Joint
 from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
 from kinfmu.laws.law import number_fields
 from kinfmu.laws.spline import ENDS, PERIODIC
-from kinfmu.measures import MEASURES, DistanceBetween, Measure
+from kinfmu.measures import POSE_QUANTITIES, DistanceBetween, PoseQuantity
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism import Body, Mechanism, Point, Start
 from kinfmu.mechanism.declared import Key, keys_of
@@ -50,7 +50,7 @@ def _values(cls: type[Any], key: Key) -> st.SearchStrategy[Any]:
             return st.sampled_from(LAWS).flatmap(laws)
         return pitch_curves() if cls is CamRoller else lifts()
     if key.takes == "measure":
-        return st.sampled_from(MEASURES).flatmap(measures)
+        return st.sampled_from(POSE_QUANTITIES).flatmap(measures)
     if isinstance(key.measures, Quantity):
         return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[key.measures.kind]
     assert key.refers is not None, f"{cls.__name__}.{key.name}: tests/joints/drawn.py does not know how to draw it"
@@ -102,7 +102,7 @@ def pitch_curves() -> st.SearchStrategy[Law]:
 
 
 @cache
-def measures(cls: type[Measure]) -> st.SearchStrategy[Measure]:
+def measures(cls: type[PoseQuantity]) -> st.SearchStrategy[PoseQuantity]:
     """Measures of a class between the bodies left and right."""
     drawn: dict[str, st.SearchStrategy[Any]] = {}
     for key in keys_of(cls):

@@ -18,7 +18,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS
-from kinfmu.measures import MEASURES
+from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
 from kinfmu.mechanism.schema import schema, schema_text
 from kinfmu.mechanism.toml_file import parse
@@ -120,7 +120,7 @@ def test_every_joint_has_its_table_in_the_schema(cls: Any) -> None:
     assert not SCHEMA.is_valid(document | {"joints": {"J": table | {"odd": 1}}})
 
 
-@pytest.mark.parametrize("cls", MEASURES, ids=lambda cls: cls.type)
+@pytest.mark.parametrize("cls", POSE_QUANTITIES, ids=lambda cls: cls.type)
 def test_every_measure_has_its_table_in_the_schema(cls: Any) -> None:
     measure = values(cls, {"measure": cls.type})
     joint = {"type": "coupling", "input": {"measure": "angle", "of": "rod", "to": "arm"}, "law": "constant_speed"}
@@ -163,7 +163,7 @@ def test_parameters_may_be_numbers_text_or_tables() -> None:
     assert not any(map(fits, [True, [1], "", "a; b", {"description": "crank"}, {"value": 1, "unit": "mm"}]))
 
 
-@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS, *MEASURES], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS, *POSE_QUANTITIES], ids=lambda cls: cls.__name__)
 def test_every_key_has_a_meaning(cls: Any) -> None:
     assert summary_of(cls)
     for key in keys_of(cls):
