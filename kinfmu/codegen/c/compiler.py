@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.util import find_spec
@@ -157,18 +158,10 @@ def compile_files(compiler: Sequence[str], files: Mapping[str, str], flags: Sequ
         names = units(files)
         libraries = [] if os.name == "nt" else ["-lm"]
         if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles in parallel itself
-            _run([[*compiler, *flags, "-c", *share] for share in _shares(files, names, os.cpu_count() or 1)], scratch)
+            longest_first = sorted(names, key=lambda name: (-_length(files, name), name))
+            _run([[*compiler, *flags, "-c", name] for name in longest_first], scratch)
             names = [f"{name.removesuffix('.c')}.o" for name in names]
         _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
-
-
-def _shares(files: Mapping[str, str], names: Sequence[str], count: int) -> list[list[str]]:
-    """Return C files in at most `count` shares of about equal length: the longest first, each to the shortest share."""
-    whole = {name: _length(files, name) for name in names}
-    shares: list[list[str]] = [[] for _ in range(min(count, len(names)))]
-    for name in sorted(names, key=lambda name: (-whole[name], name)):
-        min(shares, key=lambda share: sum(whole[one] for one in share)).append(name)
-    return shares
 
 
 def _length(files: Mapping[str, str], name: str) -> int:
@@ -182,19 +175,26 @@ def _included(text: str) -> list[str]:
 
 
 def _run(commands: Sequence[Sequence[str]], folder: str) -> None:
-    """Run compilers in parallel; raise a CompilerError with the first error if one fails."""
-    running = [
-        subprocess.Popen(  # noqa: S603  a compiler that we looked up, on sources of our own
-            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8"
+    """Run compilers, as many at once as there are cores; raise a CompilerError with the first error if one fails."""
+
+    def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(  # noqa: S603  a compiler that we looked up, on sources of our own
+            command,
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            check=False,
         )
-        for command in commands
-    ]
-    outputs = [process.communicate()[1] for process in running]
-    for process, command, text in zip(running, commands, outputs, strict=True):
-        if process.returncode != 0:
-            lines = text.splitlines() or ["it gives no reason"]
-            complaint = next((line for line in lines if "error" in line), lines[0])
-            raise CompilerError(f"{command[0]} cannot compile the generated C: {complaint}")
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        for command, done in zip(commands, pool.map(run, commands), strict=True):
+            if done.returncode != 0:
+                pool.shutdown(cancel_futures=True)
+                lines = done.stderr.splitlines() or ["it gives no reason"]
+                complaint = next((line for line in lines if "error" in line), lines[0])
+                raise CompilerError(f"{command[0]} cannot compile the generated C: {complaint}")
 
 
 @cache
