@@ -238,7 +238,7 @@ def test_a_place_is_named_once_by_its_joint_and_its_points_of_interest() -> None
 
 
 @pytest.mark.parametrize("name", gallery.names())
-def test_names_do_not_overlap_and_stay_on_the_sheet(name: str) -> None:
+def test_names_do_not_overlap_stay_on_the_sheet_and_leave_links_and_paths_free(name: str) -> None:
     pytest.importorskip("matplotlib")
     sheet = sheet_of(instant(load(name)))
     boxes = [text.get_window_extent() for text in sheet.axes.texts]
@@ -247,12 +247,6 @@ def test_names_do_not_overlap_and_stay_on_the_sheet(name: str) -> None:
     page = sheet.axes.get_window_extent().expanded(1.02, 1.02)
     assert all(page.x0 < box.x0 and box.x1 < sheet.figure.bbox.x1 for box in boxes)  # right of the axes is free paper
     assert all(page.containsy(box.y0) and page.containsy(box.y1) for box in boxes)
-
-
-@pytest.mark.parametrize("name", gallery.names())
-def test_names_leave_links_and_paths_free(name: str) -> None:
-    pytest.importorskip("matplotlib")
-    sheet = sheet_of(instant(load(name)))
     dots = sheet.covered
     to_world = sheet.axes.transData.inverted()
     for text in sheet.axes.texts:
