@@ -66,6 +66,10 @@ class Sensitivities(Displayed):
     status: IntArray
     refused: Mapping[str, str]
 
+    def __repr__(self) -> str:
+        names = f"{', '.join(self.outputs)} by {', '.join(self.parameters)}"
+        return f"<Sensitivities at {len(self.t)} samples: {names}>"
+
     def of(self, output: str, parameter: str) -> FloatArray:
         """Return the derivative of an output's position with respect to a parameter, (n,)."""
         return self.values_by[:, self.outputs.index(output), self.parameters.index(parameter)]

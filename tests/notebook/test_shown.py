@@ -199,6 +199,7 @@ def test_sensitivities_show_the_largest_derivatives() -> None:
     found = model.sensitivities(crank_angle=TURN, wrt=["a", "c"])
     largest = np.abs(found.values_by).max(axis=0)
     assert page(found).row("foot.y") == [f"{value:.6g}" for value in largest[1]]
+    assert repr(found) == "<Sensitivities at 61 samples: foot.x, foot.y by a, c>"
 
 
 def test_measures_show_their_values_or_reasons() -> None:
