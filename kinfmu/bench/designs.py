@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import fsolve
 
 from kinfmu.bench.rounds import in_turn, spread, table
+from kinfmu.bench.sensitivities import sensitivity_lines
 from kinfmu.gallery import load
 from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
@@ -50,8 +51,8 @@ def drawn(count: int) -> dict[str, FloatArray]:
 
 
 def run(rounds: int = ROUNDS, designs: int = DESIGNS) -> str:
-    """Return two tables: microseconds of a short call with other lengths, and of a design over a turn."""
-    return "\n".join([*_short_calls(rounds), "", *_batches(rounds, designs)])
+    """Return tables: microseconds of a short call with other lengths and of a design over a turn; sensitivities."""
+    return "\n".join([*_short_calls(rounds), "", *_batches(rounds, designs), "", *sensitivity_lines(rounds)])
 
 
 def _short_calls(rounds: int) -> list[str]:

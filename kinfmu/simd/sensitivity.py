@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -159,10 +160,11 @@ def _words(lines: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.findall(r"\b[A-Za-z_]\w*", "\n".join(lines))))
 
 
-def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[FloatArray], FloatArray], bool]:
+def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[FloatArray | float], FloatArray], bool]:
     """Return the compiled stage.
 
-    It fills the rows of `empty_results` that are not 0, from arrays (n,) or (1,), and returns whether all are finite.
+    It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers, and returns whether all are
+    finite.
 
     Raises:
         CompilerError: There is no compiler, or it fails.
@@ -172,14 +174,16 @@ def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[Float
     files = {"sensitivities.c": sensitivity_source(stage)} | texts | compiler.sources(("sincos.h",))
     library = compiler.load(files, FLAGS)
 
-    def fill(given: Sequence[FloatArray], results: FloatArray) -> bool:
-        arrays = [np.ascontiguousarray(array) for array in given]
-        places = [array.__array_interface__["data"][0] for array in (*arrays, results)]
-        starts = np.array(places, dtype=np.uintp)
-        steps = np.array([len(array) > 1 for array in arrays], dtype=np.int64)
-        n = results.shape[1]
-        pitch = results.strides[0] // results.itemsize
-        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, places[-1], pitch, results.size > LARGE)
+    def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
+        single = np.array([number for number in given if not isinstance(number, np.ndarray)])
+        arrays = [np.ascontiguousarray(number) if isinstance(number, np.ndarray) else None for number in given]
+        place = itertools.count(single.ctypes.data, single.itemsize)
+        starts = np.array(
+            [next(place) if array is None else array.__array_interface__["data"][0] for array in arrays], dtype=np.uintp
+        )
+        steps = np.array([array is not None for array in arrays], dtype=np.int64)
+        n, pitch, start = results.shape[1], results.strides[0] // results.itemsize, results.ctypes.data
+        job = _Stage(n, starts.ctypes.data, steps.ctypes.data, start, pitch, results.size > LARGE)
         answer: int = library.kf_sensitivities(ctypes.byref(job))
         if answer < 0:
             raise KinfmuError(f"no memory is left for the sensitivities of {n} samples")

@@ -28,7 +28,7 @@ OPEN = 1e-7  # derivative of a row relative to the size, for a change by the siz
 AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 _STAGES_KEPT = 16
 
-Native = Callable[[Sequence[FloatArray], FloatArray], bool]  # fills results (rows, n) from arrays (n,) or (1,)
+Native = Callable[[Sequence[FloatArray | float], FloatArray], bool]  # fills results (rows, n) from arrays (n,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,10 +279,10 @@ def _results(
     """
     n = shape[1]
     results = empty_results(*shape)
-    results[stage.zeros] = 0.0
+    for rows_at_zero in stage.zeros:
+        results[rows_at_zero] = 0.0
     if native is not None:
-        arrays = [number if isinstance(number, np.ndarray) else np.array([number]) for number in numbers]
-        return results, native(arrays, results)
+        return results, native(numbers, results)
     if n <= stage.few:
         columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
         rows = []

@@ -229,7 +229,13 @@ def test_designs_are_compared_with_the_closed_form() -> None:
         assert np.abs(off).max() < 1e-14
     text = designs.run(rounds=1, designs=8)
     assert "8 crank-rockers at 361 angles" in text
-    for row in ("Model.solve, Python engine", "solve_designs, q alone", "scipy.optimize.fsolve", "two threads"):
+    for row in (
+        "Model.solve, Python engine",
+        "solve_designs, q alone",
+        "scipy.optimize.fsolve",
+        "two threads",
+        "2 outputs at 361 angles, native",
+    ):
         assert row in text
 
 

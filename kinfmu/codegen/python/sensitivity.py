@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -49,9 +50,10 @@ class SensitivityStage:
     few: int
 
     @cached_property
-    def zeros(self) -> list[int]:
-        """Places of the results that are 0."""
-        return sorted(set(range(len(self.steps.results))) - set(self.places))
+    def zeros(self) -> list[slice]:
+        """Places of the results that are 0, one after another."""
+        ends = (-1, *self.places, len(self.steps.results))
+        return [slice(a + 1, b) for a, b in itertools.pairwise(ends) if b > a + 1]
 
     @cached_property
     def places(self) -> tuple[int, ...]:
