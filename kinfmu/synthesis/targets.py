@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.readings import Reading
+from kinfmu.run import FloatArray
 
 Numeral = float | str
 Free = Numeral | Sequence[Numeral]
-Rows = Sequence[Sequence[Numeral]]
+Row = Sequence[Numeral] | FloatArray
+Rows = Sequence[Sequence[Numeral]] | FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +45,12 @@ class PathTarget:
     name: str
     of: str
     points: Rows
-    at: Sequence[Numeral] | None = None
+    at: Row | None = None
     step: Numeral | None = None
     start: Free | None = None
     begin: Numeral | None = None
     end: Numeral | None = None
-    weight: float | Sequence[float] = 1.0
+    weight: float | Sequence[float] | FloatArray = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +83,7 @@ class FunctionTarget:
     offset: Free | None = None
     begin: Numeral | None = None
     end: Numeral | None = None
-    weight: float | Sequence[float] = 1.0
+    weight: float | Sequence[float] | FloatArray = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +112,12 @@ class PoseTarget:
     of: str
     poses: Rows
     length: Numeral
-    at: Sequence[Numeral] | None = None
+    at: Row | None = None
     step: Numeral | None = None
     start: Free | None = None
     begin: Numeral | None = None
     end: Numeral | None = None
-    weight: float | Sequence[float] = 1.0
+    weight: float | Sequence[float] | FloatArray = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
