@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from importlib.util import find_spec
 from itertools import cycle
 from time import perf_counter, process_time
@@ -12,47 +11,26 @@ from typing import Any
 import numpy as np
 from scipy.optimize import fsolve
 
+from kinfmu.bench import design_measures
+from kinfmu.bench.crank_rockers import ANGLES, closed_form, crank_rocker, drawn
 from kinfmu.bench.rounds import in_turn, spread, table
 from kinfmu.bench.sensitivities import sensitivity_lines
-from kinfmu.gallery import load
-from kinfmu.mechanism import Mechanism
 from kinfmu.run import FloatArray
 from kinfmu.sweep import compile as compiled
 from kinfmu.sweep import solve
 
 ROUNDS = 7
 DESIGNS = 10_000
-ANGLES = 361  # a turn by one degree
 FEW = 5  # samples of a short call
 ALONE = 200  # designs that slow ways solve
-LENGTHS = {"ground_link": 42.0, "crank_link": 15.0, "coupler_link": 50.0, "rocker_link": 45.0}
-SPREAD = 0.03  # of the lengths, so that all are crank-rockers
 OUTPUTS = ["crank.phi", "coupler.x", "coupler.y", "coupler.phi", "rocker.phi"]
 PER_DESIGN = 1e6  # [us/s]
 
 
-def crank_rocker() -> Mechanism:
-    """Return the gallery's crank-rocker with its lengths as parameters."""
-    written = load("crank_rocker")
-    places = {
-        "ground": {"C": ("ground_link", 0.0)},
-        "crank": {"P": ("crank_link", 0.0)},
-        "coupler": {"Q": ("coupler_link", 0.0)},
-        "rocker": {"Q": ("rocker_link", 0.0)},
-    }
-    bodies = [replace(body, points={**body.points, **places[body.name]}) for body in written.bodies]  # type: ignore[dict-item]
-    return replace(written, bodies=tuple(bodies), parameters=LENGTHS)  # type: ignore[arg-type]  # numbers are read
-
-
-def drawn(count: int) -> dict[str, FloatArray]:
-    """Return random lengths around those of the crank-rocker, equal in every call."""
-    rng = np.random.default_rng(1)
-    return {name: value * np.exp(rng.uniform(-SPREAD, SPREAD, count)) for name, value in LENGTHS.items()}
-
-
 def run(rounds: int = ROUNDS, designs: int = DESIGNS) -> str:
-    """Return tables: microseconds of a short call with other lengths and of a design over a turn; sensitivities."""
-    return "\n".join([*_short_calls(rounds), "", *_batches(rounds, designs), "", *sensitivity_lines(rounds)])
+    """Return tables: microseconds of a short call and of a design over a turn; measures and sensitivities."""
+    more = [*design_measures.lines(rounds, designs), "", *sensitivity_lines(rounds)]
+    return "\n".join([*_short_calls(rounds), "", *_batches(rounds, designs), "", *more])
 
 
 def _short_calls(rounds: int) -> list[str]:
@@ -131,16 +109,6 @@ def _batches(rounds: int, count: int) -> list[str]:
         *table(("", "median", "min", "max", "ns a sample"), rows),
         f"two threads: {one / two:.2f} times faster ({one:.2f} s and {two:.2f} s by the clock, q, qd, qdd)",
     ]
-
-
-def closed_form(u: Any, g: float, a: float, b: float, c: float) -> tuple[Any, Any]:
-    """Return the angles of coupler and rocker of the open crank-rocker."""
-    dx, dy = g - a * np.cos(u), -a * np.sin(u)
-    square = dx * dx + dy * dy
-    e = 0.5 + 0.5 * (b * b - c * c) / square
-    h = np.sqrt(b * b / square - e * e)
-    qx, qy = e * dx - h * dy, e * dy + h * dx
-    return np.arctan2(qy, qx), np.arctan2(qy - dy, qx - dx)
 
 
 def _loop_closure(z: FloatArray, u: float, g: float, a: float, b: float, c: float) -> list[float]:
