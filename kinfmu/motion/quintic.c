@@ -7,6 +7,7 @@
 
 #define STEPS 60    /* of a root in its interval */
 #define SAME 1e-15  /* of an interval; roots closer than this are equal */
+#define VECTOR 8    /* numbers side by side */
 
 static double polynomial(const double *c, int terms, double s)
 {
@@ -84,22 +85,44 @@ static double cut_of(const double slope[5])
 
 static bool is_finite(const double *numbers, int64_t count)
 {
+    double zeros[VECTOR] = {0.0}; /* 0 times a number, NaN for one that is not finite */
+    double all = 0.0;
     int64_t k;
-    int32_t unknown = 0;
-    for (k = 0; k < count; ++k) {
-        unknown |= !(fabs(numbers[k]) <= DBL_MAX);
+    int i;
+    for (k = 0; k + VECTOR <= count; k += VECTOR) {
+        for (i = 0; i < VECTOR; ++i) {
+            zeros[i] += 0.0 * numbers[k + i];
+        }
     }
-    return unknown == 0;
+    for (; k < count; ++k) {
+        all += 0.0 * numbers[k];
+    }
+    for (i = 0; i < VECTOR; ++i) {
+        all += zeros[i];
+    }
+    return all == 0.0;
 }
 
 /* The largest sample: its number. */
 static int64_t largest(const kf_quantity *of, int64_t count)
 {
-    double best = of->sign * of->f[0];
+    double tops[VECTOR], best = of->sign * of->f[0];
     int64_t k;
-    for (k = 1; k < count; ++k) {
-        const double f = of->sign * of->f[k];
-        best = f > best ? f : best;
+    int i;
+    for (i = 0; i < VECTOR; ++i) {
+        tops[i] = best;
+    }
+    for (k = 0; k + VECTOR <= count; k += VECTOR) {
+        for (i = 0; i < VECTOR; ++i) {
+            const double f = of->sign * of->f[k + i];
+            tops[i] = f > tops[i] ? f : tops[i];
+        }
+    }
+    for (; k < count; ++k) {
+        best = of->sign * of->f[k] > best ? of->sign * of->f[k] : best;
+    }
+    for (i = 0; i < VECTOR; ++i) {
+        best = tops[i] > best ? tops[i] : best;
     }
     for (k = 0; of->sign * of->f[k] != best; ++k) {
     }
@@ -113,18 +136,21 @@ static int64_t mark(const kf_quantity *of, int64_t count, const double *h, doubl
     int64_t k, i, found = 0;
     for (k = 0; k + 1 < count; k += AT_ONCE) {
         const int64_t end = k + AT_ONCE < count - 1 ? k + AT_ONCE : count - 1;
-        int32_t is_higher[AT_ONCE], any = 0;
+        double tops[AT_ONCE];
+        int64_t any = 0;
         for (i = k; i < end; ++i) {
             const double c0 = h[i] * (of->sign * of->v[i]) * 0.2, c5 = h[i] * (of->sign * of->v[i + 1]) * 0.2;
             const double c1 = of->sign * of->f[i] + c0, c4 = of->sign * of->f[i + 1] - c5;
             const double c2 = c1 + c0 + h[i] * h[i] * (of->sign * of->a[i]) * 0.05;
             const double c3 = c4 - c5 + h[i] * h[i] * (of->sign * of->a[i + 1]) * 0.05;
-            const int32_t higher = (c1 > value) | (c2 > value) | (c3 > value) | (c4 > value);
-            is_higher[i - k] = higher;
-            any |= higher;
+            const double left = c1 > c2 ? c1 : c2, right = c3 > c4 ? c3 : c4;
+            tops[i - k] = left > right ? left : right;
+        }
+        for (i = k; i < end; ++i) {
+            any |= tops[i - k] > value;
         }
         for (i = k; i < end && any != 0; ++i) {
-            if (is_higher[i - k] != 0) {
+            if (tops[i - k] > value) {
                 if (found < most) {
                     marked[found] = i;
                 }

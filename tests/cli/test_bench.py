@@ -12,7 +12,7 @@ import pytest
 
 import kinfmu
 from kinfmu import gallery
-from kinfmu.bench import accuracy, case, chains, designs, log_files, native_sweep, singular
+from kinfmu.bench import accuracy, case, chains, crank_rockers, designs, log_files, native_sweep, singular
 from kinfmu.bench.engines import ENGINES, SHIPPED
 from kinfmu.bench.page import PAGE, SETTINGS_PAGE
 from kinfmu.bench.singular_points import POINTS
@@ -220,11 +220,11 @@ def test_a_measurement_prints_a_table_of_what_it_compares(what: str, lines: list
 
 
 def test_designs_are_compared_with_the_closed_form() -> None:
-    mechanism, lengths = designs.crank_rocker(), designs.drawn(3)
+    mechanism, lengths = crank_rockers.crank_rocker(), crank_rockers.drawn(3)
     angles = np.linspace(0.0, 6.0, 7)
     found = kinfmu.compile(mechanism, ["coupler.phi", "rocker.phi"]).solve_designs(lengths, crank_angle=angles)
     for k in range(3):
-        wanted = designs.closed_form(angles, *(values[k] for values in lengths.values()))
+        wanted = crank_rockers.closed_form(angles, *(values[k] for values in lengths.values()))
         off = np.exp(1j * found.values[k]) - np.exp(1j * np.stack(wanted, axis=1))
         assert np.abs(off).max() < 1e-14
     text = designs.run(rounds=1, designs=8)
@@ -234,6 +234,8 @@ def test_designs_are_compared_with_the_closed_form() -> None:
         "solve_designs, q alone",
         "scipy.optimize.fsolve",
         "two threads",
+        "8 designs at 361 angles with four measures",
+        "Jansen's legs",
         "2 outputs at 361 angles, native",
     ):
         assert row in text

@@ -14,6 +14,7 @@ from tests.docs.key_tables import with_readings
 
 PATH = Path(__file__).parents[2] / "docs" / "measures.md"
 PAGE = PATH.read_text(encoding="utf-8")
+SHOWN = re.compile(r"(print\(.*\))  # (.*)")
 FILE = "\n".join(re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL))
 
 
@@ -43,7 +44,14 @@ def test_the_commands_of_the_page_run_and_print_what_it_shows(request: pytest.Fi
     assert "at 6.28319 rad/s" in outputs[2]
 
 
-def test_the_python_of_the_page_prints_its_comments(capsys: pytest.CaptureFixture[str]) -> None:
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(block, "measures.md", "exec"), {})  # noqa: S102  our own page
-    assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", block)
+def test_the_python_of_the_page_prints_its_comments(
+    capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
+) -> None:
+    code = "\n".join(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL))
+    exec(compile(code, "measures.md", "exec"), {})  # noqa: S102  our own page
+    printed = iter(capsys.readouterr().out.splitlines())
+    page = SHOWN.sub(lambda found: f"{found[1]}  # {next(printed)}", PAGE)
+    if request.config.getoption("--update"):
+        PATH.write_text(page, encoding="utf-8", newline="\n")
+    else:
+        assert page == PAGE, "docs/measures.md is old; pytest tests/docs --update writes it anew"
