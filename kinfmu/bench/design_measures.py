@@ -24,7 +24,7 @@ OF_ROCKER: tuple[Reading, ...] = (
     TransmissionAngle("transmission", ("coupler.P", "coupler.Q"), ("rocker.C", "rocker.Q")),
     PeakAcceleration("shock", "rocker.phi"),
 )
-BEGIN, END = math.radians(300.0), math.radians(60.0)  # the leg stands on its foot
+BEGIN, END = math.radians(300.0), math.radians(60.0)  # the foot is on the ground
 OF_LEG: tuple[Reading, ...] = (
     Range("stride", "foot.x"),
     Range("lift", "foot.y"),
