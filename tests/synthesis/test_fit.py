@@ -51,11 +51,8 @@ def test_designs_that_do_not_close_are_counted_with_their_reason() -> None:
 
 
 def test_no_design_that_closes_is_one_line_with_the_reason() -> None:
-    far = four_bar(ground=40.0)
     with pytest.raises(kinfmu.KinfmuError, match=r"none of 16 designs .* can be assembled"):
         kinfmu.fit(_problem(mechanism=four_bar(), unknowns={"crank": (5.5, 6.0)}), starts=1, engine="python")
-    with pytest.raises(kinfmu.KinfmuError, match="does not close"):
-        kinfmu.fit(_problem(mechanism=far), starts=1, engine="python")
 
 
 def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
