@@ -1,7 +1,8 @@
 """Units: what a number in a mechanism file may carry, and what every variable declares. Names of variables.
 
-Lengths keep the mechanism's unit everywhere; angles are radians inside, and files may use degrees. Variables are named
-`<body>.x .y .phi`, their rates `.vx .vy .omega`, their accelerations `.ax .ay .alpha`; points likewise.
+Lengths keep the mechanism's unit everywhere; angles are radians inside, and files may use degrees. Masses, forces and
+what is made of them are in SI units, whatever the unit of length is. Variables are named `<body>.x .y .phi`, their
+rates `.vx .vy .omega`, their accelerations `.ax .ay .alpha`; points likewise.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Annotated, NamedTuple
 class Quantity(NamedTuple):
     """The kind of a number: what it measures and which derivative it is; default: of order 0, with respect to time."""
 
-    kind: str  # "length", "angle", "time" or "number"
+    kind: str  # "length", "angle", "time", "number", or a key of KINDS such as "force"
     order: int = 0  # 0 position, 1 speed, 2 acceleration
     per: str = "time"  # or "angle", "length": the variable of the derivative
 
@@ -23,11 +24,78 @@ class Quantity(NamedTuple):
 Length = Annotated[float, Quantity("length")]
 Radians = Annotated[float, Quantity("angle")]  # inside; files may write degrees
 Number = Annotated[float, Quantity("number")]
+Mass = Annotated[float, Quantity("mass")]
+Inertia = Annotated[float, Quantity("inertia")]
+Force = Annotated[float, Quantity("force")]
+Torque = Annotated[float, Quantity("torque")]
+Stiffness = Annotated[float, Quantity("stiffness")]
+TorsionalStiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("damping")]
+TorsionalDamping = Annotated[float, Quantity("torsional_damping")]
+Acceleration = Annotated[float, Quantity("length", 2)]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 HIGHEST_ORDER = 7  # of a derivative with a unit
+
+POUND = 0.45359237  # [kg]
+POUND_FORCE = POUND * 9.80665  # [N]
+INCH = METRES["in"]
+KILOGRAMS = {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": POUND}
+INERTIAS = {"kg m2": 1.0, "kg cm2": 1e-4, "kg mm2": 1e-6, "g cm2": 1e-7, "g mm2": 1e-9, "lb in2": POUND * INCH**2}
+NEWTONS = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": POUND_FORCE}
+TORQUES = {
+    "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3, "N mm": 1e-3, "Nmm": 1e-3, "N cm": 1e-2,
+    "lbf in": POUND_FORCE * INCH, "lbf ft": POUND_FORCE * METRES["ft"],
+}  # fmt: skip
+STIFFNESSES = {
+    "N/m": 1.0, "N/mm": 1e3, "N/cm": 1e2, "kN/m": 1e3, "kN/mm": 1e6, "lbf/in": POUND_FORCE / INCH,
+}  # fmt: skip
+DAMPINGS = {"N s/m": 1.0, "Ns/m": 1.0, "N s/mm": 1e3, "kN s/m": 1e3}
+
+
+class Kind(NamedTuple):
+    """A quantity with a mass in it.
+
+    Attributes:
+        unit: The unit used inside and declared by variables.
+        units: Every unit that files accept, with its factor into `unit`.
+        powers: Powers of mass, length and time.
+        meaning: The quantity in messages.
+
+    """
+
+    unit: str
+    units: dict[str, float]
+    powers: tuple[int, int, int]
+    meaning: str
+
+
+def _per_angle(units: dict[str, float], word: str = "") -> dict[str, float]:
+    """Return the units of a torque per angle, or with the word ' s' per angular speed."""
+    angles = {"rad": 1.0, "deg": ANGLES["deg"]}
+    return {f"{unit}{word}/{per}": factor / size for unit, factor in units.items() for per, size in angles.items()}
+
+
+KINDS = {
+    "mass": Kind("kg", KILOGRAMS, (1, 0, 0), "a mass"),
+    "inertia": Kind("kg m2", INERTIAS, (1, 2, 0), "a moment of inertia"),
+    "force": Kind("N", NEWTONS, (1, 1, -2), "a force"),
+    "torque": Kind("N m", TORQUES, (1, 2, -2), "a torque"),
+    "mass_moment": Kind("kg m", {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6}, (1, 1, 0), "a mass times a length"),
+    "stiffness": Kind("N/m", STIFFNESSES, (1, 0, -2), "a stiffness"),
+    "torsional_stiffness": Kind("N m/rad", _per_angle(TORQUES), (1, 2, -2), "a torsional stiffness"),
+    "damping": Kind("N s/m", DAMPINGS, (1, 0, -1), "a damping coefficient"),
+    "torsional_damping": Kind("N m s/rad", _per_angle(TORQUES, " s"), (1, 2, -1), "a torsional damping coefficient"),
+    "energy": Kind("J", {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}, (1, 2, -2), "an energy"),
+    "power": Kind("W", {"W": 1.0, "mW": 1e-3, "kW": 1e3}, (1, 2, -3), "a power"),
+}
+
+
+def length_power(quantity: Quantity) -> int:
+    """Return the power of length that a quantity in SI units has, 0 for quantities in the file's unit of length."""
+    return KINDS[quantity.kind].powers[1] if quantity.kind in KINDS else 0
 
 
 def looks_like_degrees(angle: float) -> bool:
@@ -44,7 +112,7 @@ def unit_of(quantity: Quantity, length_unit: str) -> str:
     """Return the unit that a variable of this quantity declares, such as `rad/s` or `mm/s2`."""
     units = {"length": length_unit, "angle": "rad", "time": "s", "number": "1"}
     per = f"/{_power(units[quantity.per], quantity.order)}" if quantity.order else ""
-    return units[quantity.kind] + per
+    return (KINDS[quantity.kind].unit if quantity.kind in KINDS else units[quantity.kind]) + per
 
 
 def quantity_in(unit: str, length_unit: str) -> Quantity:
@@ -59,7 +127,9 @@ def _power(unit: str, order: int) -> str:
 
 
 def _bases(kind: str, length_unit: str) -> dict[str, float]:
-    """Return the units of a length, an angle or a time with their factors into the unit used inside."""
+    """Return the units of a kind of quantity with their factors into the unit used inside."""
+    if kind in KINDS:
+        return KINDS[kind].units
     if kind != "length":
         return ANGLES if kind == "angle" else SECONDS
     return {unit: metres / METRES[length_unit] for unit, metres in METRES.items()} | {length_unit: 1.0}
@@ -97,12 +167,16 @@ def display_units(unit: str) -> dict[str, float]:
 
 @cache
 def every_unit(length_unit: str) -> dict[str, tuple[Quantity, float]]:
-    """Return every unit that files accept, with its quantity and its factor into the unit used inside."""
+    """Return every unit that files accept, with its quantity and its factor into the unit used inside.
+
+    Units of two quantities belong to the last one: 'N/m' is the unit of a stiffness.
+    """
     pairs = (("length", "time"), ("angle", "time"), ("length", "angle"), ("angle", "length"))
     rates = [Quantity(kind, order, per) for kind, per in pairs for order in range(1, HIGHEST_ORDER + 1)]
+    rates += [Quantity(kind, 1, per) for kind in ("force", "torque") for per in ("time", "angle", "length")]
     return {
         unit: (quantity, factor)
-        for quantity in (Quantity("length"), Quantity("angle"), Quantity("time"), *rates)
+        for quantity in (Quantity("length"), Quantity("angle"), Quantity("time"), *rates, *map(Quantity, KINDS))
         for unit, factor in factors(quantity, length_unit).items()
     }
 
@@ -153,8 +227,8 @@ class InputName(str):
     """The name of an input, such as 'crank_angle' or 'crank_speed', with the facts that it states.
 
     Args:
-        driver: The driver.
-        noun: What the driver drives: 'angle', 'position' or 'length'.
+        driver: The driver, or the load.
+        noun: What the driver drives: 'angle', 'position' or 'length'; of a load 'force' or 'torque'.
         order: 0 for the value, 1 for its speed, 2 for its acceleration.
 
     Attributes:
@@ -172,7 +246,7 @@ class InputName(str):
     def __new__(cls, driver: str, noun: str, order: int = 0) -> InputName:
         name = super().__new__(cls, f"{driver}_{(noun, 'speed', 'acceleration')[order]}")
         name.driver, name.noun = driver, noun
-        name.quantity = Quantity("angle" if noun == "angle" else "length", order)
+        name.quantity = Quantity(noun if noun in ("angle", "force", "torque") else "length", order)
         return name
 
     def __getnewargs__(self) -> tuple[str, str, int]:  # type: ignore[override]  # for copies: what `__new__` takes
@@ -201,3 +275,32 @@ def read_inputs(texts: Sequence[str]) -> tuple[InputName, ...] | None:
             return None
         inputs += [InputName(driver, noun, order) for order in range(3)]
     return tuple(inputs) if inputs == list(texts) else None
+
+
+class ForceName(str):
+    """The name of a force, an inertia or an energy of a mechanism, such as 'crank.torque', with the facts it states.
+
+    Args:
+        owner: The driver or joint; empty for what belongs to the whole mechanism.
+        noun: What it is: 'torque', 'reduced_inertia', 'kinetic_energy'.
+        quantity: Its quantity.
+
+    Attributes:
+        owner: As given.
+        noun: As given.
+        quantity: As given.
+
+    """
+
+    __slots__ = ("noun", "owner", "quantity")
+    owner: str
+    noun: str
+    quantity: Quantity
+
+    def __new__(cls, owner: str, noun: str, quantity: Quantity) -> ForceName:
+        name = super().__new__(cls, f"{owner}.{noun}" if owner else noun)
+        name.owner, name.noun, name.quantity = owner, noun, quantity
+        return name
+
+    def __getnewargs__(self) -> tuple[str, str, Quantity]:  # type: ignore[override]  # for copies: what `__new__` takes
+        return self.owner, self.noun, self.quantity

@@ -53,7 +53,7 @@ def motion_notes(mechanism: Mechanism, paths: Sequence[DriverPath], loops: Seque
 
 
 def _texts(member: object) -> set[object]:
-    """Return the texts in the fields of a joint, a driver or a measure, and in those of its measured quantity."""
+    """Return the texts in the fields of a joint, driver, load or measure, and in those of its measured quantity."""
     found: set[object] = set()
     for entry in fields(member):  # type: ignore[arg-type]  # all members are dataclasses
         value = getattr(member, entry.name)
@@ -66,14 +66,15 @@ def _texts(member: object) -> set[object]:
 
 def _unused_points(mechanism: Mechanism) -> Iterator[str]:
     used: set[object] = set(mechanism.points.values())
-    for member in (*mechanism.joints, *mechanism.drivers, *mechanism.measures):
+    used |= {f"{body.name}.{end}" for body in mechanism.bodies for end in body.rod or ()}
+    for member in (*mechanism.joints, *mechanism.drivers, *mechanism.loads, *mechanism.measures):
         used |= _texts(member)
     unused = [name for name in mechanism.body_points if name not in used]
     if unused:
         one = len(unused) == 1
         yield (
-            f"point{'' if one else 's'} {listed(unused)} {'is' if one else 'are'} used by no joint, driver, measure or "
-            "point of interest"
+            f"point{'' if one else 's'} {listed(unused)} {'is' if one else 'are'} used by no joint, driver, load, "
+            "measure or point of interest"
         )
 
 

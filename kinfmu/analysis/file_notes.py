@@ -15,19 +15,24 @@ from kinfmu.equations.start_poses import StartValues, start_from_poses
 from kinfmu.equations.system import System
 from kinfmu.errors import listed
 from kinfmu.joints.cam import Cam
+from kinfmu.laws import MotionSequence, Spline
+from kinfmu.measures import AngleBetween
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.members import NumberPath, path_text
 from kinfmu.plan import SolvePlan
 from kinfmu.sweep import solve
 from kinfmu.units import Quantity, looks_like_degrees
 
+_TABLES = (Spline, MotionSequence)  # laws that keep their last value beyond their end
 _TURN = 2.0 * math.pi * (1.0 + 1e-9)  # [rad]; a full turn is plausible
 
 
 def file_notes(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for unused parameters and one for each angle that looks like degrees without a unit.
 
-    Also one for each driven distance that starts below 0, and for each cam that turns beyond the end of its lift.
+    Also one for each driven distance that starts below 0, for each cam or load that turns beyond the end of its law,
+    and for gravity without masses.
     """
     unused = mechanism.unused_parameters
     if unused:
@@ -41,6 +46,7 @@ def file_notes(mechanism: Mechanism) -> Iterator[str]:
                 "its magnitude counts, and decreases as the value increases"
             )
     yield from _cams(mechanism)
+    yield from _loads(mechanism)
     large: list[tuple[NumberPath, float]] = []
 
     def look(place: NumberPath, value: Any, quantity: Quantity) -> Any:
@@ -69,6 +75,26 @@ def _cams(mechanism: Mechanism) -> Iterator[str]:
             yield (
                 f"[joints.{joint.name}] law: {why}; "
                 f"[run] turns {joint.cam} by {math.degrees(max(angles) - min(angles)):.6g} deg"
+            )
+
+
+def _loads(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for gravity without masses, and for each table of a load that ends while a driver turns on."""
+    if mechanism.gravity is not None and not mechanism.has_masses:
+        yield "[gravity] has no effect: no body has a mass"
+    drivers = {driver.of: driver for driver in mechanism.drivers if isinstance(driver, AngleDriver)}
+    for load in mechanism.loads:
+        over = getattr(load, "over", None)
+        if not isinstance(over, AngleBetween) or over.of not in drivers or over.to not in (None, GROUND_NAME):
+            continue
+        law = getattr(load, "law", None)
+        if not isinstance(law, _TABLES) or law.repeats:
+            continue
+        angles = law_values(drivers[over.of], mechanism.run)
+        if max(angles) - min(angles) > _TURN:
+            yield (
+                f"[loads.{load.name}] law: {law.why_not_periodic()}; "
+                f"[run] turns {over.of} by {math.degrees(max(angles) - min(angles)):.6g} deg"
             )
 
 

@@ -15,7 +15,7 @@ class Condition(NamedTuple):
     Attributes:
         key: Its name in messages.
         value: The number.
-        required: 'positive', 'other than 0' or '0' (within `NEARLY`).
+        required: 'positive', '0 or more', 'other than 0' or '0' (within `NEARLY`).
 
     """
 

@@ -5,7 +5,7 @@ To add one, write a file and add a line here.
 
 from __future__ import annotations
 
-from kinfmu.laws.formulas import ConstantSpeed, External, Harmonic, Polynomial
+from kinfmu.laws.formulas import ConstantSpeed, ConstantValue, External, Harmonic, Polynomial
 from kinfmu.laws.law import Law, LawQuantity
 from kinfmu.laws.rise import (
     RISES,
@@ -22,6 +22,7 @@ from kinfmu.laws.spline import Spline
 
 LAWS: tuple[type[Law], ...] = (
     ConstantSpeed,
+    ConstantValue,
     Polynomial,
     Harmonic,
     *RISES,
@@ -34,6 +35,7 @@ __all__ = [
     "LAWS",
     "RISES",
     "ConstantSpeed",
+    "ConstantValue",
     "Cycloidal",
     "External",
     "Harmonic",

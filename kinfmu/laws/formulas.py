@@ -1,4 +1,4 @@
-"""Laws that are one formula: uniform motion, polynomial, harmonic motion; and External, for drivers moved by inputs."""
+"""Laws that are one formula: a constant, uniform motion, polynomial, harmonic motion; and External, for inputs."""
 
 from __future__ import annotations
 
@@ -29,6 +29,26 @@ class ConstantSpeed(Law):
 
     def target(self, x: Value, **constants: Value) -> Value:
         return constants["start"] + constants["speed"] * x
+
+
+@dataclass(frozen=True)
+class ConstantValue(Law):
+    """A constant.
+
+        u = level
+
+    For loads, and for drivers that stay where they are.
+    """
+
+    type: ClassVar[str] = "constant"
+
+    level: Annotated[Led, "the value"]
+
+    def target(self, x: Value, **constants: Value) -> Value:  # noqa: ARG002  it is the same for all
+        return constants["level"]
+
+    def why_not_periodic(self) -> str:
+        return ""
 
 
 @dataclass(frozen=True)
@@ -97,11 +117,11 @@ class Harmonic(Law):
 
 @dataclass(frozen=True)
 class External(Law):
-    """No law: the value comes from the inputs of the FMU; without inputs the driver is at rest.
+    """No law: the value comes from the inputs of the FMU; without inputs it is constant.
 
         u = start
 
-    Only drivers can have this law.
+    Only drivers and loads can have this law.
     """
 
     type: ClassVar[str] = "external"

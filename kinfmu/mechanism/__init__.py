@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from kinfmu.mechanism.body import Body, Point, RunSettings, Start
+from kinfmu.mechanism.body import Body, Gravity, Point, RunSettings, Start
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.settings import LawConstant
 
-__all__ = ["Body", "LawConstant", "Mechanism", "Parameter", "Point", "RunSettings", "Start"]
+__all__ = ["Body", "Gravity", "LawConstant", "Mechanism", "Parameter", "Point", "RunSettings", "Start"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from kinfmu.drivers import Driver
 from kinfmu.errors import MechanismError, listed, suggestion
 from kinfmu.joints import Joint
+from kinfmu.loads import Load
 from kinfmu.measures import PoseQuantity
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
@@ -48,10 +49,11 @@ def check_names(members: Members, points: Mapping[str, str]) -> None:
     """Raise a MechanismError for an invalid name. This comes before other checks: paths of numbers contain names."""
     if len(members.bodies) > MOST_BODIES:
         raise MechanismError(f"[bodies] holds {len(members.bodies)} bodies; {MOST_BODIES} at most")
-    tables: dict[str, Iterable[Body | Joint | Driver | Reading]] = {
+    tables: dict[str, Iterable[Body | Joint | Driver | Load | Reading]] = {
         "bodies": members.bodies,
         "joints": members.joints,
         "drivers": members.drivers,
+        "loads": members.loads,
         "measures": members.measures,
     }
     for table, rows in tables.items():
@@ -68,14 +70,13 @@ def check_members(
     for body in members.bodies:
         _check_body_itself(body)
     bodies = members.bodies_by_name
-    constraining: tuple[Joint | Driver, ...] = (*members.joints, *members.drivers)
-    for member in constraining:
+    for body in members.bodies:
+        _with_causes(("bodies", body.name), body.check_mass, parameters, expressions)
+    acting: tuple[Joint | Driver | Load, ...] = (*members.joints, *members.drivers, *members.loads)
+    for member in acting:
         _check_references(bodies, member)
-        _check_values(member, parameters, expressions)
-    for driver in members.drivers:
-        for given in driver.inputs():
-            if given in parameters:
-                raise MechanismError(f"[parameters] {given}: driver '{driver.name}' has an input of this name already")
+        _with_causes((table_of(member), member.name), member.check, parameters, expressions)
+    _check_names_of_results(members, parameters)
 
 
 def check_outputs(members: Members, points: Mapping[str, str], coordinates: str | tuple[str, ...]) -> None:
@@ -151,17 +152,36 @@ def _check_body_itself(body: Body) -> None:
         raise MechanismError("[bodies.ground] start: the ground does not move, its frame is the world's")
 
 
-def _check_references(bodies: Bodies, member: Joint | Driver) -> None:
-    table = "joints" if isinstance(member, Joint) else "drivers"
+def _check_names_of_results(members: Members, parameters: Mapping[str, Parameter]) -> None:
+    """Raise a MechanismError for a name that two inputs or outputs would have."""
+    given: tuple[Driver | Load, ...] = (*members.drivers, *members.loads)
+    for member in given:
+        what = "driver" if isinstance(member, Driver) else "load"
+        for name in member.inputs():
+            if name in parameters:
+                raise MechanismError(f"[parameters] {name}: {what} '{member.name}' has an input of this name already")
+    drivers = {driver.name for driver in members.drivers}
+    for load in members.loads:
+        if load.name in drivers:
+            raise MechanismError(f"[loads.{load.name}]: a driver has this name already; give the load another one")
+
+
+def table_of(member: Joint | Driver | Load) -> str:
+    """Return the table of a file in which a member is."""
+    return "joints" if isinstance(member, Joint) else "drivers" if isinstance(member, Driver) else "loads"
+
+
+def _check_references(bodies: Bodies, member: Joint | Driver | Load) -> None:
+    table = table_of(member)
     _check_fields(bodies, f"[{table}.{member.name}] ", member)
-    touched = member.bodies()
+    touched = member.acts_on() if isinstance(member, Load) else member.bodies()
     if len(touched) > 1 and len(set(touched)) == 1:
         raise MechanismError(f"[{table}.{member.name}] joins body '{touched[0]}' to itself")
     if set(touched) == {GROUND_NAME}:
         raise MechanismError(f"[{table}.{member.name}] acts on the ground only, which does not move")
 
 
-def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | PoseQuantity | Reading) -> None:
+def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | Load | PoseQuantity | Reading) -> None:
     """Check the references in its fields; messages put `before` in front of the key."""
     for key in keys_of(type(member)):
         where, value = f"{before}{key.name}", getattr(member, key.name)
@@ -171,15 +191,17 @@ def _check_fields(bodies: Bodies, before: str, member: Joint | Driver | PoseQuan
             _check_reference(bodies, where, value, key.refers, is_pair=key.takes == "pair")
 
 
-def _check_values(
-    member: Joint | Driver, parameters: Mapping[str, Parameter], expressions: Mapping[NumberPath, Expression]
+def _with_causes(
+    owner: tuple[str, str],
+    check: Callable[[], None],
+    parameters: Mapping[str, Parameter],
+    expressions: Mapping[NumberPath, Expression],
 ) -> None:
-    """Run the member's own check; an error also states its expressions and the values of their parameters."""
-    table = "joints" if isinstance(member, Joint) else "drivers"
+    """Run a member's own check; an error also states its expressions and the values of their parameters."""
     try:
-        member.check()
+        check()
     except MechanismError as error:
-        at_fault = {place: e for place, e in expressions.items() if place[:2] == (table, member.name)}
+        at_fault = {place: e for place, e in expressions.items() if place[:2] == owner}
         if not at_fault:
             raise
         values = dict.fromkeys(name for expression in at_fault.values() for name in expression.names)

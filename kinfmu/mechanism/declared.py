@@ -23,6 +23,7 @@ _PLAIN: dict[Any, Takes] = {
     bool: "truth",
     Law: "law",
     PoseQuantity: "measure",
+    PoseQuantity | None: "measure",
     str | PoseQuantity: "measured",
     tuple[float, ...]: "numbers",
     tuple[tuple[float, float], ...]: "points",

@@ -1,11 +1,11 @@
-"""Dimensions of expressions: a length, an angle, a time, products of their powers, or a pure number."""
+"""Dimensions of expressions: a mass, a length, an angle, a time, products of their powers, or a pure number."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from kinfmu.units import Quantity
+from kinfmu.units import KINDS, Quantity
 
 _ANGLES = {0: "an angle", -1: "an angular speed", -2: "an angular acceleration"}  # by the power of time
 _LENGTHS = {0: "a length", -1: "a speed", -2: "an acceleration"}
@@ -17,11 +17,12 @@ class DimensionError(Exception):
 
 @dataclass(frozen=True)
 class Dimension:
-    """Powers of length and time; an angle is a pure number marked as an angle.
+    """Powers of length, time and mass; an angle is a pure number marked as an angle.
 
     Attributes:
         length: Power of length.
         time: Power of time.
+        mass: Power of mass.
         is_angle: True if it contains radians.
         is_bare: True if a factor is a number without a unit, which may have the unit of its key ("3" as a length, also
             "3*a/b").
@@ -31,6 +32,7 @@ class Dimension:
 
     length: Fraction = Fraction(0)
     time: Fraction = Fraction(0)
+    mass: Fraction = Fraction(0)
     is_angle: bool = False
     is_bare: bool = False
     is_known: bool = True
@@ -38,45 +40,63 @@ class Dimension:
     @classmethod
     def of(cls, quantity: Quantity) -> Dimension:
         """Return the dimension of a quantity."""
-        powers = {"length": 0, "angle": 0, "number": 0, "time": 0}
-        powers[quantity.kind] += 1
+        powers = {"mass": 0, "length": 0, "angle": 0, "number": 0, "time": 0}
+        if quantity.kind in KINDS:
+            powers |= zip(("mass", "length", "time"), KINDS[quantity.kind].powers, strict=True)
+        else:
+            powers[quantity.kind] += 1
         powers[quantity.per] -= quantity.order
-        return cls(Fraction(powers["length"]), Fraction(powers["time"]), is_angle=quantity.kind == "angle")
+        length, time, mass = (Fraction(powers[key]) for key in ("length", "time", "mass"))
+        return cls(length, time, mass, is_angle=quantity.kind == "angle")
+
+    @property
+    def powers(self) -> tuple[Fraction, Fraction, Fraction]:
+        """Powers of mass, length and time."""
+        return self.mass, self.length, self.time
+
+    @property
+    def _kinds(self) -> list[str]:
+        """The quantities with a mass in them that have this dimension."""
+        return [kind for kind, said in KINDS.items() if tuple(map(Fraction, said.powers)) == self.powers]
 
     @property
     def quantity(self) -> Quantity | None:
         """The quantity of this dimension; None if it is unknown or files have no unit for it."""
         if not self.is_known or self.is_open:
             return None
+        if self.mass:
+            return Quantity(self._kinds[0]) if self._kinds else None
         for kind in ("angle" if self.is_angle else "number", "length", "time"):
             for order in (0,) if kind in ("number", "time") else (0, 1, 2):
                 same = Dimension.of(Quantity(kind, order))
-                if (same.length, same.time) == (self.length, self.time):
+                if same.powers == self.powers:
                     return Quantity(kind, order)
         return None
 
     @property
     def is_open(self) -> bool:
         """True for a bare number, which takes the unit of its key."""
-        return self.is_known and self.is_bare and not self.is_angle and self.length == 0 and self.time == 0
+        return self.is_known and self.is_bare and not self.is_angle and not any(self.powers)
 
     def fits(self, other: Dimension) -> bool:
         """Return False if the two are known to be different quantities."""
         if not (self.is_known and other.is_known) or self.is_open or other.is_open:
             return True
-        return (self.length, self.time) == (other.length, other.time)
+        return self.powers == other.powers
 
     def __str__(self) -> str:
-        if self.length == 0 and self.time == 0 and not self.is_angle:
+        if not any(self.powers) and not self.is_angle:
             return "a number"
-        if self.length == 0 and self.is_angle and self.time in _ANGLES:
+        if self.mass and self._kinds:
+            return KINDS[self._kinds[0]].meaning
+        if self.mass == 0 and self.length == 0 and self.is_angle and self.time in _ANGLES:
             return _ANGLES[int(self.time)]
-        if self.length == 1 and self.time in _LENGTHS:
+        if self.mass == 0 and self.length == 1 and self.time in _LENGTHS:
             return _LENGTHS[int(self.time)]
-        if self.length == 0 and self.time == 1:
+        if self.mass == 0 and self.length == 0 and self.time == 1:
             return "a time"
-        powers = ((self.length, "length"), (self.time, "time"))
-        return " ".join(name if power == 1 else f"{name}^{power}" for power, name in powers if power != 0)
+        named = zip(self.powers, ("mass", "length", "time"), strict=True)
+        return " ".join(name if power == 1 else f"{name}^{power}" for power, name in named if power != 0)
 
 
 BARE = Dimension(is_bare=True)
@@ -98,6 +118,7 @@ def product_of(a: Dimension, b: Dimension) -> Dimension:
     return Dimension(
         a.length + b.length,
         a.time + b.time,
+        a.mass + b.mass,
         is_angle=a.is_angle or b.is_angle,
         is_bare=a.is_bare or b.is_bare,
         is_known=a.is_known and b.is_known,
@@ -106,13 +127,14 @@ def product_of(a: Dimension, b: Dimension) -> Dimension:
 
 def quotient_of(a: Dimension, b: Dimension) -> Dimension:
     """Dimension of a / b."""
-    turned = replace(b, length=-b.length, time=-b.time, is_angle=False)
+    turned = replace(b, length=-b.length, time=-b.time, mass=-b.mass, is_angle=False)
     return replace(product_of(a, turned), is_angle=a.is_angle and not b.is_angle)
 
 
 def power_of(a: Dimension, exponent: Fraction) -> Dimension:
     """Dimension of a ** exponent."""
-    return replace(a, length=a.length * exponent, time=a.time * exponent, is_angle=a.is_angle and exponent == 1)
+    powers = {"length": a.length * exponent, "time": a.time * exponent, "mass": a.mass * exponent}
+    return replace(a, **powers, is_angle=a.is_angle and exponent == 1)  # type: ignore[arg-type]
 
 
 def ratio_of_angle(a: Dimension) -> Dimension:

@@ -5,8 +5,8 @@
     power   = atom ["**" whole number]
     atom    = number [unit] | name | "pi" | function "(" sum { "," sum } ")" | "(" sum ")"
 
-A word directly after a number is its unit; a unit with a slash, such as "mm/s", contains no blanks. This module parses
-the text; Python never evaluates it.
+A word directly after a number is its unit, or several words, such as "N m"; around the slash of a unit, such as "mm/s",
+are no blanks. This module parses the text; Python never evaluates it.
 """
 
 from __future__ import annotations
@@ -102,6 +102,7 @@ class Expression:
         text: Such as "2*a + 5 mm".
         length_unit: Unit of length of the mechanism; lengths with other units are converted to it. Default: 'm'.
         steps: The operations in postfix order. Default: those that the text gives.
+        is_converted: True if the steps convert between SI units and the unit of length (see `conversion`).
 
     Raises:
         MechanismError: The text is not an expression; the message states the position.
@@ -111,6 +112,7 @@ class Expression:
     text: str
     length_unit: str = "m"
     steps: tuple[Step, ...] = field(default=(), compare=False)
+    is_converted: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "text", self.text.strip(" \t"))
@@ -231,7 +233,8 @@ _TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/(),])"
 )
-_UNIT = re.compile(r"[ \t]*([A-Za-z_][A-Za-z0-9_]*)(/[A-Za-z_][A-Za-z0-9_]*)?")
+_WORD = "[A-Za-z_][A-Za-z0-9_]*"
+_UNIT = re.compile(rf"[ \t]*({_WORD}((?: {_WORD}){{0,2}}))(/{_WORD})?")  # the longest has three words, 'N m s/rad'
 
 
 class _Parser:
@@ -342,12 +345,15 @@ class _Parser:
         value, unit, measures = float(token.text), "", dimension.BARE
         match = _UNIT.match(self._text, self._at)
         if match:
-            word, per = match[1], match[2] or ""
-            unit, end = (word + per, match.end()) if word + per in self._units else (word, match.end(1))
+            begin, ends = match.start(1), [match.end(), match.end(1)]
+            ends += [k for k in range(match.end(1) - 1, begin, -1) if self._text[k] == " "]
+            end = next((end for end in ends if self._text[begin:end] in self._units), ends[-1])
+            unit = self._text[begin:end]
             if unit not in self._units:
-                known = listed(u for u in self._units if "/" not in u)
-                what = f"no unit '{unit}'{suggestion(unit, self._units)}; units: {known}, and such as mm/s, rad/s2"
-                raise _error(self._text, match.start(1), f"{what}; a product needs *")
+                known = listed(u for u in self._units if not {"/", " "} & set(u))
+                more = "and such as mm/s, rad/s2, N m"
+                what = f"no unit '{unit}'{suggestion(unit, self._units)}; units: {known}, {more}"
+                raise _error(self._text, begin, f"{what}; a product needs *")
             quantity, factor = self._units[unit]
             value, measures, self._at = value * factor, Dimension.of(quantity), end
         if not math.isfinite(value):

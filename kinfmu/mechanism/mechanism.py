@@ -12,8 +12,9 @@ from kinfmu.display import Displayed
 from kinfmu.drivers import Driver
 from kinfmu.errors import RequestError
 from kinfmu.joints import Joint
+from kinfmu.loads import Load
 from kinfmu.measures.arithmetic import Value
-from kinfmu.mechanism.body import GROUND_NAME, Body, RunSettings
+from kinfmu.mechanism.body import GROUND_NAME, Body, Gravity, RunSettings, read_gravity
 from kinfmu.mechanism.checks import (
     check_header,
     check_members,
@@ -51,6 +52,8 @@ class Mechanism(Displayed):
         title: One line for people.
         parameters: Parameters by name, also as plain numbers or text ("40 mm", "2*a"). Default: none.
         measures: What `check` and `measure` read off a motion, such as a stroke. Default: none.
+        gravity: Acceleration of free fall (x, y) [length/s2], such as (0, -9.81). Default: none.
+        loads: Forces and torques on the bodies. Default: none.
 
     Attributes:
         expressions: The expressions of computed numbers, by path (see `NumberPath`).
@@ -71,20 +74,24 @@ class Mechanism(Displayed):
     title: str = ""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     measures: tuple[Reading, ...] = ()
+    gravity: Gravity | None = None
+    loads: tuple[Load, ...] = ()
     expressions: Mapping[NumberPath, Expression] = field(init=False)
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "measures"):
+        for key in ("bodies", "joints", "drivers", "measures", "loads"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         if not isinstance(self.coordinates, str):
             object.__setattr__(self, "coordinates", tuple(self.coordinates))
         if not any(body.is_ground for body in self.bodies):
             object.__setattr__(self, "bodies", (Body(GROUND_NAME), *self.bodies))
         object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
+        object.__setattr__(self, "gravity", read_gravity(self.gravity))
         check_header(self.name, self.title, self.length_unit)
         check_names(self.members, self.points)
+        object.__setattr__(self, "loads", tuple(load.with_unit(self.length_unit) for load in self.loads))
         members, parameters, expressions = resolve(self.members, self.parameters, self.length_unit)
-        for key in ("bodies", "joints", "drivers", "run", "measures"):
+        for key in ("bodies", "joints", "drivers", "run", "measures", "gravity", "loads"):
             object.__setattr__(self, key, getattr(members, key))
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "expressions", MappingProxyType(expressions))
@@ -98,12 +105,18 @@ class Mechanism(Displayed):
         return f"<Mechanism {self.name}; {', '.join(f'{name}: {len(part)}' for name, part in parts.items())}>"
 
     def __hash__(self) -> int:
-        return hash((self.name, self.bodies, self.joints, self.drivers, tuple(self.points.items()), self.coordinates))
+        members = (self.bodies, self.joints, self.drivers, self.gravity, self.loads)
+        return hash((self.name, members, tuple(self.points.items()), self.coordinates))
 
     @property
     def moving_bodies(self) -> tuple[Body, ...]:
         """Bodies other than the ground, in file order."""
         return self.members.moving_bodies
+
+    @property
+    def has_masses(self) -> bool:
+        """True if a body has a mass."""
+        return any(body.has_mass for body in self.bodies)
 
     @property
     def body_points(self) -> dict[str, tuple[float, float]]:
@@ -135,8 +148,8 @@ class Mechanism(Displayed):
 
     @property
     def members(self) -> Members:
-        """Bodies, joints, drivers, run and measures, with their numbers."""
-        return Members(self.bodies, self.joints, self.drivers, self.run, self.measures)
+        """Bodies, joints, drivers, run, measures, gravity and loads, with their numbers."""
+        return Members(self.bodies, self.joints, self.drivers, self.run, self.measures, self.gravity, self.loads)
 
     def with_expressions(self) -> Members:
         """Return the members with expressions as they were written, instead of their numbers."""
@@ -144,6 +157,8 @@ class Mechanism(Displayed):
 
     def at(self, values: Mapping[str, Value]) -> Members:
         """Return the members for other values of parameters, unchecked (`with_parameters` checks).
+
+        Bodies have their centre of mass and moment of inertia in place of a rod.
 
         Args:
             values: Values by name, in any arithmetic: floats, symbols, Taylor numbers. Other parameters are computed
@@ -156,7 +171,9 @@ class Mechanism(Displayed):
             is_open = isinstance(value, Computed) and place[0] not in ("run", "measures")  # not of the geometry
             return value.expression.value(known) if is_open else value
 
-        return self.members.changed(computed)
+        members = self.members.changed(computed)
+        bodies = tuple(body.with_mass_properties(self.length_unit) for body in members.bodies)
+        return replace(members, bodies=bodies)
 
     @property
     def law_constants(self) -> tuple[LawConstant, ...]:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from kinfmu.drivers import Driver
 from kinfmu.joints import Joint
 from kinfmu.laws import Law, LawQuantity
+from kinfmu.loads import Load
 from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value
-from kinfmu.mechanism.body import Body, Point, Start
+from kinfmu.mechanism.body import Body, Gravity, Point, Start
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.readings import Reading
 from kinfmu.units import CoordinateName, Quantity
@@ -22,14 +23,16 @@ if TYPE_CHECKING:
 
 NumberPath = tuple[str | int, ...]
 """Path of a number: ("bodies", body, "points", point, 0 or 1), ("bodies", body, "start", "x" | "y" | "phi"),
-("joints", joint, key), ("drivers", driver, key), ("joints", joint, measure, key), ("run", key), and of a law
-("joints" | "drivers", name, "law", constant) or ("joints" | "drivers", name, "law", "points", number, 0 or 1), and
+("bodies", body, "mass" | "inertia"), ("bodies", body, "center_of_mass", 0 or 1), ("gravity", "x" | "y"),
+("joints" | "drivers" | "loads", name, key), ("joints" | "loads", name, measure, key), ("run", key), and of a law
+(table, name, "law", constant) or (table, name, "law", "points", number, 0 or 1), and
 ("measures", measure, key), ("measures", measure, "targets", number, 0 or 1)."""
 
 Bodies = Mapping[str, Body]  # by name
 Change = Callable[[NumberPath, Any, Quantity], Any]  # place, value and quantity -> new value
 LENGTH, ANGLE, TIME = Quantity("length"), Quantity("angle"), Quantity("time")
 COORDINATES = ("x", "y", "phi")
+MASS, INERTIA, ACCELERATION = Quantity("mass"), Quantity("inertia"), Quantity("length", 2)
 _START = {"x": LENGTH, "y": LENGTH, "phi": ANGLE}
 
 
@@ -42,6 +45,8 @@ class Members:
     drivers: tuple[Driver, ...]
     run: RunSettings
     measures: tuple[Reading, ...] = ()
+    gravity: Gravity | None = None
+    loads: tuple[Load, ...] = ()
 
     @property
     def moving_bodies(self) -> tuple[Body, ...]:
@@ -77,31 +82,47 @@ class Members:
             tuple(_member(driver, ("drivers", driver.name), change) for driver in self.drivers),
             _replaced(self.run, run),
             tuple(_reading(reading, self.driver_kind, change) for reading in self.measures),
+            _gravity(self.gravity, change),
+            tuple(_member(load, ("loads", load.name), change) for load in self.loads),
         )
 
 
 def path_text(place: NumberPath) -> str:
     """Return a path as in messages: '[bodies.crank] points.P', '[joints.AB] length', '[drivers.crank] speed'."""
-    if place[0] == "run":
-        return f"[run] {place[1]}"
+    if place[0] in ("run", "gravity"):
+        return f"[{place[0]}] {place[1]}"
     table, name, *path = place
     keys = [str(key) for key in path if key != "law" and not isinstance(key, int)]
     return f"[{table}.{name}] {'.'.join(keys)}"
 
 
 def _body(body: Body, change: Change) -> Body:
-    points = {}
-    for name, point in body.points.items():
-        new = tuple(change(("bodies", body.name, "points", name, k), point[k], LENGTH) for k in (0, 1))
-        points[name] = point if all(map(is_, new, point)) else Point(*new)
+    points = {name: _point(point, ("bodies", body.name, "points", name), change) for name, point in body.points.items()}
     start = Start(
         *(
             None if value is None else change(("bodies", body.name, "start", key), value, _START[key])
             for key, value in body.start._asdict().items()
         )
     )
-    is_same = all(points[name] is point for name, point in body.points.items()) and all(map(is_, start, body.start))
-    return body if is_same else Body(body.name, points, start)
+    values: dict[str, Any] = {
+        "points": body.points if all(points[name] is point for name, point in body.points.items()) else points,
+        "start": body.start if all(map(is_, start, body.start)) else start,
+        "center_of_mass": _point(body.center_of_mass, ("bodies", body.name, "center_of_mass"), change),
+        "mass": change(("bodies", body.name, "mass"), body.mass, MASS),
+        "inertia": change(("bodies", body.name, "inertia"), body.inertia, INERTIA),
+    }
+    return _replaced(body, values)  # type: ignore[no-any-return]  # of the same class
+
+
+def _point(point: Point, place: NumberPath, change: Change) -> Point:
+    new = tuple(change((*place, k), point[k], LENGTH) for k in (0, 1))
+    return point if all(map(is_, new, point)) else Point(*new)
+
+
+def _gravity(gravity: Gravity | None, change: Change) -> Gravity | None:
+    if gravity is None:
+        return None
+    return Gravity(*(change(("gravity", key), value, ACCELERATION) for key, value in gravity._asdict().items()))
 
 
 def _member(member: Any, place: NumberPath, change: Change) -> Any:

@@ -13,7 +13,19 @@ from kinfmu.units import Quantity, every_unit, factors, unit_of
 
 _PLAIN = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?[ \t]*([^\W\d][^\s*+()-]*|\N{DEGREE SIGN})\s*")  # number, word
 _WORDS = re.compile(r"\s*+[+-]?\s*+[^\W\d]\w*+(?:[\s-]++\w++)*+\s*+")  # 'y', '-x', 'Y axis', 'x-axis'
-_EXAMPLES = {"angle": "60 deg", "length": "25 mm", "time": "10 ms"}
+EXAMPLES = {
+    "angle": "60 deg",
+    "length": "25 mm",
+    "time": "10 ms",
+    "mass": "1.2 kg",
+    "inertia": "0.003 kg m2",
+    "force": "10 N",
+    "torque": "2 N m",
+    "stiffness": "200 N/m",
+    "torsional_stiffness": "5 N m/rad",
+    "damping": "20 N s/m",
+    "torsional_damping": "0.1 N m s/rad",
+}
 
 
 def read_number(where: str, value: object, quantity: Quantity | None, length_unit: str) -> float | Expression:
@@ -32,7 +44,8 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
     if isinstance(value, Computed):
         value = value.expression
     if isinstance(value, Expression):
-        return value if value.length_unit == length_unit else Expression(value.text, length_unit)
+        is_as_written = value.length_unit == length_unit and not value.is_converted
+        return value if is_as_written else Expression(value.text, length_unit)
     if isinstance(value, str):
         known = factors(quantity, length_unit) if quantity else every_unit(length_unit)
         try:
@@ -49,8 +62,12 @@ def read_number(where: str, value: object, quantity: Quantity | None, length_uni
             raise MechanismError(f"{where} = {quoted(value)}: text needs a unit, one of {listed(known)}")
         if literal.unit and literal.unit not in known:
             raise _wrong_unit(where, value, literal.unit, known)
-        check_number(where, literal.value, value)
-        return float(literal.value)
+        number = float(literal.value)
+        if literal.unit and quantity:
+            factor, (_, usual) = factors(quantity, length_unit)[literal.unit], every_unit(length_unit)[literal.unit]
+            number = number if factor == usual else number * (factor / usual)  # the unit of two quantities
+        check_number(where, number, value)
+        return number
     if not is_number(value):
         valid = f"a number or text such as '{_example(quantity, length_unit)}'"
         raise MechanismError(f"{where} = {quoted(value)} must be {valid}")
@@ -95,5 +112,5 @@ def _wrong_unit(where: str, value: str, unit: str, known: Collection[str]) -> Me
 def _example(quantity: Quantity | None, length_unit: str) -> str:
     if quantity is None or not factors(quantity, length_unit):
         return "2*a"
-    _, slash, per = unit_of(quantity, length_unit).partition("/")
-    return _EXAMPLES[quantity.kind] + slash + per
+    _, slash, per = unit_of(quantity, length_unit).rpartition("/") if quantity.order else ("", "", "")
+    return EXAMPLES[quantity.kind] + slash + per

@@ -9,6 +9,7 @@ from typing import Any
 
 from kinfmu.errors import MechanismError, listed
 from kinfmu.measures.arithmetic import Value
+from kinfmu.mechanism.conversion import converted
 from kinfmu.mechanism.dimension import UNKNOWN, Dimension
 from kinfmu.mechanism.expression import WORDS, Computed, Expression
 from kinfmu.mechanism.number import read_number
@@ -37,7 +38,7 @@ class Parameter:
 
     @property
     def kind(self) -> str:
-        """'length', 'angle', 'time' or 'number'."""
+        """'length', 'angle', 'time', 'number', or a quantity with a mass in it such as 'force'."""
         return (self.quantity or NUMBER).kind
 
     @property
@@ -94,36 +95,45 @@ def resolve_parameters(parameters: Mapping[str, Parameter], alone: Mapping[str, 
         said, quantity = parameters[name], quantities[name]
         dimensions[name] = Dimension.of(quantity) if quantity and quantity != NUMBER else UNKNOWN
         if name in expressions:
-            number, found = compute(f"[parameters] {name}", expressions[name], values, dimensions, dimensions[name])
+            where, expression = f"[parameters] {name}", expressions[name]
+            found = dimension_of(where, expression, dimensions, dimensions[name])
             if found.is_known and not found.is_open:
-                dimensions[name], quantity = found, quantity or found.quantity
+                dimensions[name] = found
+                same = {one for one in wanted[name] if found.mass and Dimension.of(one).powers == found.powers}
+                quantity = quantity or (same.pop() if len(same) == 1 else found.quantity)  # torque, or its stiffness
             elif quantity is None and len(wanted[name]) == 1:
                 (quantity,) = wanted[name]
                 dimensions[name] = Dimension.of(quantity)
-            done[name] = Parameter(number, quantity or NUMBER, said.description)
+            expression = converted(where, expression, quantities, dimensions, quantity)
+            done[name] = Parameter(compute(where, expression, values), quantity or NUMBER, said.description)
         else:
             done[name] = Parameter(said.value, quantity or NUMBER, said.description)
+        quantities[name] = done[name].quantity
         values[name] = float(done[name].value)
     return {name: done[name] for name in parameters}
 
 
-def compute(
-    where: str,
-    expression: Expression,
-    values: Mapping[str, float],
-    dimensions: Mapping[str, Dimension],
-    needed: Dimension,
-) -> tuple[Computed, Dimension]:
-    """Return number and dimension of an expression, or raise a MechanismError; `where` is its key in messages."""
+def dimension_of(
+    where: str, expression: Expression, dimensions: Mapping[str, Dimension], needed: Dimension
+) -> Dimension:
+    """Return the dimension of an expression, or raise a MechanismError; `where` is its key in messages."""
     try:
         found = expression.dimension(dimensions)
-        number = float(expression.value(values))
     except MechanismError as error:
         raise MechanismError(f"{where} = {error}") from None
     if not found.fits(needed):
         raise MechanismError(f"{where} = {quoted(expression.text)} is {found} and must be {needed}")
+    return found
+
+
+def compute(where: str, expression: Expression, values: Mapping[str, float]) -> Computed:
+    """Return the number of an expression, or raise a MechanismError; `where` is its key in messages."""
+    try:
+        number = float(expression.value(values))
+    except MechanismError as error:
+        raise MechanismError(f"{where} = {error}") from None
     check_number(f"{where} = {quoted(expression.text)}", number)
-    return Computed(number, expression), found
+    return Computed(number, expression)
 
 
 def dimensions_of(parameters: Mapping[str, Parameter]) -> dict[str, Dimension]:

@@ -6,11 +6,19 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from kinfmu.errors import MechanismError
+from kinfmu.mechanism.conversion import converted
 from kinfmu.mechanism.dimension import Dimension
 from kinfmu.mechanism.expression import Expression
 from kinfmu.mechanism.members import Members, NumberPath, path_text
 from kinfmu.mechanism.number import expression_error, read_number
-from kinfmu.mechanism.parameters import Parameter, compute, dimensions_of, read_parameter, resolve_parameters
+from kinfmu.mechanism.parameters import (
+    Parameter,
+    compute,
+    dimension_of,
+    dimensions_of,
+    read_parameter,
+    resolve_parameters,
+)
 from kinfmu.units import Quantity
 
 MOST_PARAMETERS = 10_000
@@ -28,7 +36,7 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     """Replace texts with units and expressions by numbers, and list the expressions.
 
     Args:
-        members: Bodies, joints, drivers, run and measures as written.
+        members: Bodies, joints, drivers, run, measures, gravity and loads as written.
         given: Parameters as written.
         unit: Unit of length.
 
@@ -54,6 +62,7 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
     parameters = resolve_parameters(said, alone)
     values = {name: float(parameter.value) for name, parameter in parameters.items()}
     dimensions = dimensions_of(parameters)
+    quantities = {name: parameter.quantity for name, parameter in parameters.items()}
 
     def computed(place: NumberPath, value: Any, quantity: Quantity) -> Any:
         if not isinstance(value, Expression):
@@ -63,6 +72,8 @@ def resolve(members: Members, given: Mapping[str, Parameter], unit: str) -> Reso
             value.refuse_unknown(values)
         except MechanismError as error:
             raise expression_error(where, value.text, quantity, unit, error) from None
-        return compute(where, value, values, dimensions, Dimension.of(quantity))[0]
+        dimension_of(where, value, dimensions, Dimension.of(quantity))
+        expressions[place] = converted(where, value, quantities, dimensions, quantity)
+        return compute(where, expressions[place], values)
 
     return Resolved(members.changed(computed), parameters, expressions)

@@ -13,11 +13,13 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, LawQuantity, Spline
 from kinfmu.laws.sequence import DWELL
+from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.mechanism.expression import LONGEST
+from kinfmu.mechanism.number import EXAMPLES
 from kinfmu.mechanism.toml_tables import table_keys
 from kinfmu.readings import READINGS
 from kinfmu.units import METRES, Quantity
@@ -26,7 +28,6 @@ Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"  # the newest that editors of TOML agree on
 NAME = "^[A-Za-z_][A-Za-z0-9_]{0,99}$"
 _REFERRED = {"point": "point", "body": "name", "coordinate": "point"}  # definitions by what a reference refers to
-_EXAMPLES = {"length": "25 mm", "angle": "60 deg", "time": "10 ms", "number": "z_1/z_2"}
 
 
 def schema_text() -> str:
@@ -57,6 +58,14 @@ def schema() -> Schema:
         "bodies": _named("body", f"Bodies; '{GROUND_NAME}' does not move", **names),
         "joints": _named("joint", "Joints between the bodies", **names),
         "drivers": _named("driver", "What moves the mechanism", **names),
+        "gravity": _table(
+            {
+                axis: _number(Quantity("length", 2), f"Acceleration of free fall along {axis}, in the world")
+                for axis in ("x", "y")
+            },
+            required=("x", "y"),
+        ),
+        "loads": _named("load", "Forces and torques on the bodies", **names),
         "points": {
             "type": "object",
             "description": "Points of interest, as 'body.point'",
@@ -107,6 +116,7 @@ def _definitions() -> Schema:
         "reading": {"oneOf": [_member(cls, ()) for cls in READINGS]},
         "joint": {"oneOf": [_member(cls, laws_of_joints) for cls in JOINTS]},
         "driver": {"oneOf": [_member(cls, LAWS) for cls in DRIVERS]},
+        "load": {"oneOf": [_member(cls, LAWS) for cls in LOADS]},
     }
 
 
@@ -128,6 +138,16 @@ def _body() -> Schema:
                         "phi": _number(Quantity("angle"), "Angle of the frame; bare numbers are radians"),
                     }
                 ),
+            },
+            "mass": _number(Quantity("mass"), "Mass [kg]; default: 0"),
+            "center_of_mass": {
+                "description": "Centre of mass [x, y] in the body's own frame; default: its origin",
+                "allOf": [_ref("xy")],
+            },
+            "inertia": _number(Quantity("inertia"), "Moment of inertia about the centre of mass [kg m2]; default: 0"),
+            "rod": {
+                "description": "Two points of the body between which its mass is a uniform slender rod",
+                **_list(_ref("name"), 2, 2),
             },
         }
     )
@@ -212,7 +232,7 @@ def _text(refers: Reference | None) -> Schema:
 
 def _number(measures: Quantity | LawQuantity, meaning: str, default: Any = REQUIRED) -> Schema:
     kind = measures.kind if isinstance(measures, Quantity) and not measures.order else ""
-    more = {"examples": [_EXAMPLES[kind]]} if kind else {}
+    more = {"examples": ["z_1/z_2" if kind == "number" else EXAMPLES[kind]]} if kind else {}
     return _ref("number", description=meaning, **more, **({} if default is REQUIRED else {"default": default}))
 
 

@@ -12,8 +12,9 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError, listed
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, RISES, External, Law, Segment, Spline
+from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES, PoseQuantity
-from kinfmu.mechanism.body import Body, RunSettings, Start
+from kinfmu.mechanism.body import MASS_KEYS, Body, Gravity, RunSettings, Start
 from kinfmu.mechanism.declared import REQUIRED, Takes, keys_of
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.mechanism.parameters import Parameter
@@ -55,6 +56,8 @@ _TABLES = (
     "bodies",
     "joints",
     "drivers",
+    "gravity",
+    "loads",
     "points",
     "outputs",
     "measures",
@@ -163,6 +166,11 @@ def _mechanism(document: dict[str, Any], folder: Path | None) -> Mechanism:
         parameters={name: _parameter(name, value) for name, value in named_values(document, "parameters")},
         run=_run(table_of(document, "run")),
         measures=read_measures(document, folder),
+        gravity=_gravity(document),
+        loads=tuple(
+            _member(f"[loads.{name}]", name, load, LOADS, LAWS, folder)
+            for name, load in named_tables(document, "loads")
+        ),
     )
 
 
@@ -176,12 +184,23 @@ def read_measures(document: Mapping[str, Any], folder: Path | None) -> tuple[Rea
 
 def _body(name: str, table: Mapping[str, Any]) -> Body:
     where = f"[bodies.{name}]"
-    check_keys(where, table, ("points", "start"))
+    check_keys(where, table, ("points", "start", *MASS_KEYS))
     points, start = subtable(where, table, "points"), subtable(where, table, "start")
     for point in points:
         check_name(f"{where} points", point)
     check_keys(f"{where} start", start, Start._fields)
-    return Body(name, points, Start(**start))
+    return Body(name, points, Start(**start), **{key: table[key] for key in MASS_KEYS if key in table})
+
+
+def _gravity(document: Mapping[str, Any]) -> Gravity | None:
+    if "gravity" not in document:
+        return None
+    table = table_of(document, "gravity")
+    check_keys("[gravity]", table, Gravity._fields)
+    for key in Gravity._fields:
+        if key not in table:
+            raise MechanismError(f"[gravity] needs the key '{key}'; downwards: x = 0, y = '-9.81 m/s2'")
+    return Gravity(**table)
 
 
 def _member(
@@ -192,7 +211,7 @@ def _member(
     laws: Iterable[type[Law]],
     folder: Path | None,
 ) -> Any:
-    """Return a joint, driver or measure; the keys of its law, if it has one, are in the same table."""
+    """Return a joint, driver, load or measure; the keys of its law, if it has one, are in the same table."""
     cls = class_of_type(where, table, "type", classes)
     keys = table_keys(cls)
     values: dict[str, Any] = {}
@@ -206,7 +225,7 @@ def _member(
 
 
 def _values(where: str, cls: Any, table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the fields of a joint, driver, measure or law from its table, without `law`.
+    """Return the fields of a joint, driver, load, measure or law from its table, without `law`.
 
     Numbers stay as written; the mechanism converts and checks them.
     """

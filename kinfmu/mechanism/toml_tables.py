@@ -12,7 +12,7 @@ from kinfmu.mechanism.valid import check_name, quoted
 
 
 def table_keys(cls: type) -> list[str]:
-    """Return the names of the keys of a joint, driver, measure or law; the points of a spline can be in a `file`."""
+    """Return the names of the keys of a joint, driver, load, measure or law; points of a spline can be in a `file`."""
     return [key.name for key in keys_of(cls)] + (["file"] if cls is Spline else [])
 
 

@@ -33,9 +33,14 @@ def text(mechanism: Mechanism) -> str:
         start = ", ".join(f"{key} = {_toml(value)}" for key, value in body.start._asdict().items() if value is not None)
         if start:
             lines.append(f"start = {{ {start} }}")
+        lines += [f"{key} = {_toml(value)}" for key, value in body.given_masses.items()]
     for table, members in (("joints", mechanism.joints), ("drivers", mechanism.drivers)):
         for member in members:
             lines += ["", f"[{table}.{member.name}]", f"type = {_toml(member.type)}", *_keys(member)]
+    if mechanism.gravity is not None:
+        lines += ["", "[gravity]", *(f"{key} = {_toml(value)}" for key, value in mechanism.gravity._asdict().items())]
+    for load in mechanism.loads:
+        lines += ["", f"[loads.{load.name}]", f"type = {_toml(load.type)}", *_keys(load)]
     if mechanism.points:
         lines += ["", "[points]", *(f"{name} = {_toml(target)}" for name, target in mechanism.points.items())]
     lines += ["", "[outputs]", f"coordinates = {_toml(mechanism.coordinates)}"]

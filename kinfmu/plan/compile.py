@@ -13,7 +13,13 @@ from kinfmu.measures.arithmetic import Value
 from kinfmu.mechanism import Mechanism, Point
 from kinfmu.plan.anchor import find_anchor
 from kinfmu.plan.block import Block, TimeDerivatives, build_block
-from kinfmu.plan.conditions import find_conditions, refuse_inconsistent, refuse_mobility, refuse_negative_distances
+from kinfmu.plan.conditions import (
+    find_conditions,
+    refuse_inconsistent,
+    refuse_mobility,
+    refuse_negative_distances,
+    refuse_undefined_loads,
+)
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import DriverInfo, MotionNodes, PlanParameter, SolvePlan, nodes_of, position_count
 from kinfmu.plan.structure import RowTracer, find_structure
@@ -77,6 +83,7 @@ def plan_from(
     refuse_mobility(system, redundancy)
     refuse_negative_distances(system, redundancy.assembly.start)
     anchor = find_anchor(system, redundancy.assembly)
+    refuse_undefined_loads(system, redundancy.assembly.start, anchor)
     settable = _parameters(mechanism, parameters)
     tracer = Tracer(local, [parameter.name for parameter in settable])
     structure = find_structure(system, tracer, redundancy, anchor.q)
@@ -110,6 +117,9 @@ def plan_from(
         outputs_motion=tuple(motions),
         coordinate_count=coordinate_count,
         fixed_nodes=fixed,
+        known=known,
+        known_by={name: system.rows[index].name for name, index in structure.fixed_by.items()},
+        load_sharing=tuple((one.row.name, *(row.name for row in one.implied_by)) for one in redundancy.redundant),
         watches=tuple(watches),
         conditions=find_conditions(mechanism, tracer),
         anchor=anchor,

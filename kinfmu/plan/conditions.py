@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from kinfmu.equations.closing import motion_samples, null_space
+import numpy as np
+
+from kinfmu.equations.assembly import Assembled
+from kinfmu.equations.closing import close, motion_samples, null_space
 from kinfmu.equations.graph import Node
 from kinfmu.equations.part import Part
 from kinfmu.equations.redundancy import Redundancy
 from kinfmu.equations.start_poses import StartValues
-from kinfmu.equations.system import System
+from kinfmu.equations.system import System, placement
 from kinfmu.errors import AssemblyError, InconsistentError, MobilityError, listed
+from kinfmu.joints.joint import Condition
 from kinfmu.measures import DistanceBetween
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.members import NumberPath, path_text
@@ -29,14 +33,25 @@ class PlanCondition(NamedTuple):
 
 def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition, ...]:
     """Return the conditions on numbers written as expressions; others are checked when the file is read."""
+    members = tracer.members
+    written = [(f"[joints.{joint.name}]", joint.conditions()) for joint in members.joints]
+    written += [(f"[loads.{load.name}]", load.conditions()) for load in members.loads]
+    written += [
+        (
+            f"[bodies.{body.name}]",
+            tuple(Condition(key, getattr(body, key), "0 or more") for key in ("mass", "inertia")),
+        )
+        for body in members.bodies
+    ]
     found = [
-        PlanCondition(f"[joints.{joint.name}] {key}", value, required)
-        for joint in tracer.joints
-        for key, value, required in joint.conditions()
+        PlanCondition(f"{table} {key}", value, required)
+        for table, conditions in written
+        for key, value, required in conditions
         if isinstance(value, Node) and value.constant is None
     ]
     laws = {("joints", joint.name): getattr(joint, "law", None) for joint in mechanism.joints}
     laws |= {("drivers", driver.name): driver.law for driver in mechanism.drivers}
+    laws |= {("loads", load.name): getattr(load, "law", None) for load in mechanism.loads}
 
     def look(place: NumberPath, value: Any, _: Quantity) -> Any:
         if place in mechanism.expressions and isinstance(value, Node) and value.constant is None:
@@ -46,7 +61,7 @@ def find_conditions(mechanism: Mechanism, tracer: Tracer) -> tuple[PlanCondition
                 found.append(PlanCondition(path_text(place), value, "positive"))
         return value
 
-    tracer.members.changed(look)
+    members.changed(look)
     return tuple(found)
 
 
@@ -97,6 +112,15 @@ def refuse_negative_distances(system: System, start: StartValues) -> None:
             raise AssemblyError(
                 f"[drivers.{driver.name}] starts at a length of {value:.6g} {unit}; a distance cannot be negative"
             )
+
+
+def refuse_undefined_loads(system: System, start: StartValues, anchor: Assembled) -> None:
+    """Raise a MechanismError for a load without a direction in the closed start pose; anchor: that pose, or near it."""
+    if system.mechanism.loads:
+        is_start = np.array_equal(anchor.u, start.u)
+        at = placement(system.mechanism, (anchor.q if is_start else close(system, start.q, start.u)[0]).tolist())
+        for load in system.mechanism.loads:
+            load.check_start(at)
 
 
 def _loose(system: System, redundancy: Redundancy) -> list[str]:

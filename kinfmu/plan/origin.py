@@ -26,6 +26,7 @@ def localized(mechanism: Mechanism) -> tuple[Mechanism, Point]:
     first = next(iter(ground.points.values()), Point(0.0, 0.0))
     is_tied = any(driver.measured().is_absolute for driver in mechanism.drivers)
     is_tied = is_tied or any(joint.depends_on_origin for joint in mechanism.joints)
+    is_tied = is_tied or any(load.depends_on_origin for load in mechanism.loads)
     if is_tied or max(map(abs, first)) <= FAR * size_of(mechanism):
         return mechanism, Point(0.0, 0.0)
     return _moved(mechanism, -first.x, -first.y), first

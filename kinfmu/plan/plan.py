@@ -62,6 +62,10 @@ class SolvePlan:
         outputs_motion: The outputs: the generalized coordinates q, then the points of interest.
         coordinate_count: How many of the outputs are generalized coordinates.
         fixed_nodes: Coordinates that never move, as constants or formulas of parameters.
+        known: The same of the bodies' coordinates, outputs among them, as seen from the plan's origin.
+        known_by: The name of the row that gives each of them, in the order in which they follow from one another.
+        load_sharing: Names of the rows among which a load can be distributed in any way: for each redundant row, it and
+            those that imply it. Their reactions are undetermined.
         watches: Redundant rows, relative to the size, whose residuals are monitored.
         conditions: Conditions that parameters set at run time must keep.
         anchor: An assembled, regular pose.
@@ -80,6 +84,9 @@ class SolvePlan:
     outputs_motion: tuple[MotionNodes[CoordinateName], ...]
     coordinate_count: int
     fixed_nodes: Mapping[CoordinateName, Node]
+    known: Mapping[str, Node]
+    known_by: Mapping[CoordinateName, str]
+    load_sharing: tuple[tuple[str, ...], ...]
     watches: tuple[tuple[str, Node], ...]
     conditions: tuple[PlanCondition, ...]
     anchor: Assembled

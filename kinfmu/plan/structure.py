@@ -24,11 +24,12 @@ from kinfmu.units import CoordinateName
 class Structure:
     """The order of solving.
 
-    fixed: coordinates that joints hold at a constant or a formula of parameters, in file order; blocks: in the order of
-    solving.
+    fixed: coordinates that joints hold at a constant or a formula of parameters, in file order; fixed_by: the row that
+    gives each, in the order in which they are found; blocks: in the order of solving.
     """
 
     fixed: Mapping[str, Node]
+    fixed_by: Mapping[CoordinateName, int]
     blocks: tuple[BlockStructure, ...]
 
 
@@ -55,7 +56,8 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
     pose: closed, (n,).
     """
     row, kept = RowTracer(system, tracer), redundancy.kept
-    known, used = _constants(system, tracer, row, kept)
+    known, fixed_by = _constants(system, tracer, row, kept)
+    used = set(fixed_by.values())
     driving = range(system.joint_row_count, len(system.rows))
     open_rows = [index for index in (*kept, *driving) if index not in used]
     unknown = [name for name in system.coordinates if name not in known]
@@ -77,7 +79,7 @@ def find_structure(system: System, tracer: Tracer, redundancy: Redundancy, pose:
     def met(index: int) -> list[str]:
         return [symbol.name for symbol in symbols([row(index, known)])]
 
-    return Structure(known, tuple(with_companions(system, met, blocks, redundancy, pose)))
+    return Structure(known, fixed_by, tuple(with_companions(system, met, blocks, redundancy, pose)))
 
 
 def linear_coefficient(row: Node, symbol: Node) -> float | None:
@@ -96,9 +98,12 @@ def given_value(tracer: Tracer, row: RowTracer, index: int, name: str, known: Ma
     return -rest if coefficient == 1.0 else rest if coefficient == -1.0 else rest / -coefficient
 
 
-def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]) -> tuple[dict[str, Node], set[int]]:
-    """Return the coordinates that the kept joint rows fix, in file order, and the rows used for that."""
+def _constants(
+    system: System, tracer: Tracer, row: RowTracer, kept: Sequence[int]
+) -> tuple[dict[str, Node], dict[CoordinateName, int]]:
+    """Return the coordinates that the kept joint rows fix, in file order, and the row that gives each."""
     values: dict[str, Node] = {}
+    fixed_by: dict[CoordinateName, int] = {}
     used: set[int] = set()
     touching: dict[str, list[int]] = {}  # body -> rows
     joints = {joint.name: joint for joint in system.mechanism.joints}
@@ -117,10 +122,11 @@ def _constants(system: System, tracer: Tracer, row: RowTracer, kept: Sequence[in
         if coordinate is None or value is None:
             continue
         values[coordinate] = value
+        fixed_by[coordinate] = index
         used.add(index)
         for again in touching[coordinate.owner]:
             heapq.heappush(waiting, again)
-    return {name: values[name] for name in system.coordinates if name in values}, used
+    return {name: values[name] for name in system.coordinates if name in values}, fixed_by
 
 
 def _with_assignments(

@@ -16,7 +16,7 @@ from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, MissingPackageError, listed, suggestion
 from kinfmu.run.axis import TIME, axis_of, rates_per
 from kinfmu.solver.python.status import Status
-from kinfmu.units import CoordinateName, InputName, read_coordinate, read_inputs, unit_of
+from kinfmu.units import CoordinateName, ForceName, InputName, read_coordinate, read_inputs, unit_of
 
 if TYPE_CHECKING:
     from kinfmu.mechanism import Mechanism
@@ -96,6 +96,10 @@ class Run(Displayed):
         values: (n, m) in the mechanism's unit of length and rad.
         rates: (n, m), per second or per unit of the driver on the axis.
         accelerations: (n, m), the same.
+        force_names: Names of the f efforts, inertias and energies, such as 'crank.torque'; none without masses, loads.
+        forces: (n, f) in SI units; None without any.
+        reaction_names: Names of the r reactions of joints, such as 'pin.force_x'.
+        reactions: (n, r) in N and N m; None without any. NaN where redundant rows share a load in an unknown way.
         fixed: Coordinates that a joint holds at a constant, by name.
         input_names: Names of the 3 d inputs: value, speed and acceleration of each driver.
         inputs: (n, 3 d).
@@ -133,6 +137,10 @@ class Run(Displayed):
     error: Lazy[FloatArray] = Lazy()
     watch_names: tuple[str, ...]
     watch: Lazy[FloatArray] = Lazy()
+    force_names: tuple[ForceName, ...] = ()
+    forces: Lazy[FloatArray | None] = Lazy(None)
+    reaction_names: tuple[ForceName, ...] = ()
+    reactions: Lazy[FloatArray | None] = Lazy(None)
     length_unit: str = "m"
     mechanism_source: Lazy[Mechanism | str] = Lazy("")
     model_description: str = ""
@@ -234,7 +242,8 @@ class Run(Displayed):
             table = self.__dict__[name]
             return (lambda: getattr(self, name)[rows]) if callable(table) else table[rows]
 
-        return self.replaced(**{name: part(name) for name in _TABLES}, events=events)
+        tables = [name for name in _TABLES if self.__dict__[name] is not None]
+        return self.replaced(**{name: part(name) for name in tables}, events=events)
 
     def replaced(self, **fields: Any) -> Run:
         """Return the run with other fields; what is not computed yet stays so."""
@@ -275,6 +284,9 @@ class Run(Displayed):
             for k, name in enumerate(self.outputs):
                 unit = unit_of(name.quantity(order, per), self.length_unit)
                 yield ColumnPlace(name.derivative(order), unit, table, k)
+        for table, names in (("forces", self.force_names), ("reactions", self.reaction_names)):
+            for k, force in enumerate(names):
+                yield ColumnPlace(force, unit_of(force.quantity, self.length_unit), table, k)
         for table in ("status", "residual", "iterations", "margin"):
             yield ColumnPlace(f"solver.{table}", "1", table, None)
         for k, error in enumerate(("solver.error_q", "solver.error_qd", "solver.error_qdd")):
@@ -342,7 +354,7 @@ class Run(Displayed):
 
 _LAZY = tuple(name for name, value in vars(Run).items() if isinstance(value, Lazy))
 _TABLES = ("t", "values", "rates", "accelerations", "inputs", "status", "iterations", "residual", "margin", "error",
-           "watch")  # fmt: skip
+           "watch", "forces", "reactions")  # fmt: skip
 
 
 def arrow_table(columns: Iterable[Column]) -> Any:

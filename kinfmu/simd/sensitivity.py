@@ -18,7 +18,7 @@ from kinfmu.codegen.python.sensitivity import SensitivityStage, stage_lines
 from kinfmu.codegen.writer import identifier
 from kinfmu.equations.graph import reachable
 from kinfmu.errors import KinfmuError
-from kinfmu.plan.sensitivity import LinearSolve
+from kinfmu.plan.steps import LinearSolve
 
 FloatArray = NDArray[np.float64]
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # loops over samples need them
@@ -58,7 +58,7 @@ def is_printable(stage: SensitivityStage) -> bool:
     solves = [step for step in steps.steps if isinstance(step, LinearSolve)]
     if any(len(step.jacobian) > len(step.jacobian[0]) for step in solves):
         return False
-    roots = [step.node for step in steps.steps if not isinstance(step, LinearSolve)] + steps.results
+    roots = [step.node for step in steps.steps if not isinstance(step, LinearSolve)] + list(steps.results)
     roots += [node for step in solves for row in (*step.jacobian, *step.columns) for node in row]
     return all(node.op != "curve" for node in reachable(roots))
 

@@ -15,6 +15,8 @@ from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.forces import force_names
+from kinfmu.plan.reactions import reaction_names
 from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
@@ -25,6 +27,7 @@ from kinfmu.sweep.continued import anew as anew_note
 from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
 from kinfmu.sweep.engine import Engine, Tables, UnreachedError
+from kinfmu.sweep.forces import ForceModel, LoadedRun, applied_efforts, force_plan
 from kinfmu.sweep.python_engine import PythonEngine
 from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
 
@@ -88,6 +91,8 @@ class Model:
         self.parameters = tuple(parameter.name for parameter in plan.parameters)
         self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self._watch_names = plan.watch_names
+        self._force_names, self._reaction_names = force_names(plan), reaction_names(plan)
+        self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)
 
@@ -134,10 +139,11 @@ class Model:
             out: Three arrays (n, outputs) for values, rates and accelerations; by outputs (order="F") is faster.
             **inputs: Driver values in place of t, such as crank_angle=(n,) [rad] with crank_speed= and
                 crank_acceleration=, arrays or numbers. Default speed: 1, default acceleration: 0, so that rates are per
-                unit of the driver. The run's t then counts the samples, and its axis is the driver's value.
+                unit of the driver. The run's t then counts the samples, and its axis is the driver's value. With t or
+                with these: efforts of external loads, such as wind_force= [N], arrays or numbers. Default: 0.
 
         Returns:
-            The run, with a status for every sample. Margins and errors are computed when they are first read.
+            The run, with a status for every sample. Margins, errors and forces are computed when they are first read.
 
         Raises:
             RequestError: A name is unknown or a value is invalid.
@@ -148,6 +154,7 @@ class Model:
         """
         tolerance = read_tolerance("tolerance", tolerance)
         setting = self.arguments.setting(parameters or {})
+        efforts: dict[str, Any] = {name: inputs.pop(name) for name in self._load_inputs if name in inputs}
         driven, times = None, np.empty(0)
         if inputs:
             if t is not None:
@@ -168,9 +175,22 @@ class Model:
         except UnreachedError as reason:
             if not anew:
                 raise
-            return self._solve_anew(str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs)
+            return self._solve_anew(
+                str(reason), setting.given, t, tolerance=tolerance, wrap=wrap, out=out, **inputs, **efforts
+            )
         plan, given = self.plan, driven
-        return Run(
+        applied = applied_efforts(self._load_inputs, efforts, count)
+
+        def loaded() -> LoadedRun:
+            """Return what forces are computed from; tables that were given may hold other numbers by now."""
+            poses = run
+            if self._force_model.poses is not self or out is not None:
+                again: dict[str, Any] = dict(inputs)
+                model = self._force_model.poses
+                poses = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **again)
+            return LoadedRun(poses, setting, applied, None if inputs else times)
+
+        run = Run(
             t=(lambda: np.arange(count, dtype=float)) if inputs else times,
             outputs=self.outputs,
             coordinate_count=plan.coordinate_count,
@@ -187,12 +207,17 @@ class Model:
             error=result.error,
             watch_names=self._watch_names,
             watch=result.watch,
+            force_names=self._force_names,
+            forces=(lambda: self._force_model.forces(loaded())) if self._force_names else None,
+            reaction_names=self._reaction_names,
+            reactions=(lambda: self._force_model.reactions(loaded())) if self._force_names else None,
             length_unit=plan.mechanism.length_unit,
             mechanism_source=self.arguments.mechanism_with(setting),
             info=lambda: self.arguments.info(setting, engine.name),
             events=tuple(Event(float(k if inputs else times[k]), "error", message) for k, message in result.failures),
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
+        return run
 
     def solve_designs(
         self,
@@ -294,6 +319,11 @@ class Model:
     def _sensitivity_model(self) -> SensitivityModel:
         plan = plan_of_unknowns(self.plan)
         return SensitivityModel(self, self if plan is self.plan else Model(plan, self.engine))
+
+    @cached_property
+    def _force_model(self) -> ForceModel:
+        plan = force_plan(self.plan)
+        return ForceModel(self if plan is self.plan else Model(plan, self.engine))
 
     def load_library(self) -> Any:
         """Return the compiled library of the plan, compiled now or found in the cache.

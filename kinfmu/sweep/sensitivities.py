@@ -15,7 +15,8 @@ from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
 from kinfmu.display import Displayed
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
-from kinfmu.plan.sensitivity import law_symbol, scale_of, sensitivity_steps
+from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
+from kinfmu.plan.steps import law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.simd.sensitivity import empty_results, is_printable, load_native_sensitivity
@@ -95,7 +96,7 @@ class SensitivityModel:
         self._symbols = [parameter_symbol(parameter.name) for parameter in model.plan.parameters]
         self._law_symbols = [law_symbol(constant.name) for constant in model.plan.law_constants]
         self._stage = lru_cache(maxsize=_STAGES_KEPT)(self._new_stage)
-        self._native = lru_cache(maxsize=_STAGES_KEPT)(_native_stage)
+        self._native = lru_cache(maxsize=_STAGES_KEPT)(native_stage)
 
     def solve(
         self,
@@ -167,7 +168,7 @@ class SensitivityModel:
         return load_sensitivity(steps), steps.gap_names
 
 
-def _native_stage(stage: SensitivityStage) -> Native | None:
+def native_stage(stage: SensitivityStage) -> Native | None:
     """Return the stage as compiled C; None where it stays in Python."""
     if not is_printable(stage):
         return None
@@ -250,7 +251,7 @@ def _evaluated(
     numbers = [given[name] for name in stage.given]
     if not is_whole:
         numbers = [number[good] if isinstance(number, np.ndarray) else number for number in numbers]
-    results, is_finite = _results(stage, native, numbers, (int(ends[-1]), n))
+    results, is_finite = stage_results(stage, native, numbers, (int(ends[-1]), n))
     tables = [
         np.moveaxis(results[a:b].reshape(*shape, n), -1, 0) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)
     ]
@@ -270,7 +271,7 @@ def _evaluated(
     return Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
 
 
-def _results(
+def stage_results(
     stage: SensitivityStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
 ) -> tuple[FloatArray, bool]:
     """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.

@@ -81,10 +81,13 @@ def test_a_body_that_is_welded_to_the_ground_may_stand_still() -> None:
 
 def test_points_that_nothing_uses_are_named() -> None:
     assert notes(("Q = [50, 0] }\nstart = { x = 20", "Q = [50, 0], R = [9, 9] }\nstart = { x = 20")) == (
-        "point coupler.R is used by no joint, driver, measure or point of interest",
+        "point coupler.R is used by no joint, driver, load, measure or point of interest",
     )
     two = notes(("P = [20, 0] }", "P = [20, 0], A = [1, 1], B = [2, 2] }"))
-    assert two == ("points crank.A, crank.B are used by no joint, driver, measure or point of interest",)
+    assert two == ("points crank.A, crank.B are used by no joint, driver, load, measure or point of interest",)
+    force = '[loads]\npush = { type = "force", at = "crank.A", x = 5 }\n'
+    assert notes(("P = [20, 0] }", "P = [20, 0], A = [1, 1] }"), ("[drivers.crank]", f"{force}[drivers.crank]")) == ()
+    assert notes(("P = [20, 0] }", 'P = [20, 0], A = [1, 1] }\nmass = 1\nrod = ["O", "A"]')) == ()
     interest = ("[drivers.crank]", '[points]\ntip = "crank.A"\n[drivers.crank]')
     assert notes(("P = [20, 0] }", "P = [20, 0], A = [1, 1] }"), interest) == ()
     distance = '[measures]\nm = { type = "range", of = { measure = "distance", between = ["ground.O", "crank.A"] } }\n'

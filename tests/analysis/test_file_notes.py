@@ -85,6 +85,28 @@ def test_a_cam_that_turns_on_where_its_lift_ends_is_reported() -> None:
     assert list(file_notes(parse(CAM.replace("segments", "repeat = true\nsegments", 1)))) == []
 
 
+def test_a_load_that_turns_on_where_its_table_ends_is_reported() -> None:
+    force = """[loads.gas]
+type = "torque"
+on = "cam"
+law = "spline"
+points = [[0, 0], [1, 50], [3, 10], ["360 deg", 0]]
+over = { measure = "angle", of = "cam" }
+"""
+    cam = CAM.replace("segments", "repeat = true\nsegments", 1)
+    note = "[loads.gas] law: its table does not repeat; set ends = 'periodic'; [run] turns cam by 720 deg"
+    assert list(file_notes(parse(cam + force))) == [note]
+    assert list(file_notes(parse(cam + force.replace("points", 'ends = "periodic"\npoints')))) == []
+    assert list(file_notes(parse(cam.replace("stop = 2", "stop = 1") + force))) == []
+
+
+def test_gravity_without_masses_is_reported() -> None:
+    gravity = "[gravity]\nx = 0\ny = -9.81\n"
+    cam = CAM.replace("segments", "repeat = true\nsegments", 1)
+    assert list(file_notes(parse(cam + gravity))) == ["[gravity] has no effect: no body has a mass"]
+    assert list(file_notes(parse(cam.replace("{ P = [0, 0] } }", "{ P = [0, 0] }, mass = 1 }") + gravity))) == []
+
+
 def test_notes_are_in_the_report_of_an_invalid_mechanism_too() -> None:
     mechanism = parse(
         CRANK_ROCKER.replace("crank = 1.0", "crank = 1.0\nrod = 3", 1).replace("Q = [3.5, 0]", "Q = [9, 0]")

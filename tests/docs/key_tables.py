@@ -9,10 +9,11 @@ from typing import Any
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS, LawQuantity
+from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, Key, keys_of, summary_of
 from kinfmu.readings import READINGS
-from kinfmu.units import ANGLES, METRES, SECONDS, Quantity
+from kinfmu.units import ANGLES, KINDS, METRES, SECONDS, Quantity
 
 SHAPES = {
     "truth": "`true` or `false`",
@@ -36,6 +37,7 @@ def sections() -> dict[str, str]:
         "units": _units(),
         "joints": "\n".join(_types(JOINTS, "type")),
         "drivers": "\n".join(_types(DRIVERS, "type")),
+        "loads": "\n".join(_types(LOADS, "type")),
         "measures": "\n".join(_types(POSE_QUANTITIES, "measure")),
         "laws": "\n".join(_types(LAWS, "law")),
     }
@@ -66,15 +68,23 @@ def _with(page: str, texts: dict[str, str]) -> str:
 def _units() -> str:
     rows = {"length": METRES, "angle": ANGLES, "time": SECONDS}
     lines = ["| what | units |", "|---|---|"]
-    lines += [f"| {kind} | {', '.join(f'`{unit}`' for unit in units)} |" for kind, units in rows.items()]
+    lines += [f"| {kind} | {_listed(units)} |" for kind, units in rows.items()]
     lines += [
         "| speed | such as `mm/s`, `m/min` |",
         "| angular speed | such as `rad/s`, `deg/s`, `rev/min`; `rpm`; `Hz` (periods or turns per second) |",
         "| acceleration | such as `mm/s2`, `deg/s2`; also higher derivatives such as `mm/s3` |",
+        *(f"| {kind} | {_listed(KINDS[kind].units)} |" for kind in ("mass", "inertia", "force", "torque")),
+        *(f"| {kind} | {_listed(KINDS[kind].units)} |" for kind in ("stiffness", "damping")),
+        "| torsional stiffness | a torque per `rad` or `deg`, such as `N m/rad`, `N mm/deg` |",
+        "| torsional damping | such as `N m s/rad`, `N m s/deg` |",
         "| per angle or length | for cams and couplings, such as `mm/rad`, `mm/deg2`, `rad/mm` |",
         "| number | none |",
     ]
     return "\n".join(lines)
+
+
+def _listed(units: Iterable[str]) -> str:
+    return ", ".join(f"`{unit}`" for unit in units)
 
 
 def _types(classes: Iterable[Any], word: str) -> Iterable[str]:
@@ -117,7 +127,7 @@ def _measured(measures: Quantity | LawQuantity | None) -> str:
         base = {"led": "as u", "argument": "as x"}.get(measures.of, measures.of)
         return base + (" per x" if measures.order else "")
     assert measures is not None
-    return measures.kind
+    return measures.kind.replace("_", " ")
 
 
 def _default(key: Key) -> str:

@@ -11,6 +11,7 @@ import kinfmu
 from kinfmu.drivers import DRIVERS
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS
+from kinfmu.loads import LOADS
 from kinfmu.mechanism import RunSettings
 from kinfmu.mechanism.checks import MOST_BODIES
 from kinfmu.mechanism.expression import DEEPEST, LONGEST
@@ -47,13 +48,13 @@ def test_the_blocks_are_one_mechanism_that_solves() -> None:
 
 def test_every_table_of_the_format_is_on_the_page() -> None:
     named = ("bodies.NAME", "joints.NAME", "drivers.NAME")
-    tables = ("units", "parameters", *named, "points", "outputs", "run", "measures.NAME")
+    tables = ("units", "parameters", *named, "gravity", "loads.NAME", "points", "outputs", "run", "measures.NAME")
     assert [re.sub(r"[`\[\]]", "", line[3:]) for line in PAGE.splitlines() if line.startswith("## `[")] == list(tables)
 
 
 def test_the_readme_names_every_type_and_no_other() -> None:
     rows = dict(re.findall(r"^\| (?:`\[)?(\w+)[^|]*\|(.*)\|$", README, re.MULTILINE))
-    for table, classes in (("joints", JOINTS), ("drivers", DRIVERS), ("laws", LAWS)):
+    for table, classes in (("joints", JOINTS), ("drivers", DRIVERS), ("loads", LOADS), ("laws", LAWS)):
         assert re.findall(r"`([^`]+)`", rows[table]) == [cls.type for cls in classes]
 
 

@@ -20,6 +20,7 @@ from kinfmu.joints import CamRoller, Coupling, Joint
 from kinfmu.laws import LAWS, RISES, Harmonic, Law, MotionSequence, Polynomial, Segment, Spline
 from kinfmu.laws.law import number_fields
 from kinfmu.laws.spline import ENDS, PERIODIC
+from kinfmu.loads import Load
 from kinfmu.measures import POSE_QUANTITIES, DistanceBetween, PoseQuantity
 from kinfmu.measures.placement import Reference
 from kinfmu.mechanism import Body, Mechanism, Point, Start
@@ -46,13 +47,14 @@ def members(cls: type[Any], **given: st.SearchStrategy[Any]) -> st.SearchStrateg
 @cache
 def _values(cls: type[Any], key: Key) -> st.SearchStrategy[Any]:
     if key.takes == "law":
-        if issubclass(cls, Driver):
+        if issubclass(cls, Driver | Load):
             return st.sampled_from(LAWS).flatmap(laws)
         return pitch_curves() if cls is CamRoller else lifts()
     if key.takes == "measure":
-        return st.sampled_from(POSE_QUANTITIES).flatmap(measures)
+        drawn = st.sampled_from(POSE_QUANTITIES).flatmap(measures)
+        return drawn if key.default is not None else st.none() | drawn
     if isinstance(key.measures, Quantity):
-        return {"length": lengths, "angle": angles, "number": lengths, "time": lengths}[key.measures.kind]
+        return angles if key.measures.kind == "angle" else lengths
     assert key.refers is not None, f"{cls.__name__}.{key.name}: tests/joints/drawn.py does not know how to draw it"
     third = any(other.name == "between" for other in keys_of(cls))
     return _references(key.refers, is_pair=key.takes == "pair", third=third)

@@ -170,12 +170,16 @@ MESSAGES = {
     "1e999": "'1e999', character 1: the number is too large",
     "2 parsec": (
         "'2 parsec', character 3: no unit 'parsec'; "
-        "units: m, mm, cm, um, km, in, ft, rad, deg, rev, s, ms, min, h, rpm, Hz, and such as mm/s, rad/s2; "
+        "units: m, mm, cm, um, km, in, ft, rad, deg, rev, s, ms, min, h, rpm, Hz, kg, g, t, lb, N, mN, kN, MN, "
+        "lbf, Nm, mNm, kNm, Nmm, J, mJ, kJ, W, mW, kW, "
+        "and such as mm/s, rad/s2, N m; "
         "a product needs *"
     ),
     "2a": (
         "'2a', character 2: no unit 'a'; "
-        "units: m, mm, cm, um, km, in, ft, rad, deg, rev, s, ms, min, h, rpm, Hz, and such as mm/s, rad/s2; "
+        "units: m, mm, cm, um, km, in, ft, rad, deg, rev, s, ms, min, h, rpm, Hz, kg, g, t, lb, N, mN, kN, MN, "
+        "lbf, Nm, mNm, kNm, Nmm, J, mJ, kJ, W, mW, kW, "
+        "and such as mm/s, rad/s2, N m; "
         "a product needs *"
     ),
     "nan": "'nan', character 1: no parameter 'nan'; did you mean 'tan'?; parameters: a, b, long_name_2",

@@ -37,8 +37,8 @@ TYPES = (
     "rack_and_pinion, cam_translating, cam_oscillating, cam_roller, coupling"
 )
 LAWS = (
-    "constant_speed, polynomial, harmonic, simple_harmonic, cycloidal, modified_sine, modified_trapezoid, 3-4-5, "
-    "4-5-6-7, spline, sequence, external"
+    "constant_speed, constant, polynomial, harmonic, simple_harmonic, cycloidal, modified_sine, modified_trapezoid, "
+    "3-4-5, 4-5-6-7, spline, sequence, external"
 )
 LENGTHS = "m, mm, cm, um, km, in, ft"
 NAME_RULE = "must consist of at most 100 letters, digits and underscores, and not begin with a digit"
@@ -49,13 +49,13 @@ CHANGES = {
         "[joints.O]",
         "[joint.O]",
         "[joint]: unknown key; did you mean 'joints'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
     ),
     "a key of the file that is not known": (
         "title =",
         "tittle =",
         "tittle: unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
     ),
     "a key of a joint that is not known": (
         "length = 1\n",
@@ -65,7 +65,8 @@ CHANGES = {
     "a key of a body that is not known": (
         "start = { x = 0,",
         "stat = { x = 0,",
-        "[bodies.crank] stat: unknown key; did you mean 'start'?; keys: points, start",
+        "[bodies.crank] stat: unknown key; did you mean 'start'?; "
+        "keys: points, start, mass, center_of_mass, inertia, rod",
     ),
     "a coordinate of a start pose that is not known": (
         "start = { x = 0,",
@@ -114,8 +115,8 @@ CHANGES = {
     ),
     "a law that is not known": (
         'law = "constant_speed"',
-        'law = "constant"',
-        f"[drivers.crank] law = 'constant' is not known; did you mean 'constant_speed'?; known: {LAWS}",
+        'law = "constant_sped"',
+        f"[drivers.crank] law = 'constant_sped' is not known; did you mean 'constant_speed'?; known: {LAWS}",
     ),
     "points of a joint that are missing": (
         'between = ["ground.O", "crank.O"]',
@@ -313,7 +314,7 @@ CHANGES = {
         "title =",
         r'"tit\nle" =',
         r"'tit\nle': unknown key; did you mean 'title'?; "
-        "keys: name, title, units, parameters, run, bodies, joints, drivers, points, outputs, measures",
+        "keys: name, title, units, parameters, run, bodies, joints, drivers, gravity, loads, points, outputs, measures",
     ),
     "a title with a line break": (
         'title = "Four-bar',

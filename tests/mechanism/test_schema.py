@@ -18,6 +18,7 @@ from kinfmu.drivers import DRIVERS
 from kinfmu.errors import MechanismError
 from kinfmu.joints import JOINTS
 from kinfmu.laws import LAWS
+from kinfmu.loads import LOADS
 from kinfmu.measures import POSE_QUANTITIES
 from kinfmu.mechanism.declared import REQUIRED, keys_of, summary_of
 from kinfmu.mechanism.schema import schema, schema_text
@@ -91,7 +92,7 @@ def values(cls: type, table: dict[str, Any]) -> dict[str, Any]:
 def value(takes: str, refers: str, name: str) -> Any:
     names = {"point": "rod.P", "body": "rod", "choice": "x", "": ""}
     pairs = {"point": ["ground.O", "rod.P"], "body": ["arm", "rod"]}
-    if name in ("carrier", "pinion", "cam"):
+    if name in ("carrier", "pinion", "cam", "on"):
         return "third"
     shapes = {
         "number": 1.5,
@@ -118,6 +119,33 @@ def test_every_joint_has_its_table_in_the_schema(cls: Any) -> None:
     for key in list(table):
         assert not SCHEMA.is_valid(document | {"joints": {"J": {k: v for k, v in table.items() if k != key}}})
     assert not SCHEMA.is_valid(document | {"joints": {"J": table | {"odd": 1}}})
+
+
+@pytest.mark.parametrize("cls", LOADS, ids=lambda cls: cls.type)
+def test_every_load_has_its_table_in_the_schema(cls: Any) -> None:
+    table, optional = values(cls, {"type": cls.type}), {"axes": "ground", "over": {"measure": "angle", "of": "rod"}}
+    if any(key.takes == "law" for key in keys_of(cls)):
+        table |= {"law": "external"}
+    document = {"name": "a", "bodies": BODIES, "loads": {"L": table}}
+    assert list(SCHEMA.iter_errors(document)) == []
+    for key in table:
+        assert not SCHEMA.is_valid(document | {"loads": {"L": {k: v for k, v in table.items() if k != key}}})
+    assert not SCHEMA.is_valid(document | {"loads": {"L": table | {"odd": 1}}})
+    known = {key: value for key, value in optional.items() if key in {key.name for key in keys_of(cls)}}
+    assert SCHEMA.is_valid(document | {"loads": {"L": table | known}})
+
+
+def test_masses_and_gravity_are_in_the_schema() -> None:
+    def fits(body: dict[str, Any], gravity: Any = None) -> bool:
+        tables = {} if gravity is None else {"gravity": gravity}
+        return SCHEMA.is_valid({"name": "a", "bodies": BODIES | {"rod": BODIES["rod"] | body}, **tables})
+
+    assert fits({"mass": "1.2 kg", "center_of_mass": ["l/2", 0], "inertia": 0.1}, {"x": 0, "y": "-9.81 m/s2"})
+    assert fits({"mass": 1, "rod": ["O", "P"]})
+    assert not fits({"mas": 1})
+    assert not fits({"mass": 1, "rod": ["O"]})
+    assert not fits({"mass": 1, "center_of_mass": 0})
+    assert not any(fits({}, gravity) for gravity in (9.81, {"y": -9.81}, {"x": 0, "y": 0, "z": 0}))
 
 
 @pytest.mark.parametrize("cls", POSE_QUANTITIES, ids=lambda cls: cls.type)
@@ -163,7 +191,7 @@ def test_parameters_may_be_numbers_text_or_tables() -> None:
     assert not any(map(fits, [True, [1], "", "a; b", {"description": "crank"}, {"value": 1, "unit": "mm"}]))
 
 
-@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LAWS, *POSE_QUANTITIES], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [*JOINTS, *DRIVERS, *LOADS, *LAWS, *POSE_QUANTITIES], ids=lambda cls: cls.__name__)
 def test_every_key_has_a_meaning(cls: Any) -> None:
     assert summary_of(cls)
     for key in keys_of(cls):

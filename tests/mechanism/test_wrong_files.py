@@ -150,7 +150,11 @@ CHANGES = {
     ),
     "a body joined to itself": ('"rocker.Q"]', '"coupler.P"]', "[joints.Q] joins body 'coupler' to itself"),
     "a driver of the ground": ('of = "crank"', 'of = "ground"', "[drivers.crank] acts on the ground only"),
-    "a law that is unknown": ("constant_speed", "constant", "law = 'constant' is not known; did you mean 'constant_sp"),
+    "a law that is unknown": (
+        "constant_speed",
+        "constant_spd",
+        "law = 'constant_spd' is not known; did you mean 'constant_sp",
+    ),
     "a joint that is unknown": ('"revolute"', '"revolve"', "type = 'revolve' is not known; did you mean 'revolute'?"),
     "a joint without a type": ('type = "revolute", ', "", "[joints.O] needs the key 'type', one of revolute"),
     "a joint without points": (', between = ["ground.O", "crank.O"]', "", "[joints.O] needs the key 'between'"),

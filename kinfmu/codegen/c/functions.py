@@ -231,7 +231,7 @@ def _loads(parts: Parts, used: Iterable[Node]) -> list[str]:
 
 
 _BIND = "bool kf_bind(kf_model *model, const double *parameters, char *why, size_t size)"
-_HOLDS = {"positive": "{} > 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
+_HOLDS = {"positive": "{} > 0.0", "0 or more": "{} >= 0.0", "other than 0": "{} != 0.0", "0": "fabs({}) <= 1e-9"}
 
 
 def bind(parts: Parts) -> list[str]:

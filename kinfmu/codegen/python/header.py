@@ -123,7 +123,12 @@ def _may_raise(plan: SolvePlan) -> bool:
     return False
 
 
-_HOLDS = {"positive": "({}) > 0.0", "other than 0": "({}) != 0.0", "0": "abs({}) <= 1e-9"}
+_HOLDS = {
+    "positive": "({}) > 0.0",
+    "0 or more": "({}) >= 0.0",
+    "other than 0": "({}) != 0.0",
+    "0": "abs({}) <= 1e-9",
+}
 
 
 def bound(plan: SolvePlan, names: Names, prolog: Sequence[Node], functions: Sequence[str]) -> list[str]:

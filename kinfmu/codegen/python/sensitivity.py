@@ -16,7 +16,7 @@ from kinfmu.codegen.python.block_code import indented, matrix, tupled, unpacking
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.equations.graph import Node, reachable, symbols
 from kinfmu.measures.arithmetic import floor
-from kinfmu.plan.sensitivity import Assignment, SensitivitySteps, Step
+from kinfmu.plan.steps import Assignment, Stage, Step
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
 from kinfmu.solver.python.linear import factor, lu_solve, qr_factor, qr_solve
@@ -43,7 +43,7 @@ class SensitivityStage:
     """
 
     given: tuple[str, ...]
-    steps: SensitivitySteps
+    steps: Stage
     text: str
     of_sample: Fill
     of_samples: Fill
@@ -61,9 +61,9 @@ class SensitivityStage:
         return tuple(k for k, node in enumerate(self.steps.results) if node.constant != 0.0)
 
 
-def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
+def load_sensitivity(steps: Stage) -> SensitivityStage:
     """Return the compiled stage."""
-    roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
+    roots = [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
     nodes = reachable(roots)
     made = {name for step in steps.steps for name in _names(step)}
     given = tuple(symbol.name for symbol in symbols(roots) if symbol.name not in made)
@@ -84,7 +84,7 @@ def load_sensitivity(steps: SensitivitySteps) -> SensitivityStage:
 
 
 def stage_lines(
-    steps: SensitivitySteps,
+    steps: Stage,
     given: Sequence[str],
     curves: Mapping[CurveData, str],
     solve: Callable[[Entries, Entries, Sequence[str]], list[str]],
@@ -95,7 +95,7 @@ def stage_lines(
     solve: gives statements for rows of J, columns b and the names of the solutions.
     functions: names of functions called in place of sin and cos.
     """
-    roots = [node for step in steps.steps for node in _nodes(step)] + steps.results
+    roots = [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
     made = [name for step in steps.steps for name in _names(step)]
     writer = Writer(Names((*given, *made), curves, functions), (), _used_again(reachable(roots), roots))
     lines = []
@@ -110,7 +110,7 @@ def stage_lines(
     return lines + writer.statements(results), [writer.expression(node) for node in results]
 
 
-def _text(steps: SensitivitySteps, given: Sequence[str], curves: Mapping[CurveData, str]) -> str:
+def _text(steps: Stage, given: Sequence[str], curves: Mapping[CurveData, str]) -> str:
     def solve(rows: Entries, columns: Entries, names: Sequence[str]) -> list[str]:
         return [f"{tupled(names)} = solutions({matrix(rows)}, {matrix(columns)})"]
 

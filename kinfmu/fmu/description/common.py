@@ -11,7 +11,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Interface, Variable
 from kinfmu.mechanism import RunSettings
 from kinfmu.solver.python.status import Status
-from kinfmu.units import METRES, display_units
+from kinfmu.units import KINDS, METRES, display_units
 
 TOOL = "kinfmu"  # name of the annotation that identifies FMUs of kinfmu
 LOG_CATEGORIES = {
@@ -74,6 +74,10 @@ def units(root: Element, interface: Interface) -> None:
 
 def _base_unit(name: str) -> dict[str, str]:
     """Return exponents of SI base units and factor: `mm/s2` is m=1, s=-2, factor=0.001."""
+    for kind in KINDS.values():
+        if kind.unit == name:
+            powers = zip(("kg", "m", "s"), kind.powers, strict=True)
+            return {key: str(power) for key, power in powers if power}
     base, _, per = name.partition("/")
     exponents = {"s": -int(per[1:] or 1) if per else 0}
     factor = 1.0

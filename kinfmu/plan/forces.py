@@ -1,0 +1,165 @@
+"""Forces of a plan: driver efforts, reduced inertia and energies, as a list of steps on a graph.
+
+With the velocity coefficients K = dq/du of the drivers, accelerations a of the centres of mass, gravity g and the
+efforts f of loads along the quantities s through which they act, the principle of virtual work gives without reactions:
+
+    inertia_kl = sum m K_k.K_l + sum I K_k K_l                    K_k: of the centre of mass; of the angle
+    effort_k   = sum m (a - g).K_k + sum I alpha K_k - sum f ds/du_k
+    bias_k     = effort_k - sum_l inertia_kl udd_l
+
+K follows block after block from J K = -r_u, as velocities do. All forces are in SI units, whatever the mechanism's unit
+of length is. Haug (1989), chapters 6 and 7.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import NamedTuple
+
+from kinfmu.equations.graph import Graph, Node
+from kinfmu.plan.mechanics import Mechanics
+from kinfmu.plan.plan import SolvePlan
+from kinfmu.plan.steps import Step, needed_steps
+from kinfmu.units import ForceName, Quantity
+
+_INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
+_MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSteps:
+    """What is computed for forces, in order.
+
+    Symbols that no step gives are unknowns with their rates and accelerations, driver values, speeds and accelerations,
+    parameters and `time`, under their contract names; with given coefficients also these, under the names of
+    `coefficient_symbol`.
+
+    Attributes:
+        steps: Assignments and linear solves.
+        names: Of the forces.
+        results: One node for each name.
+
+    """
+
+    steps: tuple[Step, ...]
+    names: tuple[ForceName, ...]
+    results: list[Node]
+
+
+def force_names(plan: SolvePlan) -> tuple[ForceName, ...]:
+    """Return the names of efforts, inertias and energies of a mechanism; none without masses and loads."""
+    mechanism = plan.mechanism
+    if not (mechanism.has_masses or mechanism.loads):
+        return ()
+    names = []
+    for k, driver in enumerate(plan.drivers):
+        kind = driver.quantity.kind
+        effort = effort_noun(kind)
+        names += [ForceName(driver.name, effort, Quantity(effort)), ForceName(driver.name, "power", Quantity("power"))]
+        if mechanism.has_masses:
+            names.append(ForceName(driver.name, f"bias_{effort}", Quantity(effort)))
+            for other in plan.drivers[k:]:
+                noun = "reduced_inertia" if other is driver else f"reduced_inertia.{other.name}"
+                quantity = Quantity(_INERTIAS.get((kind, other.quantity.kind), _MIXED_INERTIA))
+                names.append(ForceName(driver.name, noun, quantity))
+    energies = ("kinetic_energy", "potential_energy") if mechanism.has_masses else ("potential_energy",)
+    return (*names, *(ForceName("", energy, Quantity("energy")) for energy in energies))
+
+
+def effort_noun(kind: str) -> str:
+    """Return what drives an angle, a torque, or a length, a force."""
+    return "torque" if kind == "angle" else "force"
+
+
+def force_steps(plan: SolvePlan, wanted: Sequence[str], *, given_coefficients: bool = False) -> ForceSteps:
+    """Return the steps to forces.
+
+    Args:
+        plan: The plan, as `Mechanics` takes it.
+        wanted: Names of forces, of those of `force_names`.
+        given_coefficients: The velocity coefficients are given, in place of steps that solve for them: at singular
+            points these are known better than the blocks give them.
+
+    """
+    mechanics = Mechanics(plan, given_coefficients=given_coefficients)
+    names = tuple(name for name in force_names(plan) if name in wanted)
+    found = _forces(plan, mechanics)
+    results = [found[name] for name in names]
+    return ForceSteps(needed_steps(results, mechanics.steps), names, results)
+
+
+class _Inertia(NamedTuple):
+    """A mass or a moment of inertia, and what it moves along: a coordinate of the centre of mass [m], or an angle."""
+
+    amount: Node
+    rate: Node
+    acceleration: Node  # relative to free fall
+    coefficients: tuple[Node, ...]
+
+
+def _forces(plan: SolvePlan, mechanics: Mechanics) -> dict[str, Node]:
+    """Return all forces as nodes, by name."""
+    graph, inertias = mechanics.graph, _inertias(mechanics)
+    efforts = [
+        (effort, mechanics.coefficients(quantity))
+        for load in mechanics.members.loads
+        for effort, quantity in zip(mechanics.efforts(load), mechanics.measured(load), strict=True)
+    ]
+    speeds, accelerations = (
+        [mechanics.in_si(driver.quantity.kind, graph.symbol(driver.inputs[order])) for driver in plan.drivers]
+        for order in (1, 2)
+    )
+    found: dict[str, Node] = {}
+    for k, driver in enumerate(plan.drivers):
+        of_masses = _sum(graph, (one.amount * one.acceleration * one.coefficients[k] for one in inertias))
+        effort = of_masses - _sum(graph, (amount * coefficients[k] for amount, coefficients in efforts))
+        row = [
+            _sum(graph, (one.amount * (one.coefficients[k] * one.coefficients[other]) for one in inertias))
+            for other in range(len(plan.drivers))
+        ]
+        noun = effort_noun(driver.quantity.kind)
+        found[f"{driver.name}.{noun}"] = effort
+        found[f"{driver.name}.power"] = effort * speeds[k]
+        found[f"{driver.name}.bias_{noun}"] = effort - _sum(graph, map(operator.mul, row, accelerations))
+        for other, reduced in zip(plan.drivers, row, strict=True):
+            suffix = "" if other is driver else f".{other.name}"
+            found[f"{driver.name}.reduced_inertia{suffix}"] = reduced
+    found["kinetic_energy"] = _sum(graph, (one.amount * (one.rate * one.rate) for one in inertias)) * 0.5
+    found["potential_energy"] = _potential_energy(plan, mechanics)
+    return found
+
+
+def _inertias(mechanics: Mechanics) -> list[_Inertia]:
+    """Return all that is accelerated."""
+    found = []
+    for center in mechanics.centers():
+        mass = mechanics.graph.lift(center.body.mass)
+        inertia = mechanics.graph.lift(center.body.inertia)
+        angle = mechanics.graph.lift(mechanics.pose(center.body.name).phi)
+        for amount, position, acceleration in (
+            (mass, center.position[0], center.acceleration[0]),
+            (mass, center.position[1], center.acceleration[1]),
+            (inertia, angle, center.alpha),
+        ):
+            (rate,) = mechanics.rates.of([position])
+            found.append(_Inertia(amount, rate, acceleration, mechanics.coefficients(position)))
+    return [one for one in found if one.amount.constant != 0.0]
+
+
+def _potential_energy(plan: SolvePlan, mechanics: Mechanics) -> Node:
+    """Return the energy of the centres of mass above the world's origin, and what loads store."""
+    graph = mechanics.graph
+    heights = (
+        graph.lift(center.body.mass) * g * (position + offset * mechanics.metre)
+        for center in mechanics.centers()
+        for position, offset, g in zip(center.position, plan.origin, mechanics.gravity(), strict=True)
+    )
+    stored = (graph.lift(load.energy(mechanics.measured(load))) for load in mechanics.members.loads)
+    return _sum(graph, stored) - _sum(graph, heights)
+
+
+def _sum(graph: Graph, nodes: Iterable[Node]) -> Node:
+    return reduce(operator.add, nodes, graph.constant(0.0))

@@ -1,0 +1,127 @@
+"""Masses and loads of a plan on a graph: motion of the centres of mass, quantities along which loads act.
+
+All is in SI units, whatever the mechanism's unit of length is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from kinfmu.equations.graph import Node
+from kinfmu.loads import Load
+from kinfmu.measures.placement import GROUND, BodyFrame, Placement
+from kinfmu.mechanism.body import GROUND_NAME, Body
+from kinfmu.plan.block import TimeDerivatives
+from kinfmu.plan.origin import localized
+from kinfmu.plan.plan import SolvePlan
+from kinfmu.plan.steps import Tracing
+from kinfmu.plan.trace import Tracer
+from kinfmu.units import METRES
+
+
+class Center(NamedTuple):
+    """The centre of mass of a body.
+
+    Attributes:
+        body: The body, its numbers as nodes.
+        arm: From the body's origin, in world axes [m].
+        position: Seen from the plan's origin [m].
+        acceleration: Relative to free fall [m/s2].
+        alpha: Angular acceleration of the body [rad/s2].
+
+    """
+
+    body: Body
+    arm: tuple[Node, Node]
+    position: tuple[Node, Node]
+    acceleration: tuple[Node, Node]
+    alpha: Node
+
+
+class Mechanics(Tracing):
+    """The coordinates of a plan as nodes of a new graph; masses and loads on it.
+
+    The steps give the coordinates that rows give outright, with their rates and accelerations.
+
+    Args:
+        plan: The plan. It must solve the bodies that have masses and those on which loads act.
+        given_coefficients: Derivatives of coordinates with respect to drivers are given symbols; else they are solved.
+
+    """
+
+    def __init__(self, plan: SolvePlan, *, given_coefficients: bool = False) -> None:
+        self.tracer = Tracer(localized(plan.mechanism)[0], [parameter.name for parameter in plan.parameters])
+        graph, one = self.tracer.graph, self.tracer.graph.constant(1.0)
+        changes = [{graph.symbol(driver.inputs[0]): one} for driver in plan.drivers]
+        super().__init__(graph, changes, frozenset(constant.name for constant in plan.law_constants))
+        self.members = self.tracer.members
+        self.metre = METRES[plan.mechanism.length_unit]
+        self.known = dict(zip(plan.known, self.copied(list(plan.known.values())), strict=True))
+        self.rates = TimeDerivatives(self.tracer, self.known)
+        self._per_driver = [1.0 if driver.quantity.kind == "angle" else 1.0 / self.metre for driver in plan.drivers]
+        for block in plan.blocks:
+            if given_coefficients:
+                for name in block.coordinates:
+                    for number, change in enumerate(self.changes):
+                        change[graph.symbol(name)] = graph.symbol(coefficient_symbol(name, number))
+            else:
+                self.positions(block)
+
+    def pose(self, body: str, free: str = "") -> BodyFrame:
+        """Return the frame of a body, seen from the plan's origin [length]; free: a coordinate that stays a symbol."""
+        if body == GROUND_NAME:
+            return GROUND
+        names = (f"{body}.{axis}" for axis in ("x", "y", "phi"))
+        symbols = self.tracer.symbols
+        return BodyFrame.of(*(symbols[name] if name == free else self.known.get(name, symbols[name]) for name in names))
+
+    def in_si(self, kind: str, node: Node) -> Node:
+        """Return a length in metres; an angle as it is."""
+        return node * self.metre if kind == "length" else node
+
+    def coefficients(self, node: Node) -> tuple[Node, ...]:
+        """Return the derivatives of a quantity with respect to the drivers, all in SI units."""
+        return tuple(
+            derivatives[0] * per for derivatives, per in zip(self.by_direction([node]), self._per_driver, strict=True)
+        )
+
+    def gravity(self) -> tuple[Node, Node]:
+        """Return the acceleration of gravity [m/s2]."""
+        x, y = (self.graph.lift(g) * self.metre for g in self.members.gravity or (0.0, 0.0))
+        return x, y
+
+    def centers(self) -> Iterator[Center]:
+        """Yield the centres of mass of the moving bodies."""
+        graph = self.graph
+        for body in self.members.bodies:
+            if body.is_ground:
+                continue
+            pose, (s_x, s_y) = self.pose(body.name), body.center_of_mass
+            arm_x = graph.lift(pose.c * s_x - pose.s * s_y) * self.metre
+            arm_y = graph.lift(pose.s * s_x + pose.c * s_y) * self.metre
+            x, y = graph.lift(pose.x) * self.metre + arm_x, graph.lift(pose.y) * self.metre + arm_y
+            a_x, a_y, alpha = self.rates.second([x, y, graph.lift(pose.phi)])
+            g_x, g_y = self.gravity()
+            yield Center(body, (arm_x, arm_y), (x, y), (a_x - g_x, a_y - g_y), alpha)
+
+    def placement(self, load: Load, free: str = "") -> Placement:
+        """Return the poses of the bodies of a load; free: a coordinate that stays a symbol."""
+        return Placement({name: self.pose(name, free) for name in load.bodies()}, self.members.body_points)
+
+    def measured(self, load: Load, free: str = "") -> list[Node]:
+        """Return the quantities along which a load acts [m, rad]."""
+        quantities = load.measured(self.placement(load, free))
+        return [self.in_si(kind, self.graph.lift(node)) for kind, node in zip(load.kinds(), quantities, strict=True)]
+
+    def efforts(self, load: Load) -> list[Node]:
+        """Return the efforts of a load along its quantities [N, N m]."""
+        at, measured, inputs = self.placement(load), self.measured(load), load.inputs()
+        over = load.argument(at)
+        argument = self.graph.symbol(inputs[0] if inputs else "time") if over is None else over
+        return [self.graph.lift(one) for one in load.efforts(at, measured, self.rates.of(measured), argument)]
+
+
+def coefficient_symbol(coordinate: str, driver: int) -> str:
+    """Return the name of the symbol of a coordinate's derivative with respect to a driver, by its number."""
+    return f"{coordinate}.by{driver}"

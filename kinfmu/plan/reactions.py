@@ -1,0 +1,177 @@
+"""Reactions of joints: the multipliers of their rows, block after block in reverse order.
+
+    Phi_q^T lambda = Q - M qdd        Q: generalized forces of gravity and loads
+
+A row that gives a coordinate outright has its multiplier from the equation of that coordinate; a block has those of its
+rows from the transposed Jacobian. The effort along a row, per unit of its gap, is what the joint transmits: the force
+or moment that its first body exerts on its second. Haug (1989), Lagrange multipliers and reaction forces.
+"""
+
+from __future__ import annotations
+
+from kinfmu.equations.graph import Node
+from kinfmu.equations.system import System
+from kinfmu.joints import Joint
+from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.plan.block import Block
+from kinfmu.plan.forces import ForceSteps
+from kinfmu.plan.mechanics import Mechanics
+from kinfmu.plan.origin import localized
+from kinfmu.plan.plan import SolvePlan
+from kinfmu.plan.steps import Assignment, needed_steps
+from kinfmu.plan.structure import RowTracer
+from kinfmu.units import CoordinateName, ForceName, Quantity
+
+
+def reaction_names(plan: SolvePlan) -> tuple[ForceName, ...]:
+    """Return the names of all reactions of a mechanism, one for each row of a joint; none without masses and loads."""
+    mechanism = plan.mechanism
+    if not (mechanism.has_masses or mechanism.loads):
+        return ()
+    return tuple(name for joint in mechanism.joints for name in names_of_rows(joint))
+
+
+def names_of_rows(joint: Joint) -> list[ForceName]:
+    """Return the reactions of a joint: 'pin.force_x', 'pin.force_y'; 'slide.force', 'slide.moment'."""
+    kinds, names = joint.kinds(), []
+    for label, kind in zip(joint.labels, kinds, strict=True):
+        noun, quantity = ("force", "force") if kind == "length" else ("moment", "torque")
+        suffix = f"_{label}" if kinds.count(kind) > 1 else ""
+        names.append(ForceName(joint.name, noun + suffix, Quantity(quantity)))
+    return names
+
+
+def undetermined_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:
+    """Return the reactions that redundant rows leave undetermined, each with the rows that share its load."""
+    shared: dict[str, tuple[str, ...]] = {}
+    for rows in plan.load_sharing:
+        for row in rows:
+            shared[row] = tuple(dict.fromkeys((*shared.get(row, ()), *rows)))
+    return {
+        name: shared[row] for row, name in zip(row_names(plan), reaction_names(plan), strict=False) if row in shared
+    }
+
+
+def row_names(plan: SolvePlan) -> list[str]:
+    """Return the names of the joints' rows, in the order of `reaction_names`."""
+    return [f"{joint.name}.{label}" for joint in plan.mechanism.joints for label in joint.labels]
+
+
+def reaction_steps(plan: SolvePlan) -> ForceSteps:
+    """Return the steps to the reactions of all joints, in the order of `reaction_names`.
+
+    Where redundant rows share a load, the steps give one of the possible distributions.
+
+    Args:
+        plan: The plan, as `Mechanics` takes it.
+
+    """
+    mechanics = Mechanics(plan)
+    multipliers = _Multipliers(plan, mechanics).of_row
+    zero = mechanics.graph.constant(0.0)
+    results: list[Node] = []
+    for joint in mechanics.tracer.joints:
+        for kind, scale in zip(joint.kinds(), joint.scales(), strict=True):
+            effort = -(multipliers.get(len(results), zero) * scale)
+            results.append(effort / mechanics.metre if kind == "length" else effort)
+    return ForceSteps(needed_steps(results, mechanics.steps), reaction_names(plan), results)
+
+
+class _Multipliers:
+    """The multipliers of all rows, as steps on a graph.
+
+    Attributes:
+        of_row: The multiplier of each row, by its index; rows that nothing loads have none.
+
+    """
+
+    def __init__(self, plan: SolvePlan, mechanics: Mechanics) -> None:
+        self.of_row: dict[int, Node] = {}
+        self._mechanics = mechanics
+        self._graph = mechanics.graph
+        self._system = System(localized(plan.mechanism)[0])
+        self._row = RowTracer(self._system, mechanics.tracer)
+        self._index = {row.name: index for index, row in enumerate(self._system.rows)}
+        self._open = _open_forces(mechanics)
+        mechanics.steps += [Assignment(name, node) for name, node in mechanics.known.items()]
+        for block in reversed(plan.blocks):
+            self._block(block)
+        for name, row in reversed(list(plan.known_by.items())):
+            self._outright(name, self._index[row])
+
+    def _block(self, block: Block) -> None:
+        """Balance the coordinates of a block by its rows."""
+        if block.unknowns:
+            self._solve(block)
+        for (name, _), row in zip(reversed(block.assigned), reversed(block.assigned_by), strict=True):
+            self._outright(name, self._index[row.name])
+
+    def _solve(self, block: Block) -> None:
+        """Add the multipliers of a block's rows, J^T lambda = -w; w: the open forces along its unknowns."""
+        graph, one = self._graph, self._graph.constant(1.0)
+        assigned = self._mechanics.copied([motion[0] for _, motion in block.assigned])
+        forces = []
+        for unknown in block.unknowns:
+            along = self._open_along(unknown)
+            slopes = graph.derivative(assigned, {graph.symbol(unknown): one})
+            for (name, _), slope in zip(block.assigned, slopes, strict=True):
+                along = along + self._open_along(name) * slope
+            forces.append(along)
+        if all(force.constant == 0.0 for force in forces):
+            return
+        jacobian = self._mechanics.jacobian(block)
+        transposed = tuple(zip(*jacobian, strict=True))
+        names = tuple(f"{row.name}.multiplier" for row in block.rows)
+        solved = self._mechanics.solutions(transposed, [tuple(forces)], [names])[0]
+        is_relative = len(block.rows) > len(block.unknowns)  # least squares weigh rows relative to the size
+        for row, multiplier in zip(block.rows, solved, strict=True):
+            scale = row.scale * self._system.size if is_relative else 1.0
+            self._add(self._index[row.name], multiplier / scale)
+
+    def _outright(self, name: CoordinateName, index: int) -> None:
+        """Balance a coordinate by the row that gives it."""
+        force = self._open_along(name)
+        if force.constant != 0.0:
+            self._add(index, -(force / self._slope(index, name)))
+
+    def _add(self, index: int, multiplier: Node) -> None:
+        """Add the multiplier of a row, and what it exerts along the coordinates of its bodies."""
+        if multiplier.args:
+            name = f"{self._system.rows[index].name}.lambda"
+            self._mechanics.steps.append(Assignment(name, multiplier))
+            multiplier = self._graph.symbol(name)
+        self.of_row[index] = multiplier
+        for column in self._system.members[self._system.member_of[index]].columns:
+            coordinate = self._system.coordinates[column]
+            self._open[coordinate] = self._open_along(coordinate) + self._slope(index, coordinate) * multiplier
+
+    def _open_along(self, name: str) -> Node:
+        return self._open.get(name, self._graph.constant(0.0))
+
+    def _slope(self, index: int, name: str) -> Node:
+        """Return the derivative of a row with respect to a coordinate, the others where they are."""
+        known = {other: node for other, node in self._mechanics.known.items() if other != name}
+        row = self._row(index, known)
+        return self._graph.derivative([row], {self._graph.symbol(name): self._graph.constant(1.0)})[0]
+
+
+def _open_forces(mechanics: Mechanics) -> dict[str, Node]:
+    """Return what the rows have to balance, M qdd - Q, by coordinate [J per unit of the coordinate]."""
+    graph, metre = mechanics.graph, mechanics.metre
+    found: dict[str, Node] = {}
+    for center in mechanics.centers():
+        mass, inertia = graph.lift(center.body.mass), graph.lift(center.body.inertia)
+        f_x, f_y = (mass * acceleration for acceleration in center.acceleration)
+        name = center.body.name
+        found[f"{name}.x"], found[f"{name}.y"] = f_x * metre, f_y * metre
+        found[f"{name}.phi"] = f_y * center.arm[0] - f_x * center.arm[1] + inertia * center.alpha
+    one = graph.constant(1.0)
+    for load in mechanics.members.loads:
+        efforts = mechanics.efforts(load)
+        for body in load.acts_on():
+            for axis in () if body == GROUND_NAME else ("x", "y", "phi"):
+                name = f"{body}.{axis}"
+                slopes = graph.derivative(mechanics.measured(load, free=name), {graph.symbol(name): one})
+                for effort, slope in zip(efforts, slopes, strict=True):
+                    found[name] = found[name] - effort * slope
+    return found

@@ -1,0 +1,169 @@
+"""Forces of a run: efforts of the drivers, reduced inertia, energies and reactions at all samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
+from kinfmu.errors import RequestError
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.forces import force_names, force_steps
+from kinfmu.plan.mechanics import coefficient_symbol
+from kinfmu.plan.origin import localized
+from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
+from kinfmu.plan.steps import law_symbol
+from kinfmu.plan.trace import parameter_symbol
+from kinfmu.run import FloatArray, Run
+from kinfmu.solver.python.status import Status
+from kinfmu.sweep.arguments import Setting
+from kinfmu.sweep.designs import Solvable
+from kinfmu.sweep.driving import column_of
+from kinfmu.sweep.sensitivities import native_stage, stage_results
+
+_STAGES = 3  # forces, the same with coefficients given, reactions
+Given = dict[str, FloatArray | float]
+
+
+class LoadedRun(NamedTuple):
+    """What the forces of a run are computed from.
+
+    poses: a run of the force plan; efforts: of external loads, (n,) by their inputs; times: (n,) for the laws of loads,
+    or None where driver values are given in place of times: laws over time then have no values.
+    """
+
+    poses: Run
+    setting: Setting
+    efforts: Mapping[str, FloatArray]
+    times: FloatArray | None
+
+
+def applied_efforts(known: Sequence[str], given: Mapping[str, ArrayLike], count: int) -> dict[str, FloatArray]:
+    """Return the efforts of external loads at all samples, (n,) by the names of their inputs; 0 where none is given.
+
+    Raises:
+        RequestError: An effort is not a number, or neither one number nor one for each sample.
+
+    """
+    efforts = {}
+    for name in known:
+        column = column_of(name, given.get(name, 0.0))
+        if len(column) not in (1, count):
+            raise RequestError(
+                f"{name} must be a number or have {count} values, one for each sample, not {len(column)}"
+            )
+        efforts[name] = np.broadcast_to(column, (count,)).copy()
+    return efforts
+
+
+class ForceModel:
+    """The forces of a model; code is printed when it is first needed and kept.
+
+    Args:
+        poses: A model of `force_plan`.
+
+    """
+
+    def __init__(self, poses: Solvable) -> None:
+        self.poses = poses
+        self.names = force_names(poses.plan)
+        self._native = lru_cache(maxsize=_STAGES)(native_stage)
+
+    def forces(self, run: LoadedRun) -> FloatArray:
+        """Return the forces at all samples, (n, names); NaN where the run has no numbers.
+
+        Samples that are interpolated across a singular point take the velocity coefficients from runs with unit speeds,
+        which are interpolated likewise: there the blocks do not give them.
+        """
+        status = run.poses.status
+        if status.max(initial=0) < Status.BRIDGED:
+            return self._evaluated(self._stage, self._given(run, slice(None)), len(status))
+        forces = np.full((len(status), len(self.names)), np.nan)
+        regular, bridged = np.flatnonzero(status < Status.BRIDGED), np.flatnonzero(status == Status.BRIDGED)
+        forces[regular] = self._evaluated(self._stage, self._given(run, regular), len(regular))
+        if len(bridged):
+            given = self._given(run, bridged) | self._coefficients(run, bridged)
+            forces[bridged] = self._evaluated(self._stage_of_coefficients, given, len(bridged))
+        return forces
+
+    def reactions(self, run: LoadedRun) -> FloatArray:
+        """Return the reactions at all samples, (n, reactions).
+
+        They are NaN where the run has no numbers, at samples that are interpolated across a singular point, where the
+        rows do not determine them, and for rows that share a load with redundant ones.
+        """
+        status = run.poses.status
+        names = reaction_names(self.poses.plan)
+        if status.max(initial=0) < Status.BRIDGED:
+            reactions = self._evaluated(self._reaction_stage, self._given(run, slice(None)), len(status))
+        else:
+            reactions = np.full((len(status), len(names)), np.nan)
+            regular = np.flatnonzero(status < Status.BRIDGED)
+            reactions[regular] = self._evaluated(self._reaction_stage, self._given(run, regular), len(regular))
+        reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
+        return reactions
+
+    @cached_property
+    def _stage(self) -> SensitivityStage:
+        return load_sensitivity(force_steps(self.poses.plan, self.names))
+
+    @cached_property
+    def _stage_of_coefficients(self) -> SensitivityStage:
+        return load_sensitivity(force_steps(self.poses.plan, self.names, given_coefficients=True))
+
+    @cached_property
+    def _reaction_stage(self) -> SensitivityStage:
+        return load_sensitivity(reaction_steps(self.poses.plan))
+
+    def _given(self, run: LoadedRun, samples: Any) -> Given:
+        """Return the numbers of the symbols in a stage, at some samples."""
+        plan, poses, setting = self.poses.plan, run.poses, run.setting
+        given: Given = {"time": np.nan if run.times is None else run.times[samples]}
+        given |= {name: effort[samples] for name, effort in run.efforts.items()}
+        given |= dict(zip(poses.input_names, poses.inputs[samples].T, strict=True))
+        for order, table in enumerate((poses.values, poses.rates, poses.accelerations)):
+            columns = table[samples].T
+            given |= {name.derivative(order): column for name, column in zip(plan.outputs, columns, strict=True)}
+        written = [parameter.value for parameter in plan.parameters]
+        for parameter, value in zip(plan.parameters, setting.values or written, strict=True):
+            given[parameter_symbol(parameter.name)] = value
+        for constant, value in zip(plan.law_constants, setting.constants, strict=True):
+            given[law_symbol(constant.name)] = value
+        return given
+
+    def _coefficients(self, run: LoadedRun, samples: Any) -> Given:
+        """Return the derivatives of the coordinates with respect to each driver: rates at a speed of 1."""
+        plan = self.poses.plan
+        values = {driver.inputs[0]: run.poses[driver.inputs[0]][samples] for driver in plan.drivers}
+        found: Given = {}
+        for number in range(len(plan.drivers)):
+            speeds: dict[str, Any] = {driver.inputs[1]: float(k == number) for k, driver in enumerate(plan.drivers)}
+            unit = self.poses.solve(parameters=run.setting.given, **values, **speeds)
+            found |= {coefficient_symbol(name, number): unit[name.derivative(1)] for name in plan.outputs}
+        return found
+
+    def _evaluated(self, stage: SensitivityStage, given: Mapping[str, Any], n: int) -> FloatArray:
+        """Return the results of a stage, (n, results)."""
+        native = self._native(stage) if self.poses.is_native(n) else None
+        numbers = [given[name] for name in stage.given]
+        results, _ = stage_results(stage, native, numbers, (len(stage.steps.results), n))
+        return results.T
+
+
+def force_plan(plan: SolvePlan) -> SolvePlan:
+    """Return a plan whose outputs are all coordinates that forces depend on, seen from its own origin; or the same."""
+    moving = [name for name in plan.mechanism.coordinate_names if name not in plan.known]
+    if set(moving) <= set(plan.outputs) and plan.origin == (0.0, 0.0):
+        return plan
+    local, _ = localized(plan.mechanism)
+    local, open_ones = replace(local, coordinates="moving"), [parameter.name for parameter in plan.parameters]
+    loaded = {body.name for body in local.moving_bodies if body.has_mass}
+    loaded |= {body for load in local.loads for body in load.bodies()}
+    wanted = [name for name in moving if name.owner in loaded]
+    solved = {name for block in compile_plan(local, wanted, open_ones).blocks for name in block.coordinates}
+    return compile_plan(local, [name for name in moving if name in solved], open_ones)

@@ -1,0 +1,197 @@
+"""Efforts, inertias, energies and reactions against free-body diagrams and virtual work in 50 digits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism, Run, gallery
+from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.units import METRES
+from tests.gallery.references import REFERENCES
+from tests.power_series import Series, mp, sin_cos
+
+GRAVITY = (0.6, -9.81)  # [m/s2], tilted so that both components count
+FREE_BODIES = (Revolute, Translational, Fixed, Distance, PointOnLine)  # joints whose free-body diagram is below
+every_member = pytest.mark.parametrize("name", gallery.names())
+
+
+@cache
+def loaded(name: str) -> Mechanism:
+    """A mechanism of the gallery whose bodies have masses beside their origins."""
+    mechanism = gallery.load(name)
+    metre = METRES[mechanism.length_unit]
+    size = max(abs(value) for body in mechanism.bodies for point in body.points.values() for value in point)
+    bodies = [
+        body
+        if body.is_ground
+        else replace(
+            body,
+            mass=1.0 + 0.37 * k,
+            center_of_mass=(size * (0.3 + 0.01 * k), size * (0.11 - 0.02 * k)),
+            inertia=(0.4 + 0.1 * k) * (size * metre) ** 2,
+        )
+        for k, body in enumerate(mechanism.bodies)
+    ]
+    return replace(mechanism, bodies=tuple(bodies), gravity=(GRAVITY[0] / metre, GRAVITY[1] / metre))
+
+
+def some_samples(run: Run, count: int = 7) -> list[int]:
+    good = np.flatnonzero(run.good)
+    return sorted({int(good[k]) for k in np.linspace(0, len(good) - 1, count + 2).round().astype(int)[1:-1]})
+
+
+def efforts_in_50_digits(name: str, mechanism: Mechanism, run: Run, t: float) -> list[Any]:
+    """Virtual work with coordinates, accelerations and velocity coefficients from the closed forms."""
+    reference, metre = REFERENCES[name], mp.mpf(repr(METRES[mechanism.length_unit]))
+    inputs = reference.inputs(t)
+    motion = reference.motion(t)
+    along = []  # coordinates over each driver alone
+    for driven in inputs:
+        alone = [Series([one.c[0], int(key == driven), 0]) for key, one in inputs.items()]
+        along.append(reference.coordinates(*alone))
+
+    def series(coordinates: dict[str, Any], coordinate: str) -> Series:
+        value = coordinates.get(coordinate, run.fixed.get(coordinate))
+        return value if isinstance(value, Series) else Series([value, 0, 0])
+
+    efforts = [mp.mpf(0) for _ in inputs]
+    for body in mechanism.moving_bodies:
+
+        def center(coordinates: dict[str, Any], body: Any = body) -> tuple[Series, Series, Series]:
+            x, y, phi = (series(coordinates, f"{body.name}.{axis}") for axis in ("x", "y", "phi"))
+            s, c = sin_cos(phi)
+            s_x, s_y = (mp.mpf(value) for value in body.center_of_mass)
+            return (x + c * s_x - s * s_y) * metre, (y + s * s_x + c * s_y) * metre, phi
+
+        x, y, phi = center(motion)
+        for k, (driver, coordinates) in enumerate(zip(mechanism.drivers, along, strict=True)):
+            per = 1 if driver.quantity.kind == "angle" else metre
+            k_x, k_y, k_phi = (one.c[1] / per for one in center(coordinates))
+            efforts[k] += mp.mpf(body.mass) * ((2 * x.c[2] - mp.mpf(GRAVITY[0])) * k_x)
+            efforts[k] += mp.mpf(body.mass) * ((2 * y.c[2] - mp.mpf(GRAVITY[1])) * k_y)
+            efforts[k] += mp.mpf(body.inertia) * 2 * phi.c[2] * k_phi
+    return efforts
+
+
+@every_member
+def test_efforts_equal_virtual_work_in_50_digits(name: str) -> None:
+    mechanism = loaded(name)
+    run = kinfmu.solve(mechanism)
+    columns = [f"{d.name}.{'torque' if d.quantity.kind == 'angle' else 'force'}" for d in mechanism.drivers]
+    reference = REFERENCES[name]
+    inside = [k for k in some_samples(run) if reference.first <= k < len(run) - reference.first]
+    assert inside
+    for k in inside:
+        for column, exact in zip(columns, efforts_in_50_digits(name, mechanism, run, float(run.t[k])), strict=True):
+            assert run[column][k] == pytest.approx(float(exact), rel=0, abs=1e-11 * np.nanmax(np.abs(run[column])))
+
+
+@every_member
+def test_power_is_the_rate_of_energy(name: str) -> None:
+    """sum m (a - g).v + sum I alpha omega, from the columns of the run."""
+    mechanism = loaded(name)
+    run, metre = kinfmu.solve(mechanism), METRES[mechanism.length_unit]
+    rate = np.zeros(len(run))
+    for body in mechanism.moving_bodies:
+        velocity, acceleration = center_rates(run, body, metre)
+        rate += body.mass * ((acceleration - np.array(GRAVITY)) * velocity).sum(axis=1)
+        rate += body.inertia * run[f"{body.name}.omega"] * run[f"{body.name}.alpha"]
+    power = sum(run[f"{driver.name}.power"] for driver in mechanism.drivers)
+    usual = max(np.nanmax(np.abs(run[f"{driver.name}.power"])) for driver in mechanism.drivers) + np.nanmax(
+        np.abs(rate)
+    )
+    np.testing.assert_allclose(power[run.good], rate[run.good], rtol=0, atol=1e-11 * usual)
+
+
+def center_rates(run: Run, body: Any, metre: float) -> tuple[Any, Any]:
+    """Velocity and acceleration of the centre of mass, (n, 2) in m."""
+    phi, omega, alpha = (run[f"{body.name}.{axis}"] for axis in ("phi", "omega", "alpha"))
+    s_x, s_y = body.center_of_mass
+    arm = np.stack([np.cos(phi) * s_x - np.sin(phi) * s_y, np.sin(phi) * s_x + np.cos(phi) * s_y], axis=1)
+    left = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    velocity = np.stack([run[f"{body.name}.vx"], run[f"{body.name}.vy"]], axis=1) + omega[:, None] * left
+    acceleration = np.stack([run[f"{body.name}.ax"], run[f"{body.name}.ay"]], axis=1) + alpha[:, None] * left
+    return velocity * metre, (acceleration - (omega**2)[:, None] * arm) * metre
+
+
+def place(run: Run, mechanism: Mechanism, point: str) -> Any:
+    """World place of a point, (n, 2)."""
+    name, _, own = point.partition(".")
+    s_x, s_y = next(body for body in mechanism.bodies if body.name == name).points[own]
+    if name == "ground":
+        return np.tile([s_x, s_y], (len(run), 1))
+    phi = run[f"{name}.phi"]
+    x = run[f"{name}.x"] + np.cos(phi) * s_x - np.sin(phi) * s_y
+    return np.stack([x, run[f"{name}.y"] + np.sin(phi) * s_x + np.cos(phi) * s_y], axis=1)
+
+
+def exerted(run: Run, mechanism: Mechanism, joint: Any) -> tuple[str, str, Any, Any, Any]:
+    """First and second body, force on the second (n, 2), the place where it acts, and the moment besides (n,)."""
+    a, b = (place(run, mechanism, point) for point in joint.between)
+    first, second = (point.partition(".")[0] for point in joint.between)
+    none, at = np.zeros(len(run)), b
+    if isinstance(joint, Revolute | Fixed):
+        force = np.stack([run[f"{joint.name}.force_x"], run[f"{joint.name}.force_y"]], axis=1)
+        return first, second, force, at, run[f"{joint.name}.moment"] if isinstance(joint, Fixed) else none
+    if isinstance(joint, Distance):
+        along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+        return first, second, run[f"{joint.name}.force"][:, None] * along, at, none
+    turn = joint.axis + (0.0 if first == "ground" else run[f"{first}.phi"])
+    normal = np.stack([-np.sin(turn) + none, np.cos(turn) + none], axis=1)
+    moment = run[f"{joint.name}.moment"] if isinstance(joint, Translational) else none
+    return first, second, run[f"{joint.name}.force"][:, None] * normal, at, moment
+
+
+def is_free_body_diagram_known(name: str) -> bool:
+    mechanism = gallery.load(name)
+    is_redundant = bool(kinfmu.check(mechanism).redundant)
+    crank_like = all(driver.type == "angle" for driver in mechanism.drivers)
+    return crank_like and not is_redundant and all(isinstance(joint, FREE_BODIES) for joint in mechanism.joints)
+
+
+@every_member
+def test_reactions_and_torques_balance_every_body(name: str) -> None:
+    """Newton and Euler about the centre of mass of each body, at every sample."""
+    if not is_free_body_diagram_known(name):
+        pytest.skip("another kind of joint or driver, or redundant rows")
+    mechanism = loaded(name)
+    run, metre = kinfmu.solve(mechanism), METRES[mechanism.length_unit]
+    force = {body.name: np.zeros((len(run), 2)) for body in mechanism.bodies}
+    moment = {body.name: np.zeros(len(run)) for body in mechanism.bodies}  # about the centre of mass
+    centers = {body.name: np.zeros((len(run), 2)) for body in mechanism.bodies}
+    for body in mechanism.moving_bodies:
+        phi, (s_x, s_y) = run[f"{body.name}.phi"], body.center_of_mass
+        centers[body.name] = np.stack(
+            [
+                run[f"{body.name}.x"] + np.cos(phi) * s_x - np.sin(phi) * s_y,
+                run[f"{body.name}.y"] + np.sin(phi) * s_x + np.cos(phi) * s_y,
+            ],
+            axis=1,
+        )
+    for joint in mechanism.joints:
+        first, second, on_second, at, besides = exerted(run, mechanism, joint)
+        for body, sign in ((first, -1.0), (second, 1.0)):
+            arm = (at - centers[body]) * metre
+            force[body] += sign * on_second
+            moment[body] += sign * (arm[:, 0] * on_second[:, 1] - arm[:, 1] * on_second[:, 0] + besides)
+    for driver in mechanism.drivers:
+        moment[driver.of] += run[f"{driver.name}.torque"]
+    largest = max(np.nanmax(np.abs(run.reactions)), 1e-300)
+    for body in mechanism.moving_bodies:
+        _, acceleration = center_rates(run, body, metre)
+        np.testing.assert_allclose(
+            force[body.name][run.good],
+            body.mass * (acceleration - np.array(GRAVITY))[run.good],
+            rtol=0,
+            atol=1e-10 * largest,
+        )
+        euler = body.inertia * run[f"{body.name}.alpha"]
+        np.testing.assert_allclose(
+            moment[body.name][run.good], euler[run.good], rtol=0, atol=1e-10 * largest + 1e-10 * np.abs(euler).max()
+        )
