@@ -119,6 +119,12 @@ static bool does_stream(const kf_job *job)
     return is_aligned && job->count * (int64_t)sizeof(double) * (3 * KF_OUTPUTS) > MOST_CACHED;
 }
 
+/* Return whether samples may be solved twice: not if numbers are streamed, which goes in one direction. */
+bool kf_takes_again(const kf_job *job)
+{
+    return !does_stream(job);
+}
+
 /* Complete what was streamed, up to sample `end`. */
 static void finish(kf_sweep *sweep, const kf_job *job, int64_t end)
 {

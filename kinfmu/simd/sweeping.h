@@ -33,6 +33,9 @@ bool kf_leave(kf_sweep *sweep, const kf_job *job, int64_t sample);
 /* side_by_side.c */
 bool kf_lanes_made(kf_sweep *sweep);
 bool kf_side_by_side(kf_sweep *sweep, kf_job *job, int64_t start);
+
+/* Return whether samples may be solved twice. */
+bool kf_takes_again(const kf_job *job);
 void kf_in_windows(kf_sweep *sweep, kf_job *job);
 
 #endif

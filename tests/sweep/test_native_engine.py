@@ -89,7 +89,7 @@ def test_optimizing_compilers_find_nothing_to_warn_of(monkeypatch: pytest.Monkey
 def test_most_samples_are_solved_in_lanes() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     result = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))
-    assert result.side_by_side == SAMPLES // 64 * 64  # all that fill the lanes
+    assert result.side_by_side == SAMPLES  # the last ones together with some that are solved already
     assert (result.outcomes[:, 0] == 0).all()
 
 

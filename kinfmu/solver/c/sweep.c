@@ -239,6 +239,12 @@ bool kf_sweep_run(kf_sweep *sweep, kf_job *job)
                 return false;
             }
         }
+        if (sample < job->count && kf_takes_again(job)) { /* the last ones, with some that are solved already */
+            if (!kf_side_by_side(sweep, job, job->count - KF_LANES)) {
+                return false;
+            }
+            sample = job->count;
+        }
         for (; sample < job->count; ++sample) {
             if (!kf_leave(sweep, job, sample)) {
                 return false;
