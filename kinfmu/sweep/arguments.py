@@ -48,7 +48,7 @@ class Arguments:
         self._constants_written = tuple(constant.value for constant in plan.law_constants)
         self._places = {parameter.name: k for k, parameter in enumerate(plan.parameters)}
         self._constant_places = {constant.name: k for k, constant in enumerate(plan.law_constants)}
-        self._opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
+        self.opens_expressions = any(plan.mechanism.parameters[name].expression for name in self._places)
         self._positive = {k for k, constant in enumerate(plan.law_constants) if constant.is_positive}
 
     def setting(self, given: Settings) -> Setting:
@@ -77,7 +77,7 @@ class Arguments:
             constants[place] = float(value)
             if place in self._positive and not constants[place] > 0.0:
                 self.mechanism.settable.number(name, value)  # refuses it
-        if own and self._opens_expressions:  # those that are not given follow from the others
+        if own and self.opens_expressions:  # those that are not given follow from the others
             known = {name: float(value) for name, value in given.items() if name in self._places}
             found = parameter_values(self.mechanism.parameters, known)
             values = [float(found[name]) for name in self._places]

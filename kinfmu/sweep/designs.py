@@ -132,6 +132,8 @@ class Batch:
         self.parameters = _arrays(model, parameters)
         self.count = max((len(array) for array in self.parameters.values()), default=1)
         self.values = self._rows(self.plan.parameters)
+        if model.arguments.opens_expressions:
+            self.values = np.array([self._followed(design) for design in range(self.count)])
         self.constants = self._rows(self.plan.law_constants)
 
     def part(self, part: slice) -> Batch:
@@ -158,6 +160,14 @@ class Batch:
         for k, one in enumerate(declared):
             rows[:, k] = self.parameters.get(one.name, one.value)
         return rows
+
+    def _followed(self, design: int) -> Sequence[float]:
+        """Return the values of a design, in which expressions that are not given follow from what is given."""
+        arguments = self.model.arguments
+        try:
+            return arguments.setting(self.of(design)).values or arguments.written
+        except KinfmuError:  # an invalid number, which `invalid` finds
+            return tuple(self.values[design])
 
 
 class Driving(NamedTuple):

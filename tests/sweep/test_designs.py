@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,22 @@ def test_designs_equal_solve_of_each(name: str, engine: str) -> None:
     assert designs.status.shape == (count, SAMPLES)
     assert designs.good.any() == (name != "fourbar")
     assert_as_solved(model, designs, **inputs)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_parameters_that_are_not_given_follow_from_those_that_are(engine: str) -> None:
+    crank_rocker = with_open_lengths(kinfmu.load("crank_rocker"))
+    values = {name: float(parameter.value) for name, parameter in crank_rocker.parameters.items()}
+    first, second = [name for name, length in values.items() if length != 0.0][1:3]
+    ratio = values[second] / values[first]
+    derived = replace(crank_rocker, parameters={**crank_rocker.parameters, second: f"{first}*{ratio!r}"})
+    model = kinfmu.compile(derived, parameters=[first, second], engine=engine)
+    value, angles = values[first], np.linspace(0.0, 1.5, 5)
+    designs = model.solve_designs({first: [value, 1.02 * value, np.nan]}, crank_angle=angles)
+    assert designs.good.all(axis=1).tolist() == [True, True, False]
+    for k, factor in enumerate((1.0, 1.02)):
+        run = kinfmu.compile(derived, model.outputs).solve(crank_angle=angles, parameters={first: factor * value})
+        np.testing.assert_allclose(designs.values[k], run.values, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
