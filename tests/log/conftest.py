@@ -44,7 +44,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
     return built
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")  # an open viewer draws all the time
 def viewer() -> Iterator[headless.Viewer]:
     """One invisible viewer for all recordings; skips, with the reason, where no picture can be drawn."""
     with ExitStack() as stack:
@@ -57,7 +57,7 @@ def viewer() -> Iterator[headless.Viewer]:
         yield found
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")  # an open viewer draws all the time
 def graphics(viewer: headless.Viewer) -> None:
     """Skips, with the reason, where no picture can be drawn."""
     assert viewer
