@@ -56,7 +56,7 @@ def is_printable(stage: SensitivityStage) -> bool:
     """Return True for a stage without curves and least squares, which stay in Python."""
     steps = stage.steps
     solves = [step for step in steps.steps if isinstance(step, LinearSolve)]
-    if any(len(step.jacobian) > len(step.jacobian[0]) for step in solves):
+    if any(len(step.jacobian) != len(step.jacobian[0]) for step in solves):
         return False
     roots = [step.node for step in steps.steps if not isinstance(step, LinearSolve)] + list(steps.results)
     roots += [node for step in solves for row in (*step.jacobian, *step.columns) for node in row]

@@ -19,7 +19,7 @@ from kinfmu.measures.arithmetic import floor
 from kinfmu.plan.steps import Assignment, Stage, Step
 from kinfmu.solver.python.curve import CurveData
 from kinfmu.solver.python.curve import curve as curve_value
-from kinfmu.solver.python.linear import factor, lu_solve, qr_factor, qr_solve
+from kinfmu.solver.python.linear import factor, least_norm, lu_solve, qr_factor, qr_solve
 
 FEW = 16  # samples up to which numbers are faster than arrays: numpy takes a microsecond for each operation
 FEW_WITH_SOLVES = 2  # likewise where blocks of three unknowns are solved by loops in Python
@@ -145,11 +145,14 @@ def _used_again(nodes: list[Node], roots: list[Node]) -> set[Node]:
 
 
 def _solutions_of_numbers(rows: Entries, columns: Entries) -> list[float]:
-    """Return the entries of the solutions x of J x = -b, column after column; least squares for more rows.
+    """Return the entries of the solutions x of J x = -b, column after column.
 
-    rows: of J; columns: the columns b.
+    Least squares for more rows than unknowns, the shortest x for less. rows: of J; columns: the columns b.
     """
     matrix_rows, right = [list(row) for row in rows], [[-b for b in column] for column in columns]
+    if len(rows) < len(rows[0]):
+        orthogonal = qr_factor([list(column) for column in zip(*rows, strict=True)])
+        return [entry for column in right for entry in least_norm(orthogonal, column)]
     if len(rows) > len(rows[0]):
         orthogonal = qr_factor(matrix_rows)
         return [entry for column in right for entry in qr_solve(orthogonal, column)]
@@ -168,7 +171,11 @@ def _solutions_of_arrays(rows: Entries, columns: Entries) -> list[Any]:
     for k, column in enumerate(columns):
         for i, entry in enumerate(column):
             right[:, i, k] = entry
-    if len(rows) > len(rows[0]):
+    is_wide = len(rows) < len(rows[0])
+    if is_wide:
+        orthogonal, upper = np.linalg.qr(jacobian.transpose(0, 2, 1))
+        jacobian = upper.transpose(0, 2, 1)
+    elif len(rows) > len(rows[0]):
         orthogonal, jacobian = np.linalg.qr(jacobian)
         right = orthogonal.transpose(0, 2, 1) @ right
     try:
@@ -176,6 +183,8 @@ def _solutions_of_arrays(rows: Entries, columns: Entries) -> list[Any]:
     except np.linalg.LinAlgError:  # one of them is exactly singular
         jacobian[np.linalg.det(jacobian) == 0.0] = np.nan
         solved = np.linalg.solve(jacobian, right)
+    if is_wide:
+        solved = orthogonal @ solved
     return [-solved[:, i, k] for k in range(len(columns)) for i in range(len(rows[0]))]
 
 

@@ -121,6 +121,17 @@ def qr_solve(factors: QR, right: list[float]) -> list[float]:
     return x
 
 
+def least_norm(factors: QR, right: list[float]) -> list[float]:
+    """Return the shortest x with A^T x = b, from the factors of A: x = Q R^-T b."""
+    columns, k = factors.columns, len(factors.columns)
+    x = [0.0] * len(columns[0])
+    for i in range(k):
+        x[i] = (right[i] - sum(columns[i][j] * x[j] for j in range(i))) / columns[i][i]
+    for reflector in reversed(factors.reflectors):
+        _reflect(reflector, sum(entry * entry for entry in reflector), x)
+    return x
+
+
 def unclosed(matrix: Matrix, right: list[float], damping: float) -> list[float]:
     """Return b + A x where x minimizes |A x + b|^2 + damping^2 |x|^2: the part of b outside the columns of A."""
     columns = list(zip(*matrix, strict=True))
