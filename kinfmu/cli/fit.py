@@ -42,5 +42,5 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
         result.figure(picture)
         click.echo(f"figure      {picture}")
     if not result.holds:
-        broken = ", ".join(condition.name for condition in result.conditions if not condition.holds)
+        broken = ", ".join(one.name for one in result.constraints if not one.holds)
         raise KinfmuError(f"{file}: the best design does not meet all constraints: {broken}")

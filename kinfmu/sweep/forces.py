@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
+from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.errors import RequestError
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps
@@ -109,16 +109,16 @@ class ForceModel:
         return reactions
 
     @cached_property
-    def _stage(self) -> SensitivityStage:
-        return load_sensitivity(force_steps(self.poses.plan, self.names))
+    def _stage(self) -> CompiledStage:
+        return load_stage(force_steps(self.poses.plan, self.names))
 
     @cached_property
-    def _stage_of_coefficients(self) -> SensitivityStage:
-        return load_sensitivity(force_steps(self.poses.plan, self.names, given_coefficients=True))
+    def _stage_of_coefficients(self) -> CompiledStage:
+        return load_stage(force_steps(self.poses.plan, self.names, given_coefficients=True))
 
     @cached_property
-    def _reaction_stage(self) -> SensitivityStage:
-        return load_sensitivity(reaction_steps(self.poses.plan))
+    def _reaction_stage(self) -> CompiledStage:
+        return load_stage(reaction_steps(self.poses.plan))
 
     def _given(self, run: LoadedRun, samples: Any) -> Given:
         """Return the numbers of the symbols in a stage, at some samples."""
@@ -147,7 +147,7 @@ class ForceModel:
             found |= {coefficient_symbol(name, number): unit[name.derivative(1)] for name in plan.outputs}
         return found
 
-    def _evaluated(self, stage: SensitivityStage, given: Mapping[str, Any], n: int) -> FloatArray:
+    def _evaluated(self, stage: CompiledStage, given: Mapping[str, Any], n: int) -> FloatArray:
         """Return the results of a stage, (n, results)."""
         native = self._native(stage) if self.poses.is_native(n) else None
         numbers = [given[name] for name in stage.given]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinfmu.codegen.python.sensitivity import SensitivityStage, load_sensitivity
+from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.display import Displayed
 from kinfmu.errors import CompilerError, RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
@@ -19,7 +19,7 @@ from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
 from kinfmu.plan.steps import law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
-from kinfmu.simd.sensitivity import empty_results, is_printable, load_native_sensitivity
+from kinfmu.simd.stage import empty_results, is_printable, load_native_stage
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.designs import Solvable
@@ -163,17 +163,17 @@ class SensitivityModel:
 
     def _new_stage(
         self, outputs: tuple[str, ...], parameters: tuple[str, ...], by_law: bool, given: frozenset[str]
-    ) -> tuple[SensitivityStage, tuple[str, ...]]:
+    ) -> tuple[CompiledStage, tuple[str, ...]]:
         steps = sensitivity_steps(self._model.plan, outputs, parameters, by_law=by_law, given=given)
-        return load_sensitivity(steps), steps.gap_names
+        return load_stage(steps), steps.gap_names
 
 
-def native_stage(stage: SensitivityStage) -> Native | None:
+def native_stage(stage: CompiledStage) -> Native | None:
     """Return the stage as compiled C; None where it stays in Python."""
     if not is_printable(stage):
         return None
     try:
-        return load_native_sensitivity(stage)
+        return load_native_stage(stage)
     except CompilerError:  # the library of the model was found in the cache
         return None
 
@@ -234,7 +234,7 @@ def _names(what: str, wanted: Sequence[str] | None, known: Sequence[str]) -> tup
 
 def _evaluated(
     plan: SolvePlan,
-    stage: SensitivityStage,
+    stage: CompiledStage,
     native: Native | None,
     gap_names: Sequence[str],
     outputs: tuple[str, ...],
@@ -272,7 +272,7 @@ def _evaluated(
 
 
 def stage_results(
-    stage: SensitivityStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
+    stage: CompiledStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
 ) -> tuple[FloatArray, bool]:
     """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
 

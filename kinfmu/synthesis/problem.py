@@ -17,7 +17,7 @@ from kinfmu.synthesis.constraints import CONSTRAINTS, Constraint, GrashofConstra
 from kinfmu.synthesis.lengths import Lengths
 from kinfmu.synthesis.measuring import Measuring, measuring_of
 from kinfmu.synthesis.numbers import Bounds, read_bounds
-from kinfmu.synthesis.sampled import Sampled, Tracer, sampled
+from kinfmu.synthesis.sampled import Sampled, TracedPoints, sampled
 from kinfmu.synthesis.targets import TARGETS, MeasureTarget, Target
 
 
@@ -69,12 +69,12 @@ class FitProblem:
         doubled = next((name for k, name in enumerate(names) if name in names[:k]), None)
         if doubled is not None:
             raise MechanismError(f"two targets or constraints have the name '{doubled}'")
-        unit, tracer = self.mechanism.length_unit, Tracer(self.mechanism)
+        unit, traced = self.mechanism.length_unit, TracedPoints(self.mechanism)
         argument = argument_of(self.mechanism, self.over)
         known = {str(name): name.is_angle for name in self.mechanism.coordinate_names}
         known |= {f"{point}.{axis}": False for point in self.mechanism.points for axis in ("x", "y")}
         own = [
-            sampled(target, f"[targets.{target.name}]", tracer, known, argument, unit)
+            sampled(target, f"[targets.{target.name}]", traced, known, argument, unit)
             for target in self.targets
             if not isinstance(target, MeasureTarget)
         ]
@@ -88,7 +88,7 @@ class FitProblem:
         ]
         found = {
             "argument": argument,
-            "traced": replace(self.mechanism, points=tracer.points),
+            "traced": replace(self.mechanism, points=traced.points),
             "bounds": bounds,
             "sampled": tuple(own),
             "measuring": measuring_of(self.mechanism, argument, self.targets, self.constraints),

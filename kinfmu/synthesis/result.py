@@ -76,7 +76,7 @@ class TargetErrors:
 
 
 @dataclass(frozen=True)
-class Condition:
+class ConstraintResult:
     """How far a constraint is met.
 
     Attributes:
@@ -104,7 +104,7 @@ class FitResult:
         errors: Errors of the targets. They are those of `mechanism`.
         residuals: (r,) weighted errors, without penalties.
         squares: Sum of their squares.
-        conditions: How far the constraints are met.
+        constraints: How far the constraints are met.
         optima: The local optima found, best first.
         tried: Number of designs that were solved.
         refused: How often designs could not be assembled or did not reach a sample, by reason.
@@ -118,7 +118,7 @@ class FitResult:
     errors: tuple[TargetErrors, ...]
     residuals: FloatArray
     squares: float
-    conditions: tuple[Condition, ...]
+    constraints: tuple[ConstraintResult, ...]
     optima: tuple[Optimum, ...]
     tried: int
     refused: Mapping[str, int]
@@ -132,7 +132,7 @@ class FitResult:
     @property
     def holds(self) -> bool:
         """Whether all constraints are met."""
-        return all(condition.holds for condition in self.conditions)
+        return all(one.holds for one in self.constraints)
 
     def figure(self, path: str | Path | None = None, *, ax: Axes | None = None) -> None:
         """Draw what was wanted, what is reached, and the mechanism at one pose.
@@ -186,7 +186,7 @@ def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refus
         errors=tuple(_errors(problem, found)),
         residuals=found.residuals[: found.target_count],
         squares=found.squares,
-        conditions=tuple(_conditions(problem, found)),
+        constraints=tuple(_constraints(problem, found)),
         optima=tuple(optima),
         tried=tried,
         refused=dict(refused),
@@ -239,8 +239,8 @@ def _errors(problem: FitProblem, found: Evaluation) -> list[TargetErrors]:
     return result
 
 
-def _conditions(problem: FitProblem, found: Evaluation) -> list[Condition]:
-    unit, conditions = problem.mechanism.length_unit, []
+def _constraints(problem: FitProblem, found: Evaluation) -> list[ConstraintResult]:
+    unit, constraints = problem.mechanism.length_unit, []
     for one, met in zip(problem.lengths, found.excess, strict=True):
         gap = float(met[0]) + one.gap
         text = f"p + q - s - l = {gap:.6g} {unit}, at least {one.gap:.6g} {unit}"
@@ -249,7 +249,7 @@ def _conditions(problem: FitProblem, found: Evaluation) -> list[Condition]:
                 f"; the other links exceed {one.links[one.shortest].text} by {float(met[1:].min()):.6g} {unit} or more"
             )
         violation = max(0.0, -float(met.min()))
-        conditions.append(Condition(one.name, text, violation, violation <= HOLDS * max(1.0, abs(one.gap))))
+        constraints.append(ConstraintResult(one.name, text, violation, violation <= HOLDS * max(1.0, abs(one.gap))))
     for aim, value in zip(problem.measuring.aims if problem.measuring else (), found.measured, strict=True):
         if aim.value is not None:
             continue
@@ -259,8 +259,8 @@ def _conditions(problem: FitProblem, found: Evaluation) -> list[Condition]:
         size = max(1.0, *(abs(limit) for limit in (aim.minimum, aim.maximum) if limit is not None))
         shown = "" if aim.unit == "1" else f" {aim.unit}"
         text = f"{aim.reading.type} = {float(value):.6g}{shown}, {' and '.join(limits)}{shown}"
-        conditions.append(Condition(aim.name, text, violation, violation <= HOLDS * size))
-    return conditions
+        constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size))
+    return constraints
 
 
 def argument_unit(problem: FitProblem) -> str:

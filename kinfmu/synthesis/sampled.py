@@ -76,7 +76,7 @@ class Sampled:
         return self.at is not None and not self.over
 
 
-class Tracer:
+class TracedPoints:
     """Names of the outputs of points; points that the mechanism does not list as outputs are added to it."""
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -108,7 +108,7 @@ class Tracer:
 def sampled(
     target: PathTarget | FunctionTarget | PoseTarget,
     where: str,
-    tracer: Tracer,
+    traced: TracedPoints,
     coordinates: Mapping[str, bool],
     argument: Argument,
     unit: str,
@@ -118,7 +118,7 @@ def sampled(
     Args:
         target: As declared.
         where: Its table in messages, such as '[targets.foot]'.
-        tracer: Names of the outputs of points.
+        traced: Names of the outputs of points.
         coordinates: Known outputs, and whether they are angles.
         argument: What the samples go by.
         unit: Unit of length.
@@ -138,7 +138,7 @@ def sampled(
     if isinstance(target, FunctionTarget):
         return _function(target, where, coordinates, argument, unit, common)
     if isinstance(target, PathTarget):
-        outputs: tuple[str, ...] = tracer.outputs(f"{where} of", target.of)
+        outputs: tuple[str, ...] = traced.outputs(f"{where} of", target.of)
         wanted = read_rows(f"{where} points", target.points, (LENGTH, LENGTH), unit, "[[x, y], ...]")
         scale = np.ones(2)
     else:

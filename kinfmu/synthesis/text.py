@@ -25,11 +25,11 @@ def report(result: FitResult) -> str:
     unit = argument_unit(result.problem)
     for one in result.errors:
         lines += ["", *_target(one, unit)]
-    if result.conditions:
+    if result.constraints:
         lines += ["", "constraints"]
-        for condition in result.conditions:
-            verdict = "holds" if condition.holds else f"VIOLATED by {condition.violation:.3g}"
-            lines.append(f"  {condition.name}: {verdict}; {condition.text}")
+        for met in result.constraints:
+            verdict = "holds" if met.holds else f"VIOLATED by {met.violation:.3g}"
+            lines.append(f"  {met.name}: {verdict}; {met.text}")
     lines += ["", "parameters", *_parameters(result), "", "local optima"]
     rows = [
         (f"{k}", f"{one.total:.9g}", f"{one.searches}", *(f"{value:.6g}" for value in one.parameters.values()))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import kinfmu
 from kinfmu import Mechanism
 from kinfmu.codegen.python import emit
-from kinfmu.codegen.python.sensitivity import load_sensitivity
+from kinfmu.codegen.python.stage import load_stage
 from kinfmu.errors import RequestError
 from kinfmu.gallery import names
 from kinfmu.mechanism.toml_file import parse
@@ -406,7 +406,7 @@ def test_stages_have_only_what_their_outputs_need() -> None:
     steps = sensitivity_steps(plan, ["crank.phi"], ["coupler"], by_law=False)
     assert steps.steps
     assert all(step.name.startswith("crank") for step in steps.steps)  # type: ignore[union-attr]
-    assert load_sensitivity(steps).places == (0, 1)
+    assert load_stage(steps).places == (0, 1)
 
 
 def test_a_model_of_few_outputs_gives_their_derivatives() -> None:

@@ -76,7 +76,7 @@ def test_constraints_are_met_exactly_at_the_cost_of_the_targets() -> None:
     assert bound.holds
     assert lengths[1] + lengths[2] - lengths[0] - lengths[3] >= 1.0 - 1e-6
     assert kinfmu.measure(run, [swing])["s"].value <= np.radians(30.0) + 1e-6
-    assert [condition.name for condition in bound.conditions] == ["turns", "swing", "margin"]
+    assert [one.name for one in bound.constraints] == ["turns", "swing", "margin"]
 
 
 def test_a_constraint_that_cannot_hold_is_reported() -> None:
@@ -85,7 +85,7 @@ def test_a_constraint_that_cannot_hold_is_reported() -> None:
     result = kinfmu.fit(_problem(constraints=[impossible]), starts=1, engine="python")
 
     assert not result.holds
-    assert result.conditions[0].violation > 1.0
+    assert result.constraints[0].violation > 1.0
     assert "turns: VIOLATED by" in str(result)
 
 

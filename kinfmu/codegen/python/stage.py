@@ -1,4 +1,7 @@
-"""Sensitivity stage: a function of one sample, and of all samples at once; printed when first needed."""
+"""A stage of steps compiled: a function of one sample, and of all samples at once.
+
+Sensitivities, forces and reactions are stages; they are printed when first needed.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,8 @@ Entries = Sequence[Sequence[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class SensitivityStage:
-    """A compiled sensitivity stage.
+class CompiledStage:
+    """A stage compiled as Python.
 
     Attributes:
         given: Names of the symbols whose values the functions take, in this order.
@@ -61,7 +64,7 @@ class SensitivityStage:
         return tuple(k for k, node in enumerate(self.steps.results) if node.constant != 0.0)
 
 
-def load_sensitivity(steps: Stage) -> SensitivityStage:
+def load_stage(steps: Stage) -> CompiledStage:
     """Return the compiled stage."""
     roots = [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
     nodes = reachable(roots)
@@ -70,17 +73,17 @@ def load_sensitivity(steps: Stage) -> SensitivityStage:
     data = dict.fromkeys(node.curve[0] for node in nodes if node.op == "curve")
     curves = {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
     text = _text(steps, given, curves)
-    code = compile(text, "<sensitivity stage>", "exec")
+    code = compile(text, "<stage>", "exec")
     constants = {name: one for one, name in curves.items()}
 
     def function(operations: dict[str, Any]) -> Fill:
         namespace = operations | constants
         exec(code, namespace)  # noqa: S102  our own generated source
-        fill: Fill = namespace["sensitivities"]
+        fill: Fill = namespace["results"]
         return fill
 
     few = FEW if all(isinstance(step, Assignment) for step in steps.steps) else FEW_WITH_SOLVES
-    return SensitivityStage(given, steps, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
+    return CompiledStage(given, steps, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
 
 
 def stage_lines(
@@ -117,8 +120,8 @@ def _text(steps: Stage, given: Sequence[str], curves: Mapping[CurveData, str]) -
     lines, results = stage_lines(steps, given, curves, solve)
     return "\n".join(
         [
-            "def sensitivities(given):",
-            '    """Return outputs and their derivatives with respect to parameters, without those that are 0."""',
+            "def results(given):",
+            '    """Return the results that are not 0."""',
             *unpacking(map(identifier, given), "given"),
             *indented(lines),
             f"    return {tupled(results)}",

@@ -1,4 +1,4 @@
-"""Sensitivity stage in C: the statements of `kinfmu.codegen.python.sensitivity`, compiled, for samples side by side."""
+"""A stage of steps in C: the statements of `kinfmu.codegen.python.stage`, compiled, for samples side by side."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kinfmu.codegen.c import compiler
 from kinfmu.codegen.c.text import array
-from kinfmu.codegen.python.sensitivity import SensitivityStage, stage_lines
+from kinfmu.codegen.python.stage import CompiledStage, stage_lines
 from kinfmu.codegen.writer import identifier
 from kinfmu.equations.graph import reachable
 from kinfmu.errors import KinfmuError
@@ -52,7 +52,7 @@ class _Solve(NamedTuple):
     names: Sequence[str]
 
 
-def is_printable(stage: SensitivityStage) -> bool:
+def is_printable(stage: CompiledStage) -> bool:
     """Return True for a stage without curves and least squares, which stay in Python."""
     steps = stage.steps
     solves = [step for step in steps.steps if isinstance(step, LinearSolve)]
@@ -63,7 +63,7 @@ def is_printable(stage: SensitivityStage) -> bool:
     return all(node.op != "curve" for node in reachable(roots))
 
 
-def sensitivity_source(stage: SensitivityStage) -> str:
+def stage_source(stage: CompiledStage) -> str:
     """Return the C source of a stage: loops over the samples of a block, with linear solves between them."""
     solves: list[_Solve] = []
 
@@ -110,7 +110,7 @@ def sensitivity_source(stage: SensitivityStage) -> str:
             *body,
             "}",
             "",
-            "int kf_sensitivities(const kf_stage *stage)",
+            "int kf_evaluate(const kf_stage *stage)",
             "{",
             "    return kf_fill(stage, places, fill);",
             "}",
@@ -160,7 +160,7 @@ def _words(lines: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.findall(r"\b[A-Za-z_]\w*", "\n".join(lines))))
 
 
-def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[FloatArray | float], FloatArray], bool]:
+def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | float], FloatArray], bool]:
     """Return the compiled stage.
 
     It fills the rows of `empty_results` that are not 0, from arrays (n,) or single numbers, and returns whether all are
@@ -171,7 +171,7 @@ def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[Float
 
     """
     texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
-    files = {"sensitivities.c": sensitivity_source(stage)} | texts | compiler.sources(("sincos.h",))
+    files = {"evaluate.c": stage_source(stage)} | texts | compiler.sources(("sincos.h",))
     library = compiler.load(files, FLAGS)
 
     def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
@@ -184,9 +184,9 @@ def load_native_sensitivity(stage: SensitivityStage) -> Callable[[Sequence[Float
         steps = np.array([array is not None for array in arrays], dtype=np.int64)
         n, pitch, start = results.shape[1], results.strides[0] // results.itemsize, results.ctypes.data
         job = _Stage(n, starts.ctypes.data, steps.ctypes.data, start, pitch, results.size > LARGE)
-        answer: int = library.kf_sensitivities(ctypes.byref(job))
+        answer: int = library.kf_evaluate(ctypes.byref(job))
         if answer < 0:
-            raise KinfmuError(f"no memory is left for the sensitivities of {n} samples")
+            raise KinfmuError(f"no memory is left for the results of {n} samples")
         return answer == 1
 
     return fill
@@ -201,4 +201,4 @@ def empty_results(rows: int, n: int) -> FloatArray:
     return whole[first : first + rows * pitch].reshape(rows, pitch)[:, :n]
 
 
-__all__ = ["empty_results", "is_printable", "load_native_sensitivity", "sensitivity_source"]
+__all__ = ["empty_results", "is_printable", "load_native_stage", "stage_source"]
