@@ -304,3 +304,9 @@ class ForceName(str):
 
     def __getnewargs__(self) -> tuple[str, str, Quantity]:  # type: ignore[override]  # for copies: what `__new__` takes
         return self.owner, self.noun, self.quantity
+
+
+def read_force(text: str, kind: str) -> ForceName | None:
+    """Return the force, inertia or energy that a name in a file states; None if the text is no such name."""
+    owner, _, noun = text.partition(".") if "." in text else ("", "", text)
+    return ForceName(owner, noun, Quantity(kind)) if noun and text[0] != "." and kind in KINDS else None

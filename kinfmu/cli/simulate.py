@@ -42,8 +42,9 @@ LOGS = Path("logs")
 @click.option(
     "--channels",
     metavar="NAMES",
-    help="What to log, separated by commas: q, qd, qdd, points, inputs, residual, iterations, margin, error, watch, "
-    "drawn (for viewers), columns such as coupler.*; -error,-margin: all but these; none: no logs. Default: all.",
+    help="What to log, separated by commas: q, qd, qdd, points, inputs, forces, reactions, residual, iterations, "
+    "margin, error, watch, drawn (for viewers), columns such as coupler.*; -error,-margin: all but these; none: no "
+    "logs. Default: all.",
 )
 @click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), help="Samples to log per second of the run.")
 @on_interrupt("stopped before the first sample: nothing was kept")

@@ -23,7 +23,7 @@ from kinfmu.solver.python.status import Status
 
 FORMAT = "2"  # increased when older files can no longer be read the same way
 _INTEGERS = ("status", "iterations")
-_TABLES = ("inputs", "values", "rates", "accelerations", "error", "watch")  # of several columns
+_TABLES = ("inputs", "values", "rates", "accelerations", "forces", "reactions", "error", "watch")  # of several columns
 
 
 def description(run: Run) -> dict[str, str]:
@@ -40,6 +40,9 @@ def description(run: Run) -> dict[str, str]:
         "length_unit": run.length_unit,
         "axis": run.axis,
     }
+    for table, names in (("forces", run.force_names), ("reactions", run.reaction_names)):
+        if names:
+            lists[table] = {name: name.quantity.kind for name in names}
     return {"format": FORMAT} | {key: json.dumps(value, ensure_ascii=False) for key, value in lists.items()}
 
 
@@ -55,7 +58,7 @@ def lists_in(texts: Mapping[str, str]) -> dict[str, Any]:
     about = lists_of(texts)
     names = [place.name for place in _empty(about, 0).places()]
     if names != about["columns"]:
-        raise LogError("columns of the record do not match its outputs, inputs and watches")
+        raise LogError("columns of the record do not match its outputs, inputs, forces and watches")
     return about
 
 
@@ -126,7 +129,9 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
     outputs, inputs, watches = (about[key] for key in ("outputs", "input_names", "watch_names"))
     widths = dict.fromkeys(("values", "rates", "accelerations"), len(outputs))
     widths |= {"inputs": len(inputs), "error": 3, "watch": len(watches)}
+    widths |= {table: len(about[table]) for table in ("forces", "reactions")}
     blank: dict[str, Any] = {name: np.empty((n, widths[name])) for name in _TABLES}
+    blank |= {table: None for table in ("forces", "reactions") if not about[table]}
     blank["inputs"] = np.zeros((n, len(inputs)))  # they are read before they are filled
     blank |= {name: np.empty(n) for name in ("residual", "margin")}
     blank |= {name: np.zeros(n, np.int64) for name in _INTEGERS}
@@ -137,6 +142,8 @@ def _empty(about: Mapping[str, Any], n: int) -> Run:
         fixed=about["fixed"],
         input_names=inputs,
         watch_names=tuple(watches),
+        force_names=about["forces"],
+        reaction_names=about["reactions"],
         length_unit=about["length_unit"],
         absent=frozenset(about["absent"]),
         axis=about["axis"],

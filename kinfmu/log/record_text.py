@@ -11,7 +11,7 @@ from kinfmu.errors import LogError, listed
 from kinfmu.mechanism.valid import is_line, quoted
 from kinfmu.run import MOST_SAMPLES, Event
 from kinfmu.run.axis import SAMPLE, TIME
-from kinfmu.units import METRES, read_coordinate, read_inputs
+from kinfmu.units import METRES, ForceName, read_coordinate, read_force, read_inputs
 
 MOST_COLUMNS = 500_000  # three times those of the largest mechanism
 LEVELS = ("info", "warning", "error")
@@ -44,11 +44,21 @@ def lists_of(texts: Mapping[str, str]) -> dict[str, Any]:
     found["axis"] = axis = _value(texts, "axis") if "axis" in texts else TIME  # older records have no axis
     if not isinstance(axis, str):
         raise LogError(f"axis of the record = {quoted(axis)} must be the name of an input, or {TIME} or {SAMPLE}")
+    found |= {table: _forces(texts, table) for table in ("forces", "reactions")}
     if found["coordinate_count"] > len(found["outputs"]):
         raise LogError(f"coordinate_count of the record = {found['coordinate_count']} is more than its outputs")
     if len(set(found["columns"])) < len(found["columns"]):
         raise LogError("columns of the record hold a name twice")
     return found
+
+
+def _forces(texts: Mapping[str, str], key: str) -> tuple[ForceName, ...]:
+    """Return the names of forces or of reactions; none in records of mechanisms without masses and loads."""
+    kinds = _value(texts, key) if key in texts else {}
+    names = [read_force(*entry) for entry in kinds.items()] if _are_texts(kinds) and _are_lines(list(kinds)) else [None]
+    if None in names or len(names) > MOST_COLUMNS:
+        raise LogError(f"{key} of the record = {quoted(kinds)} must be kinds of quantities, such as 'torque', by name")
+    return tuple(name for name in names if name is not None)
 
 
 def samples_of(texts: Mapping[str, str]) -> int:

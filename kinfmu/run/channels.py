@@ -23,10 +23,10 @@ def absent_columns(run: Run, names: Sequence[str] | None) -> frozenset[str]:
 
     Args:
         run: The run, with or without samples.
-        names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'residual',
-            'iterations', 'margin', 'error', 'watch'; columns such as 'coupler.vx', with * for any letters; 'drawn', the
-            topics of an MCAP file that viewers draw by themselves. A minus in front leaves out: ['-error', '-margin']
-            is all but those. None: all.
+        names: 'all', 'none'; groups 'inputs', 'q', 'qd', 'qdd', 'points' (of interest, with rates), 'forces' (efforts,
+            inertias, energies), 'reactions', 'residual', 'iterations', 'margin', 'error', 'watch'; columns such as
+            'coupler.vx', with * for any letters; 'drawn', the topics of an MCAP file that viewers draw by themselves. A
+            minus in front leaves out: ['-error', '-margin'] is all but those. None: all.
 
     Returns:
         Names of the absent columns. Time and status are always kept, and the inputs of a run over these.
@@ -157,6 +157,8 @@ def _groups(run: Run) -> dict[str, set[str]]:
         "points": {name.derivative(order) for name in points for order in range(3)},
         **{name: {f"solver.{name}"} for name in ("status", "residual", "iterations", "margin")},
         "error": {f"solver.error_{name}" for name in ("q", "qd", "qdd")},
+        "forces": set(run.force_names),
+        "reactions": set(run.reaction_names),
         "watch": {f"watch.{name}" for name in run.watch_names},
         DRAWN: {DRAWN},
     }

@@ -260,9 +260,18 @@ class Run(Displayed):
                 shape = len(self) if places[0].column is None else (len(self), len(places))
                 tables[name] = np.zeros(shape, np.int64) if name == "iterations" else np.full(shape, np.nan)
             elif gone:
-                tables[name] = np.array(getattr(self, name))
-                tables[name][:, gone] = np.nan
+                tables[name] = self._blanked(name, gone)
         return self.replaced(**tables, absent=absent)
+
+    def _blanked(self, name: str, gone: list[int]) -> Any:
+        """Return a table with NaN in some columns; one that is lazy stays so."""
+
+        def blanked() -> FloatArray:
+            table = np.array(getattr(self, name))
+            table[:, gone] = np.nan
+            return table
+
+        return blanked if callable(self.__dict__[name]) else blanked()
 
     def columns(self) -> Iterator[Column]:
         """Yield every column that was kept: time, inputs, values, rates, accelerations, diagnostics, watches."""
