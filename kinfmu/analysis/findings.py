@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinfmu.analysis.drivers import DriverAdvice
+from kinfmu.analysis.loading import Loading
 from kinfmu.analysis.measuring import Measurements
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, SingularPoint
@@ -30,7 +31,7 @@ class Findings:
 
     ranges: one per driver, in file order; loops: the four-bars and slider-cranks among the joints; advice: on drivers,
     None where drivers and degrees of freedom match; notes: further findings, one line each;
-    measured: values of the measures, None without measures.
+    measured: values of the measures, None without measures; loading: efforts and reactions, None without masses, loads.
     """
 
     mechanism: Mechanism
@@ -42,6 +43,7 @@ class Findings:
     advice: DriverAdvice | None = None
     notes: tuple[str, ...] = ()
     measured: Measurements | None = None
+    loading: Loading | None = None
 
     @property
     def mobility(self) -> int:
@@ -105,6 +107,10 @@ class Findings:
         (coordinates), suggestions (name, and the keys of the driver's table).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
         reason (why the value is null), refused: reason by name; null without measures.
+        forces, only with masses or loads: over (the motion, as text), efforts and largest_reaction (of a joint; null if
+        none is determined): name, value (the peak with its sign), unit, driver, at (driver value), at_unit, rms;
+        reduced_inertias: name, smallest, largest, unit; undetermined: reactions, and rows that share their load;
+        reason (why there are no numbers), samples_without_numbers.
         notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.
         """
         plan, mechanism = self.plan, self.mechanism
@@ -136,6 +142,7 @@ class Findings:
             "loops": [loop.as_json() for loop in self.loops],
             "advice": None if self.advice is None else self.advice.as_json(),
             "measures": None if self.measured is None else self.measured.as_json(),
+            **({} if self.loading is None else {"forces": self.loading.as_json()}),
             "notes": list(self.notes),
             "problem": str(self.problem) if self.problem else None,
         }

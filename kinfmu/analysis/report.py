@@ -8,6 +8,7 @@ from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.drivers import clearer_problem, driver_advice
 from kinfmu.analysis.file_notes import file_notes, run_notes, start_notes
 from kinfmu.analysis.findings import Findings
+from kinfmu.analysis.loading import loading
 from kinfmu.analysis.matrices import Matrix, pose_matrices
 from kinfmu.analysis.measuring import measurements
 from kinfmu.analysis.named_loops import find_named_loops
@@ -57,7 +58,7 @@ class Report(Findings, Displayed):
 
 
 def check(mechanism: Mechanism) -> Report:
-    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, measures.
+    """Check a mechanism: mobility, redundancy, plan, drivers, loops, singular points, ranges, measures, forces.
 
     Args:
         mechanism: The mechanism to check.
@@ -90,4 +91,4 @@ def check(mechanism: Mechanism) -> Report:
     loops = find_named_loops(mechanism, redundancy, paths)
     notes += motion_notes(mechanism, paths, loops)
     measured = measurements(mechanism, ranges)
-    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes), measured)
+    return Report(mechanism, redundancy, None, plan, ranges, loops, None, tuple(notes), measured, loading(plan, ranges))

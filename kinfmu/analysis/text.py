@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import NamedTuple
 
 from kinfmu.analysis.findings import Findings
+from kinfmu.analysis.loading import Peak
 from kinfmu.analysis.loops import FourBar, Link, SliderCrank
 from kinfmu.analysis.named_loops import NamedLoop
 from kinfmu.analysis.singular import DriverRange, LimitPosition
@@ -36,7 +38,7 @@ class ReportLine(NamedTuple):
 def findings(report: Findings) -> list[ReportLine]:
     """Return the findings in order."""
     found: list[ReportLine] = []
-    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _measures, _notes):
+    for parts in (_count, _rows, _plan, _advice, _loops, _motion, _measures, _forces, _notes):
         found += parts(report)
     if report.problem is not None:
         found.append(ReportLine("problem", str(report.problem)))
@@ -231,6 +233,37 @@ def _measures(report: Findings) -> Iterator[ReportLine]:
         )
     for name, reason in measured.refused.items():
         yield ReportLine("", _no_value(name, reason))
+
+
+def _forces(report: Findings) -> Iterator[ReportLine]:
+    loading = report.loading
+    if loading is None:
+        return
+    missing = f"; {loading.missing} samples have no numbers" if loading.missing and not loading.reason else ""
+    yield ReportLine("forces", f"over {loading.over}{missing}")
+    if loading.reason:
+        yield ReportLine("", f"no values, because {loading.reason}")
+    for effort in loading.efforts:
+        yield ReportLine("", f"{effort.name}: peak {_peak_text(effort)}, rms {effort.rms:.6g} {effort.unit}")
+    for inertia in loading.inertias:
+        ends = f"{inertia.smallest:.6g} to {inertia.largest:.6g} {inertia.unit}"
+        yield ReportLine("", f"{inertia.name}: {ends}")
+    if loading.reaction is not None:
+        yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
+    redundant = {row.row.name: row.row.owner for row in report.redundant}
+    for names, rows in loading.undetermined:
+        others = [row for row in rows if row in redundant]
+        joints = {redundant[row] for row in others}
+        shared = [name for name in names if name.partition(".")[0] not in joints]
+        yield ReportLine("", f"statically indeterminate: {_names(shared)} share the load with {_names(others)}")
+
+
+def _peak_text(peak: Peak) -> str:
+    """Return a peak with its unit and where it occurs: '-12.3 N m (crank at 45 deg)'."""
+    if not math.isfinite(peak.value):
+        return "without a finite value"
+    at = degrees(peak.at) if peak.at_unit == "rad" else f"{peak.at:.6g} {peak.at_unit}"
+    return f"{peak.value:.6g} {peak.unit} ({peak.driver} at {at})"
 
 
 def _no_value(name: str, reason: str) -> str:

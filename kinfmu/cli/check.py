@@ -42,7 +42,7 @@ def check(
     """Check a mechanism and report its properties.
 
     Mobility, redundant and inconsistent constraints, the solving order, ranges of the drivers, singular points, and the
-    measures of the file.
+    measures of the file. With masses or loads also efforts of the drivers, reduced inertia and the largest reaction.
     """
     from kinfmu.analysis import check as checked
 

@@ -1,0 +1,179 @@
+"""Efforts and reactions of a mechanism with masses or loads over the motion that measures are taken of.
+
+Peaks are those of the samples: 360 in a turn of the driver, or those of the file's run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from kinfmu.analysis.measuring import SAMPLES_PER_TURN
+from kinfmu.analysis.singular import DriverRange
+from kinfmu.errors import KinfmuError
+from kinfmu.laws import ConstantSpeed, External
+from kinfmu.mechanism import Mechanism
+from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import effort_noun
+from kinfmu.plan.reactions import undetermined_reactions
+from kinfmu.run import FloatArray, Run
+from kinfmu.run.axis import axis_of
+from kinfmu.sweep import solve
+from kinfmu.units import unit_of
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest size of a force, with its sign, and where it occurs.
+
+    name: Of a column, such as 'crank.torque', or of a joint; driver: in whose values `at` is; 'time' if several move;
+    rms: Root of the mean square over the motion.
+    """
+
+    name: str
+    value: float
+    unit: str
+    driver: str
+    at: float
+    at_unit: str
+    rms: float
+
+
+@dataclass(frozen=True)
+class Span:
+    """The smallest and the largest value of a reduced inertia."""
+
+    name: str
+    smallest: float
+    largest: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Loading:
+    """Forces over a motion.
+
+    over: the motion, as text; efforts: of each driver; inertias: reduced; reaction: the joint that transmits the
+    largest determined force; undetermined: reactions that share a load, with the rows that share it; reason: why there
+    are no numbers, '' if there are; missing: samples without numbers.
+    """
+
+    over: str
+    efforts: tuple[Peak, ...] = ()
+    inertias: tuple[Span, ...] = ()
+    reaction: Peak | None = None
+    undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
+    reason: str = ""
+    missing: int = 0
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the forces as plain data."""
+        return {
+            "over": self.over,
+            "efforts": [asdict(effort) for effort in self.efforts],
+            "reduced_inertias": [asdict(inertia) for inertia in self.inertias],
+            "largest_reaction": None if self.reaction is None else asdict(self.reaction),
+            "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
+            "reason": self.reason or None,
+            "samples_without_numbers": self.missing,
+        }
+
+
+def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
+    """Return the forces of a mechanism over its motion; None without masses and loads.
+
+    A single driver with a constant speed, or without a law, that turns all the way round makes one cycle, without a law
+    at 1 rad/s; any other motion is the run of the file.
+
+    Args:
+        plan: The plan of the mechanism.
+        ranges: Ranges of its drivers.
+
+    """
+    mechanism = plan.mechanism
+    if not (mechanism.has_masses or mechanism.loads):
+        return None
+    undetermined: dict[tuple[str, ...], list[str]] = {}
+    for name, rows in undetermined_reactions(plan).items():
+        undetermined.setdefault(rows, []).append(name)
+    shared = tuple((tuple(names), rows) for rows, names in undetermined.items())
+    try:
+        arguments, over = _motion(mechanism, ranges)
+        run = solve(mechanism, **arguments)
+        over = over or f"the run of the file, {axis_of(run).range()}"
+        missing = int((~run.good).sum())
+        if missing == len(run):
+            return Loading(over, undetermined=shared, reason="no sample has numbers", missing=missing)
+        efforts = tuple(_peak(run, name, run[name]) for name in _efforts(mechanism))
+        return Loading(over, efforts, tuple(_inertias(run)), _largest_reaction(run), shared, missing=missing)
+    except KinfmuError as reason:
+        return Loading("no motion", undetermined=shared, reason=str(reason))
+
+
+def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
+    """Return the motion as `solve` takes it, over time where a law gives it, since laws of loads may need times."""
+    if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
+        return {}, ""
+    (driver,), turns = mechanism.drivers, ranges[0].turns
+    count = "one turn" if turns == 1 else f"{turns} turns"
+    angle, speed_name, _ = driver.inputs()
+    turned = np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)
+    if isinstance(driver.law, External):
+        start = float(driver.law.at(mechanism.run.start))
+        return {angle: start + turned, speed_name: 1.0}, f"{count} of {driver.name} at 1 rad/s"
+    if isinstance(driver.law, ConstantSpeed) and (speed := float(driver.law.speed)):
+        unit = unit_of(speed_name.quantity, mechanism.length_unit)
+        times = mechanism.run.start + turned / abs(speed)
+        return {"t": times}, f"{count} of {driver.name} at {speed:.6g} {unit}"
+    return {}, ""
+
+
+def _efforts(mechanism: Mechanism) -> list[str]:
+    return [f"{driver.name}.{effort_noun(driver.quantity.kind)}" for driver in mechanism.drivers]
+
+
+def _inertias(run: Run) -> Iterator[Span]:
+    """Yield the ranges of the reduced inertias."""
+    for name in run.force_names:
+        values = run[name][np.isfinite(run[name])]
+        if name.noun.startswith("reduced_inertia") and len(values):
+            unit = unit_of(name.quantity, run.length_unit)
+            yield Span(name, float(values.min()), float(values.max()), unit)
+
+
+def _largest_reaction(run: Run) -> Peak | None:
+    """Return the largest force that a joint transmits; None if there is none that is determined."""
+    found: dict[str, list[FloatArray]] = {}
+    for name in run.reaction_names:
+        if name.quantity.kind == "force":
+            found.setdefault(name.owner, []).append(run[name])
+    peaks = [_peak(run, joint, np.hypot.reduce(parts)) for joint, parts in found.items()]
+    return max((peak for peak in peaks if np.isfinite(peak.value)), key=lambda peak: peak.value, default=None)
+
+
+def _peak(run: Run, name: str, values: FloatArray) -> Peak:
+    """Return the largest size of a column, NaN if it has no numbers."""
+    known = np.isfinite(values)
+    sizes = np.where(known, np.abs(values), -1.0)
+    k = int(np.argmax(sizes))
+    several = len(run.input_names) != 3
+    at = float(run.t[k] if several else run.inputs[k, 0])
+    driver, at_unit = "time", "s"
+    if not several:
+        driver, at_unit = run.input_names[0].driver, unit_of(run.input_names[0].quantity, run.length_unit)
+    unit = next((place.unit for place in run.places() if place.name == name), "N")
+    value = float(values[k]) if known[k] else math.nan
+    return Peak(name, value, unit, driver, at, at_unit, _rms(run, values))
+
+
+def _rms(run: Run, values: FloatArray) -> float:
+    """Return the root of the mean square over time by the trapezoidal rule; samples without numbers do not count."""
+    steps = np.diff(run.t)
+    weights = np.append(steps, 0.0) + np.append(0.0, steps) if steps.any() else np.ones(len(run))
+    known = np.isfinite(values)
+    total = float(weights[known].sum())
+    return math.sqrt(float((weights[known] * np.square(values[known])).sum()) / total) if total > 0.0 else math.nan

@@ -1,0 +1,108 @@
+"""Efforts, reduced inertia and reactions in the report of check, against closed forms."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+import kinfmu
+from kinfmu.mechanism.toml_file import parse
+from tests.sweep.test_forces import loaded
+
+ARM = """
+name = "arm"
+units = { length = "mm" }
+gravity = { x = 0, y = "-10 m/s2" }
+
+[bodies]
+ground.points = { O = [0, 0] }
+arm = { points = { O = [0, 0] }, mass = "2 kg", center_of_mass = [300, 0], inertia = "0.5 kg m2" }
+
+[joints]
+O = { type = "revolute", between = ["ground.O", "arm.O"] }
+
+[drivers.arm]
+type = "angle"
+of = "arm"
+law = "constant_speed"
+start = 0
+speed = 4
+"""
+
+
+def test_an_arm_that_turns_has_the_torque_of_its_weight() -> None:
+    """Torque m g r cos(phi), inertia I + m r^2, and at the lowest point the reaction m g + m r omega^2."""
+    report = kinfmu.check(parse(ARM, "arm.toml"))
+    found = report.loading
+    assert found is not None
+    assert found.over == "one turn of arm at 4 rad/s"
+    (torque,) = found.efforts
+    assert (torque.name, torque.unit, torque.driver, torque.at_unit) == ("arm.torque", "N m", "arm", "rad")
+    assert abs(torque.value) == pytest.approx(6.0, rel=1e-12)
+    assert torque.rms == pytest.approx(6.0 / math.sqrt(2.0), rel=1e-12)
+    (inertia,) = found.inertias
+    assert (inertia.smallest, inertia.largest) == pytest.approx((0.68, 0.68), rel=1e-12)
+    assert found.reaction is not None
+    assert (found.reaction.name, found.reaction.unit) == ("O", "N")
+    assert found.reaction.value == pytest.approx(20.0 + 2.0 * 0.3 * 16.0, rel=1e-12)
+    assert found.reaction.at == pytest.approx(1.5 * math.pi, rel=1e-12)
+    assert found.undetermined == ()
+    text = str(report)
+    assert "  forces      over one turn of arm at 4 rad/s\n" in text
+    assert ", rms 4.24264 N m\n              arm.reduced_inertia: 0.68 to 0.68 kg m2\n" in text
+    assert "              largest reaction: O 29.6 N (arm at 270 deg)" in text
+
+
+def test_json_has_the_same_numbers() -> None:
+    report = kinfmu.check(parse(ARM, "arm.toml"))
+    found = json.loads(json.dumps(report.as_json()))["forces"]
+    assert found["over"] == "one turn of arm at 4 rad/s"
+    assert abs(found["efforts"][0]["value"]) == pytest.approx(6.0, rel=1e-12)
+    assert found["largest_reaction"]["value"] == pytest.approx(29.6, rel=1e-12)
+    assert found["reduced_inertias"][0]["name"] == "arm.reduced_inertia"
+    assert (found["undetermined"], found["reason"], found["samples_without_numbers"]) == ([], None, 0)
+
+
+def test_undetermined_reactions_are_named_with_the_row_that_shares_the_load() -> None:
+    report = kinfmu.check(loaded("fourbar"))
+    assert report.loading is not None
+    assert report.loading.reaction is None
+    words = "statically indeterminate: O.force_x, O.force_y, P.force_x, P.force_y, C.force_x, C.force_y, "
+    assert f"{words}Q.force_x, Q.force_y share the load with AB.length" in str(report)
+    ((names, rows),) = report.loading.undetermined
+    assert "AB.force" in names
+    assert rows[0] == "AB.length"
+
+
+def test_other_motions_are_the_run_of_the_file() -> None:
+    report = kinfmu.check(loaded("excavator"))
+    assert report.loading is not None
+    assert report.loading.over == "the run of the file, t = 0 to 5 s"
+    assert [effort.name for effort in report.loading.efforts] == [
+        f"{name}_cylinder.force" for name in ("boom", "stick", "bucket")
+    ]
+    assert {effort.driver for effort in report.loading.efforts} == {"time"}
+
+
+def test_without_masses_and_loads_nothing_is_reported_of_forces() -> None:
+    report = kinfmu.check(kinfmu.load("slider_crank"))
+    assert report.loading is None
+    assert "forces" not in report.as_json()
+    assert "  forces" not in str(report)
+
+
+def test_a_load_moves_the_peak() -> None:
+    """Without a mass, the torque balances a constant torque on the arm."""
+    mechanism = parse(ARM, "arm.toml")
+    (ground, arm) = mechanism.bodies
+    light = replace(arm, mass=0.0, inertia=0.0, center_of_mass=(0.0, 0.0))
+    text = '[loads.brake]\ntype = "torque"\non = "arm"\nlaw = "constant"\nlevel = "-3 N m"\n'
+    loads = parse(ARM + text, "arm.toml").loads
+    report = kinfmu.check(replace(mechanism, bodies=(ground, light), loads=loads))
+    assert report.loading is not None
+    assert report.loading.efforts[0].value == pytest.approx(3.0, rel=1e-12)
+    assert report.loading.efforts[0].rms == pytest.approx(3.0, rel=1e-12)
+    assert report.loading.inertias == ()
