@@ -1,10 +1,10 @@
-"""plot(): coordinates of a run over time or driver values, each with velocity and acceleration, for a report."""
+"""plot(): coordinates of a run over time or driver values, with velocity and acceleration, and forces, for a report."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -12,23 +12,25 @@ from kinfmu.draw.chart import SMALL, dress
 from kinfmu.draw.curves import LOST, curves, gaps, rows_of
 from kinfmu.draw.sheet import FONT, GREY, INCH, INK, TITLE_FONT, TITLE_LINE, ink, title_lines
 from kinfmu.draw.writing import check_suffix, check_target, write
-from kinfmu.errors import FigureError
+from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import FloatArray, Run
 from kinfmu.run.axis import ROUND_OFF, Axis, axis_of, shown_range
-from kinfmu.run.channels import coordinates
+from kinfmu.run.channels import coordinates, forces
 from kinfmu.scene import palette
-from kinfmu.units import CoordinateName, unit_of
+from kinfmu.units import CoordinateName, ForceName, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MOST_COORDINATES = 30  # more make a sheet too large to print
-_ABREAST = 3  # coordinates in a row
+_ABREAST = 3  # columns of panels in a row
+_PANELS = 3  # of a column
 _WIDTH, _HEIGHT = 244.0, 96.0  # [pt], of a panel with its margins
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 22.0, 44.0, 34.0  # [pt] around all panels; the last tick has half its number there
 _BETWEEN, _GAP, _BLOCK_GAP = 62.0, 14.0, 52.0  # [pt] between coordinates, their panels, and rows of coordinates
 _EDGE = 8.0  # [pt] around the title
+_FORCES: palette.Colour = (185, 28, 28)  # that of driving arrows in drawings
 _LABEL = 40.0  # [pt] from an axis to its name
 
 
@@ -46,23 +48,24 @@ def plot(
     """Draw `run` over its axis, usually time: coordinates into a .svg or .png file, or columns into Axes of matplotlib.
 
     In a file, each coordinate has three panels: position, velocity and acceleration, in rad and the mechanism's unit of
-    length. Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text
+    length. With masses or loads, efforts and energies have a panel each, and so have reactions that are named, in SI
+    units. Samples without numbers are gaps on a tinted background; a panel of a column that was not kept has the text
     "not kept". The same run gives the same bytes. Into Axes, each column is a curve with its name as the label, in your
     settings of matplotlib; several calls draw several runs into the same Axes.
 
     Args:
         run: The run.
         path: The .svg or .png file.
-        columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q' or '-crank.phi', as in tables. Default: all
-            generalized coordinates. With `ax`: columns of one unit, such as 'coupler.vx', with * for any letters.
-            Default: all generalized coordinates, if they have one unit.
+        columns: Of a file: names such as 'coupler.x', 'coupler.*', 'q', '-crank.phi' or 'reactions', as in tables.
+            Default: all generalized coordinates, efforts and energies. With `ax`: columns of one unit, such as
+            'coupler.vx', with * for any letters. Default: all generalized coordinates, if they have one unit.
         ax: Axes to draw into, in place of a file.
 
     Returns:
         `ax`; None for a file.
 
     Raises:
-        RequestError: A name is not a coordinate or, with `ax`, not a column.
+        RequestError: A name is not a coordinate or a force or, with `ax`, not a column.
         FigureError: There are more than MOST_COORDINATES coordinates, the run has no samples, the suffix is unknown, or
             the file cannot be written; neither or both of `path` and `ax` are given; curves for `ax` have two units.
         MissingPackageError: matplotlib is not installed.
@@ -73,97 +76,164 @@ def plot(
         return curves(ax, run, columns)
     path = Path(str(path))
     check_suffix(path)
-    names = _chosen(run, columns, path)
-    write(path, lambda: _sheet(run, names))
+    stacks = _chosen(run, columns, path)
+    write(path, lambda: _sheet(run, stacks))
     return None
 
 
-def _chosen(run: Run, columns: Sequence[str], path: Path) -> tuple[CoordinateName, ...]:
-    """Return the names of the coordinates to plot."""
-    names = coordinates(run, columns) if columns else run.names or run.outputs
-    if len(names) > MOST_COORDINATES:
-        raise FigureError(
-            f"{path}: {len(names)} coordinates are too many for one sheet, which holds {MOST_COORDINATES}; choose some "
-            f"of them by name, such as {names[0]}"
+class Panel(NamedTuple):
+    """A panel: a column, its name on the axis, its unit, order of derivative, and the coordinate or force."""
+
+    column: str
+    label: str
+    unit: str
+    order: int
+    name: CoordinateName | ForceName
+
+
+class Stack(NamedTuple):
+    """Panels below each other, with a title."""
+
+    title: str
+    panels: tuple[Panel, ...]
+
+
+def stacks_of(run: Run, columns: Sequence[str]) -> list[Stack]:
+    """Return what to plot: a stack for each coordinate, and for the forces of each driver or joint."""
+    chosen = forces(run, columns)
+    names = list(columns)
+    if chosen and not any(name.startswith("-") for name in names):
+        names = [name for name in names if not forces(run, [name]) or _chooses_coordinates(run, name)]
+    coordinate_names = run.names or run.outputs
+    if columns:
+        coordinate_names = coordinates(run, names) if names else ()
+    per = axis_of(run).per
+    found = []
+    for name in coordinate_names:
+        nouns = [name.derivative(order) for order in range(3)]
+        units = [unit_of(name.quantity(order, per), run.length_unit) for order in range(3)]
+        panels = [
+            Panel(column, column.removeprefix(f"{name.owner}."), unit, order, name)
+            for order, (column, unit) in enumerate(zip(nouns, units, strict=True))
+        ]
+        found.append(Stack(name, tuple(panels)))
+    for owner in dict.fromkeys(force.owner for force in chosen):
+        own = [force for force in chosen if force.owner == owner]
+        panels = [Panel(name, name.noun, unit_of(name.quantity, run.length_unit), 0, name) for name in own]
+        found += [Stack(owner or "energy", tuple(panels[k : k + _PANELS])) for k in range(0, len(panels), _PANELS)]
+    return found
+
+
+def _chooses_coordinates(run: Run, name: str) -> bool:
+    """Return True if a name of columns chooses coordinates."""
+    try:
+        return bool(coordinates(run, [name]))
+    except RequestError:
+        return False
+
+
+def _chosen(run: Run, columns: Sequence[str], path: Path) -> list[Stack]:
+    """Return the stacks of panels to plot."""
+    stacks = stacks_of(run, columns)
+    if len(stacks) > MOST_COORDINATES:
+        what = (
+            "coordinates" if all(isinstance(s.panels[0].name, CoordinateName) for s in stacks) else "columns of panels"
         )
-    if not len(run) or not names:
-        raise FigureError(f"{path}: the run has no {'samples' if names else 'coordinates'} to plot")
-    return names
+        raise FigureError(
+            f"{path}: {len(stacks)} {what} are too many for one sheet, which holds {MOST_COORDINATES}; choose some "
+            f"of them by name, such as {stacks[0].panels[0].column}"
+        )
+    if not len(run) or not stacks:
+        raise FigureError(f"{path}: the run has no {'samples' if stacks else 'coordinates'} to plot")
+    return stacks
 
 
-def _sheet(run: Run, names: Sequence[CoordinateName]) -> Figure:
+def _sheet(run: Run, stacks: Sequence[Stack]) -> Figure:
     from matplotlib.figure import Figure
 
     axis = axis_of(run)
-    abreast = min(len(names), _ABREAST)
-    blocks = -(-len(names) // _ABREAST)
-    block = 3.0 * _HEIGHT + _BLOCK_GAP
+    abreast = min(len(stacks), _ABREAST)
+    rows = [stacks[k : k + _ABREAST] for k in range(0, len(stacks), _ABREAST)]
+    blocks = [max(len(stack.panels) for stack in row) * _HEIGHT + _BLOCK_GAP for row in rows]
     width = _LEFT + abreast * _WIDTH - _BETWEEN + _RIGHT
     title = title_lines(run.info.get("title") or run.info.get("name") or "", width - 2.0 * _EDGE)
     above = _TOP + max(len(title) - 1, 0) * TITLE_LINE
-    height = above + blocks * block - _BLOCK_GAP - _GAP + _BOTTOM
+    height = above + sum(blocks) - _BLOCK_GAP - _GAP + _BOTTOM
     made = Figure(figsize=(width / INCH, height / INCH), dpi=INCH, facecolor="white")
     look: dict[str, Any] = {"fontsize": TITLE_FONT, "va": "top", "color": ink(INK), "parse_math": False}
     made.text(_EDGE / width, 1.0 - _EDGE / height, "\n".join(title), **look)
-    for index, name in enumerate(names):
+    for index, stack in enumerate(stacks):
         row, column = divmod(index, _ABREAST)
         left = _LEFT + column * _WIDTH
         panels: list[Axes] = []
-        for order in range(3):
-            top = height - above - row * block - order * _HEIGHT
+        for place, panel in enumerate(stack.panels):
+            top = height - above - sum(blocks[:row]) - place * _HEIGHT
             size = ((_WIDTH - _BETWEEN) / width, (_HEIGHT - _GAP) / height)
             axes = made.add_axes((left / width, (top - _HEIGHT + _GAP) / height, *size))
             panels.append(axes)
-            _panel(axes, run, axis, name, order)
-        for axes in panels[:2]:
+            _panel(axes, run, axis, panel)
+        for axes in panels[:-1]:
             axes.tick_params(labelbottom=False)
-        panels[0].set_title(name, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
-        panels[2].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
+        panels[0].set_title(stack.title, fontsize=FONT + 1.0, loc="left", color=ink(INK), parse_math=False)
+        panels[-1].set_xlabel(axis.label, fontsize=SMALL, color=ink(GREY), labelpad=1.0)
         for axes in panels:
             axes.yaxis.set_label_coords(-_LABEL / (_WIDTH - _BETWEEN), 0.5)
     return made
 
 
-def _panel(axes: Axes, run: Run, axis: Axis, name: CoordinateName, order: int) -> None:
+def _panel(axes: Axes, run: Run, axis: Axis, panel: Panel) -> None:
     """Draw one curve over the whole run."""
-    column = name.derivative(order)
-    is_kept = column not in run.absent
-    values = np.where(run.good, np.asarray(run[column], dtype=float), np.nan) if is_kept else np.full(len(run), np.nan)
+    is_kept = panel.column not in run.absent
+    values = np.full(len(run), np.nan)
+    if is_kept:
+        values = np.where(run.good, np.asarray(run[panel.column], dtype=float), np.nan)
     known = values[np.isfinite(values)]
     rows = rows_of(values)
-    colour = ink((palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[order])
+    is_force = isinstance(panel.name, ForceName)
+    colour = ink(_FORCES if is_force else (palette.BODIES[5], palette.BODIES[2], palette.BODIES[4])[panel.order])
     look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "solid_joinstyle": "round"}
     if len(known) < 2:
         look |= {"marker": "o", "markersize": 3.0}
     axes.plot(axis.values[rows], values[rows], **look)
     dress(axes, "")
     axes.set_xlim(*_span(axis.values))
-    shown = _shown(run, axis, name, order, known)
+    shown = _shown(run, axis, panel, known)
     if shown:
         axes.set_ylim(*shown)
     axes.locator_params(axis="y", nbins=4)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
-    unit = unit_of(name.quantity(order, axis.per), run.length_unit).replace("2", "\N{SUPERSCRIPT TWO}")
-    axes.set_ylabel(f"{column.removeprefix(f'{name.owner}.')} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
-    if not is_kept:
-        axes.text(0.5, 0.5, "not kept", fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
+    unit = panel.unit.replace("2", "\N{SUPERSCRIPT TWO}")
+    axes.set_ylabel(f"{panel.label} [{unit}]", fontsize=SMALL, color=ink(GREY), labelpad=3.0)
+    if not is_kept or (is_force and not len(known)):
+        words = "not determined" if is_kept else "not kept"
+        axes.text(0.5, 0.5, words, fontsize=SMALL, ha="center", transform=axes.transAxes, color=ink(GREY))
     for first, last in gaps(run, axis.values):
         axes.axvspan(first, last, color=ink(LOST), linewidth=0.0, zorder=0.0)
 
 
-def _shown(run: Run, axis: Axis, name: CoordinateName, order: int, known: FloatArray) -> tuple[float, float] | None:
+def _shown(run: Run, axis: Axis, panel: Panel, known: FloatArray) -> tuple[float, float] | None:
     """Return the range of an axis, so that noise about a constant is a straight line; None for matplotlib's default."""
     if not len(known):
         return -1.0, 1.0
-    same_kind = [k for k, other in enumerate(run.outputs) if other.is_angle == name.is_angle]
-    positions = run.values[run.good][:, same_kind]
-    size = float(np.max(np.abs(positions), initial=0.0, where=np.isfinite(positions)))
-    usual = size / (axis.span or 1.0) ** order
+    usual = _usual(run, axis, panel)
     if np.ptp(known) <= ROUND_OFF * np.abs(known).max():
         middle = float(known.mean())
         half = 0.5 * abs(middle) or usual or 1.0
         return middle - half, middle + half
     return shown_range(known, usual)
+
+
+def _usual(run: Run, axis: Axis, panel: Panel) -> float:
+    """Return the size of what is like a curve: positions with their derivatives, or efforts of the same quantity."""
+    name = panel.name
+    if isinstance(name, ForceName):
+        tables = ((run.force_names, run.forces), (run.reaction_names, run.reactions))
+        names, table = next((names, table) for names, table in tables if name in names)
+        like = np.asarray(table)[:, [other.quantity == name.quantity for other in names]]
+    else:
+        like = run.values[run.good][:, [other.is_angle == name.is_angle for other in run.outputs]]
+    size = float(np.max(np.abs(like), initial=0.0, where=np.isfinite(like)))
+    return size if isinstance(name, ForceName) else size / (axis.span or 1.0) ** panel.order
 
 
 def _span(t: FloatArray) -> tuple[float, float]:

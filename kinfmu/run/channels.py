@@ -10,7 +10,7 @@ import numpy as np
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.run.axis import TIME
 from kinfmu.run.run import FloatArray, IntArray, Run
-from kinfmu.units import CoordinateName
+from kinfmu.units import CoordinateName, ForceName
 
 ALWAYS = ("time", "solver.status")  # without them a sample has no meaning
 DRAWN = "drawn"
@@ -129,6 +129,24 @@ def coordinates(run: Run, names: Sequence[str]) -> tuple[CoordinateName, ...]:
             found = _of_coordinates(name, owners, groups, columns)
             kept |= dict.fromkeys(column for column in owners if column in found)
     return tuple(dict.fromkeys(owners[column] for column in kept if column in owners))
+
+
+def forces(run: Run, names: Sequence[str]) -> tuple[ForceName, ...]:
+    """Return the forces and reactions that `names` choose, in the order of the run.
+
+    Args:
+        run: The run.
+        names: As in `absent_columns`. None given, or a minus in front of the first: all but reactions.
+
+    """
+    known = {str(name): name for name in (*run.force_names, *run.reaction_names)}
+    groups = {group: found & known.keys() for group, found in _groups(run).items()}
+    kept = set(map(str, run.force_names)) if not names or names[0].startswith("-") else set()
+    for name in names:
+        bare = name.removeprefix("-")
+        found = groups[bare] if bare in groups else {column for column in known if fnmatchcase(column, bare)}
+        kept = kept - found if name.startswith("-") else kept | found
+    return tuple(name for column, name in known.items() if column in kept)
 
 
 def _of_coordinates(

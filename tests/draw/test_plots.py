@@ -9,15 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kinfmu
 from kinfmu.draw import plot
 from kinfmu.draw.curves import gaps, rows_of
-from kinfmu.draw.plots import _sheet, _shown
+from kinfmu.draw.plots import _sheet, _shown, stacks_of
 from kinfmu.errors import FigureError, RequestError
 from kinfmu.run import Run
 from kinfmu.run.axis import axis_of
-from kinfmu.run.channels import coordinates, select
+from kinfmu.run.channels import select
 from kinfmu.units import CoordinateName
 from tests.log.runs import fourbar, with_gap
+from tests.sweep.test_forces import loaded
 
 
 @pytest.fixture
@@ -26,7 +28,7 @@ def run() -> Run:
 
 
 def test_each_coordinate_is_three_panels_with_its_numbers_and_units(run: Run) -> None:
-    panels = _sheet(run, coordinates(run, ["coupler.x", "rocker.phi"])).axes
+    panels = _sheet(run, stacks_of(run, ["coupler.x", "rocker.phi"])).axes
     assert [panel.get_ylabel() for panel in panels] == [
         "x [m]",
         "vx [m/s]",
@@ -59,7 +61,7 @@ def test_a_gap_breaks_the_curve_on_a_tinted_ground(run: Run) -> None:
     assert gaps(with_gap(run, 0, 180), run.t) == [(0.0, 180.0)]
     assert gaps(with_gap(with_gap(run, 0, 3), 170, 180), run.t) == [(0.0, 4.0), (169.0, 180.0)]
     assert gaps(run, run.t) == []
-    panel = _sheet(gap, coordinates(gap, ["coupler.x"])).axes[0]
+    panel = _sheet(gap, stacks_of(gap, ["coupler.x"])).axes[0]
     assert len(panel.patches) == 1
     assert np.flatnonzero(np.isnan(panel.lines[0].get_ydata())).tolist() == list(range(100, 121))
 
@@ -68,12 +70,12 @@ def test_noise_about_a_constant_is_a_straight_line(run: Run) -> None:
     noise = 1e-16 * np.random.default_rng(3).normal(size=len(run))
     values = run.values + noise[:, None] * (np.array(run.outputs) == "coupler.phi")
     noisy = dataclasses.replace(run, values=values)
-    shown = _shown(noisy, axis_of(noisy), CoordinateName("coupler", "phi"), 0, noisy["coupler.phi"])
+    shown = _shown(noisy, axis_of(noisy), stacks_of(noisy, ["coupler.phi"])[0].panels[0], noisy["coupler.phi"])
     assert shown
     assert shown[1] - shown[0] > 1.0
-    low, high = _shown(run, axis_of(run), CoordinateName("crank", "phi"), 1, run["crank.omega"]) or (0.0, 0.0)
+    low, high = _shown(run, axis_of(run), stacks_of(run, ["crank.phi"])[0].panels[1], run["crank.omega"]) or (0.0, 0.0)
     assert low < run["crank.omega"][0] < high
-    assert _shown(run, axis_of(run), CoordinateName("coupler", "x"), 0, run["coupler.x"]) is None
+    assert _shown(run, axis_of(run), stacks_of(run, ["coupler.x"])[0].panels[0], run["coupler.x"]) is None
 
 
 def test_a_long_run_is_drawn_by_its_extremes() -> None:
@@ -88,13 +90,13 @@ def test_a_long_run_is_drawn_by_its_extremes() -> None:
 def test_one_sample_and_a_constant_coordinate_are_plotted_too(run: Run, tmp_path: Path) -> None:
     plot(fourbar(np.array([60.0])), tmp_path / "one.png", ["coupler.x"])
     plot(with_gap(run, 0, 180), tmp_path / "none.png", ["coupler.x"])
-    panels = _sheet(run, coordinates(run, ["rocker.x"])).axes
+    panels = _sheet(run, stacks_of(run, ["rocker.x"])).axes
     assert set(panels[0].lines[0].get_ydata()) == {1.0}
     assert set(panels[1].lines[0].get_ydata()) == {0.0}
 
 
 def test_a_column_that_was_not_kept_is_an_empty_panel_with_a_note(run: Run) -> None:
-    panels = _sheet(select(run, ["q"]), coordinates(select(run, ["q"]), ["coupler.x"])).axes
+    panels = _sheet(select(run, ["q"]), stacks_of(select(run, ["q"]), ["coupler.x"])).axes
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [[], ["not kept"], ["not kept"]]
 
 
@@ -111,3 +113,42 @@ def test_what_cannot_be_plotted_is_reported(run: Run, tmp_path: Path) -> None:
     with pytest.raises(FigureError, match="the run has no samples to plot"):
         plot(fourbar(np.array([])), tmp_path / "run.svg")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Run:
+    return kinfmu.solve(loaded("slider_crank"))
+
+
+def test_efforts_and_energies_are_panels_with_their_units(heavy: Run) -> None:
+    stacks = stacks_of(heavy, ["forces"])
+    assert [stack.title for stack in stacks] == ["crank", "crank", "energy"]
+    panels = _sheet(heavy, stacks).axes
+    assert [panel.get_ylabel() for panel in panels] == [
+        "torque [N m]",
+        "power [W]",
+        "bias_torque [N m]",
+        "reduced_inertia [kg m²]",
+        "kinetic_energy [J]",
+        "potential_energy [J]",
+    ]
+    np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), heavy["crank.torque"])
+
+
+def test_reactions_are_plotted_if_they_are_named(heavy: Run) -> None:
+    columns = [panel.column for stack in stacks_of(heavy, []) for panel in stack.panels]
+    assert {"crank.torque", "kinetic_energy", "rod.ax"} <= set(columns)
+    assert not set(heavy.reaction_names) & set(columns)
+    (pin,) = stacks_of(heavy, ["O.*"])
+    assert (pin.title, [panel.column for panel in pin.panels]) == ("O", ["O.force_x", "O.force_y"])
+    assert [panel.unit for panel in pin.panels] == ["N", "N"]
+    without = stacks_of(heavy, ["-forces"])
+    assert [stack.title for stack in without] == list(heavy.names)
+    with pytest.raises(RequestError, match=r"no coordinate 'O\.forse_x'"):
+        stacks_of(heavy, ["crank.torque", "O.forse_x"])
+
+
+def test_reactions_without_values_say_so() -> None:
+    run = kinfmu.solve(loaded("fourbar"), np.arange(5.0))
+    (axes,) = _sheet(run, stacks_of(run, ["AB.force"])).axes
+    assert [text.get_text() for text in axes.texts] == ["not determined"]

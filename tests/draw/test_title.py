@@ -11,10 +11,9 @@ import pytest
 
 from kinfmu import load
 from kinfmu.draw import figure, plot
-from kinfmu.draw.plots import _sheet
+from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.draw.sheet import Sheet, title_lines
 from kinfmu.run import Run
-from kinfmu.run.channels import coordinates
 from tests.log.runs import fourbar
 
 pytest.importorskip("matplotlib")
@@ -65,7 +64,7 @@ def test_the_title_of_a_figure_is_in_the_picture(title: str, unit: str | None) -
 
 @pytest.mark.parametrize("title", ["Four-bar", LONG, "W" * 200])
 def test_the_title_of_plots_is_in_the_picture_and_above_the_names(title: str) -> None:
-    figure = _sheet(titled(title), coordinates(fourbar(np.arange(10.0)), ["coupler.x"]))
+    figure = _sheet(titled(title), stacks_of(fourbar(np.arange(10.0)), ["coupler.x"]))
     figure.canvas.draw()
     (box,) = (text.get_window_extent() for text in figure.texts)
     assert box.x1 <= figure.bbox.x1
@@ -78,7 +77,7 @@ def test_the_number_of_the_last_tick_is_in_the_picture(stop: float) -> None:
     run = fourbar(np.arange(10.0))
     figure = _sheet(
         dataclasses.replace(run, t=np.linspace(0.0, stop, 10)),
-        coordinates(run, ["coupler.x", "coupler.y"]),
+        stacks_of(run, ["coupler.x", "coupler.y"]),
     )
     figure.canvas.draw()
     assert figure.axes[-1].xaxis.get_tightbbox().x1 <= figure.bbox.x1

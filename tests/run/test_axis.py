@@ -12,14 +12,14 @@ import pytest
 import kinfmu
 from kinfmu import Run
 from kinfmu.draw import animate
-from kinfmu.draw.plots import _sheet
+from kinfmu.draw.plots import _sheet, stacks_of
 from kinfmu.errors import LogError, RequestError
 from kinfmu.log import read, write_mcap
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.series import groups
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run.axis import axis_of, shown_range
-from kinfmu.run.channels import coordinates, select
+from kinfmu.run.channels import select
 from kinfmu.run.verdict import sentence
 
 TURN = np.linspace(0.0, math.tau, 361)
@@ -110,7 +110,7 @@ def test_a_part_of_a_sweep_keeps_its_axis(sweep: Run) -> None:
 
 
 def test_pictures_and_reports_say_the_axis(sweep: Run, tmp_path: Path) -> None:
-    panels = _sheet(sweep, coordinates(sweep, ["coupler.x"])).axes
+    panels = _sheet(sweep, stacks_of(sweep, ["coupler.x"])).axes
     assert [panel.get_ylabel() for panel in panels] == ["x [mm]", "vx [mm/rad]", "ax [mm/rad²]"]
     assert panels[2].get_xlabel() == "crank [deg]"
     np.testing.assert_array_equal(panels[0].lines[0].get_xdata(), np.arange(361.0))
