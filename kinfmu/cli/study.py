@@ -9,11 +9,10 @@ from pathlib import Path
 import click
 
 from kinfmu.cli.arguments import InputFile, OutputFile, names_in
+from kinfmu.cli.check import FIGURES
 from kinfmu.cli.group import main
 from kinfmu.cli.messages import printable
 from kinfmu.errors import KinfmuError
-
-FIGURES = (".svg", ".png")
 
 
 @main.command(epilog="Example: kinfmu study tolerances.toml --figure tolerances.svg")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from kinfmu.errors import MechanismError, RequestError, listed, suggestion
 from kinfmu.files.whole_file import suffix_of, write_whole
 from kinfmu.gallery.chains import CHAINS, chain
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.toml_file import read
+from kinfmu.mechanism.toml_tables import text_of
 from kinfmu.mechanism.toml_text import text
 
 
@@ -57,6 +60,27 @@ def load(mechanism: str | Path) -> Mechanism:
             )
         return read(folder() / mechanism / "mechanism.toml")
     return read(mechanism)
+
+
+def load_named_in(document: Mapping[str, Any], folder: Path) -> Mechanism:
+    """Return the mechanism that the key 'mechanism' of a study or fit file names.
+
+    Args:
+        document: The content of the file.
+        folder: Its folder, where a relative path starts.
+
+    Raises:
+        RequestError: The name is unknown.
+        MechanismError: There is no such key, or the mechanism cannot be read or is invalid.
+
+    """
+    if "mechanism" not in document:
+        raise MechanismError(
+            "mechanism is missing: a mechanism file, such as mechanism = 'fourbar.toml', or a gallery name"
+        )
+    name = text_of("mechanism", document["mechanism"], "a file or a gallery name")
+    is_file = suffix_of(name) == ".toml" or "/" in name
+    return load(folder / name if is_file else name)
 
 
 def save(mechanism: Mechanism, path: str | Path) -> Path:

@@ -13,12 +13,12 @@ from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, suggestion
 from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.motion.batch_reading import BatchReading
+from kinfmu.processes import require_workers
 from kinfmu.readings import Reading
 from kinfmu.run import Column, FloatArray
 from kinfmu.run.run import arrow_table, data_frame
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep import Model
-from kinfmu.sweep.model import require_workers
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -91,13 +91,15 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> Measur
     return MeasuredValues((reading.name, _value(run, motion, reading)) for reading in readings)
 
 
-def chosen_measures(mechanism: Mechanism, measures: Iterable[Reading | str] | None) -> tuple[Reading, ...]:
+def chosen_measures(
+    mechanism: Mechanism, measures: Iterable[Reading | str] | Reading | str | None
+) -> tuple[Reading, ...]:
     """Return the measures of a call, checked and with numbers in place of texts."""
     if measures is None:
         return mechanism.measures
     own = {reading.name: reading for reading in mechanism.measures}
     chosen: list[Reading] = []
-    for one in [measures] if isinstance(measures, str) else measures:
+    for one in [measures] if isinstance(measures, str | Reading) else measures:
         if not isinstance(one, str):
             chosen.append(one)
         elif one in own:

@@ -15,10 +15,11 @@ from numpy.typing import ArrayLike
 
 from kinfmu import VERSION, gallery
 from kinfmu.analysis.measuring import driver_cycle
-from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed, suggestion
+from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism, toml_text
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.valid import quoted
+from kinfmu.motion.measure import chosen_measures
 from kinfmu.motion.needed import needed
 from kinfmu.plan import compile_plan
 from kinfmu.readings import Reading
@@ -34,8 +35,6 @@ OWN_COLUMNS = DESIGN, STATUS, REASON = "design", "solver.status", "reason"
 _SAMPLES_AT_ONCE = {"native": 1_500_000, "python": 200_000}  # of a part: 0.2 to 2 s
 _MOST, _FEWEST = 4096, 32  # designs of a part
 _PARTS = 32  # at least, so that all cores have work and progress shows
-
-Choice = str | Reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,7 @@ def define(
     mechanism: Mechanism | str | Path,
     parameters: Mapping[str, Any],
     *,
-    measures: Iterable[Choice] | Choice | None = None,
+    measures: Iterable[Reading | str] | Reading | str | None = None,
     sampling: str = METHODS[0],
     designs: int = SAMPLES,
     seed: int = SEED,
@@ -191,7 +190,10 @@ def define(
     count = whole_number("designs", designs, 1) if is_sampled else 1
     samples = Sampling(variations, sampling, count, whole_number("seed", seed, 0))
     whole_number("the number of designs, of all grids and samples together,", len(samples), 1)
-    mechanism = replace(mechanism, measures=_chosen(mechanism, measures))
+    readings = chosen_measures(mechanism, measures)
+    if not readings:
+        raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
+    mechanism = replace(mechanism, measures=readings)
     _refuse_equal_names([one.name for one in variations], [reading.name for reading in mechanism.measures])
     motion = _motion(mechanism, t, inputs or {}, over)
     constants = [one.name for one in variations if one.name in mechanism.settable.constants]
@@ -203,26 +205,6 @@ def define(
     if engine == "auto":
         engine = _engine(len(samples) * len(motion))
     return Study(mechanism, samples, motion, engine, file_text)
-
-
-def _chosen(mechanism: Mechanism, measures: Iterable[Choice] | Choice | None) -> tuple[Reading, ...]:
-    """Return the measures of a study, each with a name of its own."""
-    own = {reading.name: reading for reading in mechanism.measures}
-    if measures is None:
-        wanted: Sequence[Choice] = list(own)
-    else:
-        wanted = [measures] if isinstance(measures, str | Reading) else list(measures)
-    if not wanted:
-        raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
-    chosen: dict[str, Reading] = {}
-    for one in wanted:
-        if not isinstance(one, str):
-            chosen[one.name] = one
-        elif one in own:
-            chosen[one] = own[one]
-        else:
-            raise RequestError(f"there is no measure '{one}'{suggestion(one, own)}; measures: {listed(own)}")
-    return tuple(chosen.values())
 
 
 def _refuse_equal_names(parameters: Sequence[str], measures: Sequence[str]) -> None:
@@ -287,8 +269,3 @@ def _identified(value: FloatArray | float) -> Any:
         return value
     digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
     return {"from": float(value[0]), "to": float(value[-1]), "samples": len(value), "sha256": digest}
-
-
-def as_request(error: MechanismError) -> RequestError:
-    """Return the error of an argument of a call, in place of that of a file."""
-    return RequestError(str(error), **error.data)

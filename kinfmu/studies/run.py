@@ -14,7 +14,7 @@ from kinfmu import VERSION
 from kinfmu.errors import MechanismError, MissingPackageError, RequestError, StudyError
 from kinfmu.files.whole_file import replacement, suffix_of
 from kinfmu.mechanism import Mechanism
-from kinfmu.mechanism.valid import quoted
+from kinfmu.processes import cores, require_workers
 from kinfmu.readings import Reading
 from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
@@ -23,7 +23,7 @@ from kinfmu.studies.parts import Parts, remove_finished
 from kinfmu.studies.result import StudyResult, is_result_of
 from kinfmu.studies.sampling import METHODS
 from kinfmu.studies.table import join, part_bytes, schema_of
-from kinfmu.studies.workers import cores, results
+from kinfmu.studies.workers import results
 
 RESULTS = ".parquet"
 Progress = Callable[[int, int], None]
@@ -115,8 +115,7 @@ def run_study(
     """Run a study, or go on with it; arguments as in `study`."""
     if workers is None:
         workers = cores()
-    elif isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise RequestError(f"workers = {quoted(workers)} must be a positive whole number")
+    require_workers(workers)
     if output is None:
         with tempfile.TemporaryDirectory(prefix="kinfmu-study-") as folder:
             path = Path(folder) / f"study{RESULTS}"

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu import gallery
 from kinfmu.errors import MechanismError, RequestError, StudyError
-from kinfmu.files.whole_file import suffix_of
+from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.toml_file import document_of, read_measures, text_in
-from kinfmu.mechanism.toml_tables import check_keys, table_of, text_of
+from kinfmu.mechanism.toml_tables import check_keys, table_of
 from kinfmu.mechanism.valid import quoted
 from kinfmu.run import MOST_SAMPLES
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
@@ -56,11 +55,7 @@ def read_study(path: str | Path, *, engine: str = "auto") -> Study:
 
 def _study(document: dict[str, Any], folder: Path, engine: str, text: str) -> Study:
     check_keys("", document, KEYS)
-    if "mechanism" not in document:
-        raise StudyError(
-            "mechanism is missing: a mechanism file, such as mechanism = 'fourbar.toml', or a gallery name"
-        )
-    mechanism = _mechanism(text_of("mechanism", document["mechanism"], "a file or a gallery name"), folder)
+    mechanism = load_named_in(document, folder)
     own = read_measures(document, folder)
     report = document.get("report")
     is_list = isinstance(report, list) and report and all(isinstance(name, str) for name in report)
@@ -81,13 +76,6 @@ def _study(document: dict[str, Any], folder: Path, engine: str, text: str) -> St
         engine=engine,
         file_text=text,
     )
-
-
-def _mechanism(name: str, folder: Path) -> Mechanism:
-    """Return a mechanism of the gallery, or of a file whose path starts at the folder of the study."""
-    if suffix_of(name) != ".toml" and "/" not in name:
-        return gallery.load(name)
-    return gallery.load(folder / name)
 
 
 def _motion(mechanism: Mechanism, table: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:

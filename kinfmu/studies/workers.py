@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
-from types import ModuleType
 from typing import Any
 
 from kinfmu import VERSION
 from kinfmu.errors import MissingPackageError, StudyError
+from kinfmu.processes import WorkerLostError, processes, without_main
 
 AHEAD = 3  # parts given to each core before they are due; more would only fill the memory
 LOCAL = "local"
 
 Call = Callable[..., Any]
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def results(
@@ -59,7 +49,7 @@ def _in_pool(
     waiting, under_way = iter(parts), dict[Future[Any], int]()
     while True:
         for part in waiting:
-            with _without_main():
+            with without_main():
                 under_way[pool.submit(call, *arguments(part))] = part
             if len(under_way) >= ahead:
                 break
@@ -72,35 +62,11 @@ def _in_pool(
 
 @contextmanager
 def _processes(count: int) -> Iterator[tuple[Executor, int]]:
-    import multiprocessing
-
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker)
     try:
-        yield pool, count
-    except BrokenProcessPool:
-        reason = "a worker process ended unexpectedly: it was killed, or there is too little memory"
-        raise StudyError(f"{reason}; finished parts are kept, and the same command goes on from there") from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it however it ends."""
-    import multiprocessing
-    from multiprocessing.connection import wait as wait_for
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is None:
-        return
-    sentinel = parent.sentinel
-
-    def end() -> None:
-        wait_for([sentinel])
-        os._exit(1)  # a pool's workers would wait for a parent that was killed forever
-
-    threading.Thread(target=end, daemon=True).start()
+        with processes(count) as pool:
+            yield pool, count
+    except WorkerLostError as error:
+        raise StudyError(f"{error}; finished parts are kept, and the same command goes on from there") from None
 
 
 @contextmanager
@@ -113,7 +79,7 @@ def _cluster(address: str, workers: int) -> Iterator[tuple[Executor, int]]:
     cluster = None
     try:
         if address == LOCAL:
-            with _without_main():
+            with without_main():
                 cluster = distributed.LocalCluster(
                     n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
                 )
@@ -138,14 +104,3 @@ def _cluster(address: str, workers: int) -> Iterator[tuple[Executor, int]]:
     finally:
         if cluster is not None:
             cluster.close()
-
-
-@contextmanager
-def _without_main() -> Iterator[None]:
-    """Hide the script that runs, which a new process would run once more: all that workers call is in modules."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = script

@@ -17,6 +17,7 @@ from kinfmu.mechanism.settings import read_tolerance
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names
 from kinfmu.plan.reactions import reaction_names
+from kinfmu.processes import require_workers
 from kinfmu.run import Event, FloatArray, Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
@@ -395,12 +396,6 @@ def require_engine(engine: str) -> None:
     """Raise a RequestError for the name of an unknown engine."""
     if engine not in ENGINES:
         raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
-
-
-def require_workers(workers: object) -> None:
-    """Raise a RequestError for a number of workers that is no positive whole number."""
-    if not (isinstance(workers, int) and workers > 0):
-        raise RequestError(f"workers = {workers!r} must be a positive whole number")
 
 
 def _from_text(text: str, outputs: Sequence[str], parameters: Sequence[str], engine: str) -> Model:

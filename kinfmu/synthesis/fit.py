@@ -48,8 +48,7 @@ def fit(
         problem: The problem, or the path of a fit file (.toml).
         starts: Number of whole searches.
         seed: Seed of the Sobol points.
-        workers: Number of processes; None: one for each core. The result does not depend on it. Scripts that use
-            several processes must call this under `if __name__ == "__main__":`.
+        workers: Number of processes; None: one for each core. The result does not depend on it.
         engine: 'python'; 'native', generated C; or 'auto', native where a compiler is found.
         progress: Called with the number of steps done, and of all.
 
@@ -60,6 +59,7 @@ def fit(
         RequestError: An argument is invalid.
         MechanismError: The problem is invalid; the message states file, table and key.
         AssemblyError: None of the designs drawn can be assembled and reaches all samples.
+        KinfmuError: A process ended unexpectedly.
 
     """
     require_engine(engine)
@@ -78,7 +78,7 @@ def fit(
         if progress is not None:
             progress(done, steps)
 
-    with Team(problem, engine, _DESIGNS * starts, workers) as team:
+    with Team(problem, engine, _DESIGNS * starts, workers).working() as team:
         drawn = team.results("draw", list(start_points(problem, _DRAWN * starts, seed)), advance)
         for one in drawn:
             refused.update(one.refused)

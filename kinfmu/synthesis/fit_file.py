@@ -7,10 +7,8 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from kinfmu.errors import KinfmuError, MechanismError, RequestError, listed
-from kinfmu.files.whole_file import suffix_of
-from kinfmu.gallery import has, load
-from kinfmu.mechanism import Mechanism
+from kinfmu.errors import MechanismError, RequestError, listed
+from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_file import document_of, text_in
 from kinfmu.mechanism.toml_tables import check_keys, class_of_type, named_tables, table_of, text_of
@@ -42,26 +40,14 @@ def read_problem(path: str | Path) -> FitProblem:
 
 def _problem(document: Mapping[str, Any], folder: Path) -> FitProblem:
     check_keys("", document, KEYS)
-    if "mechanism" not in document:
-        raise MechanismError("mechanism is missing; the first line should be such as mechanism = 'crank_rocker.toml'")
     over = document.get("over")
     return FitProblem(
-        _mechanism(text_of("mechanism", document["mechanism"]), folder),
+        load_named_in(document, folder),
         table_of(document, "unknowns"),
         tuple(_members(document, "targets", TARGETS, folder)),
         tuple(_members(document, "constraints", CONSTRAINTS, folder)),
         None if over is None else text_of("over", over),
     )
-
-
-def _mechanism(name: str, folder: Path) -> Mechanism:
-    """Return the mechanism of a file, or of the gallery."""
-    if suffix_of(name) != ".toml" and has(name):
-        return load(name)
-    try:
-        return load(folder / name if suffix_of(name) == ".toml" else name)
-    except KinfmuError as error:
-        raise MechanismError(f"mechanism: {error}") from None
 
 
 def _members(document: Mapping[str, Any], table: str, classes: Iterable[Any], folder: Path) -> Iterable[Any]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from types import TracebackType
+from concurrent.futures import Executor
+from contextlib import contextmanager
 from typing import Literal
 
 import numpy as np
 
-from kinfmu.errors import CompilerError, RequestError
+from kinfmu.errors import CompilerError
+from kinfmu.processes import cores, processes, require_workers, without_main
 from kinfmu.run import FloatArray
 from kinfmu.synthesis.argument import SAMPLES
 from kinfmu.synthesis.equations import Equations, NotAssembledError
@@ -23,11 +22,6 @@ Advance = Callable[[int], None]
 WORTH = 2.0  # [s] in Python, from which compiling pays
 _EFFORTS = {"short": SHORT, "long": LONG, "fine": FINE}
 _equations: Equations  # of a process of the team
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Team:
@@ -45,25 +39,26 @@ class Team:
     """
 
     def __init__(self, problem: FitProblem, engine: str, designs: int, workers: int | None) -> None:
-        if workers is not None and not (isinstance(workers, int) and workers > 0):
-            raise RequestError(f"workers = {workers!r} must be a positive whole number")
+        if workers is None:
+            workers = cores()
+        require_workers(workers)
         self.equations = _equations_of(problem, engine, designs)
-        self.workers = workers or cores()
-        self._pool: ProcessPoolExecutor | None = None
+        self.workers = workers
+        self._pool: Executor | None = None
 
-    def __enter__(self) -> Team:
-        if self.workers > 1:
-            self._pool = ProcessPoolExecutor(
-                self.workers,
-                multiprocessing.get_context("spawn"),
-                initializer=_join,
-                initargs=(self.equations.problem, self.equations.engine),
-            )
-        return self
+    @contextmanager
+    def working(self) -> Iterator[Team]:
+        """Start the processes, and end them with the block.
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=kind is None, cancel_futures=True)
+        Raises:
+            WorkerLostError: A process ended unexpectedly.
+
+        """
+        if self.workers == 1:
+            yield self
+            return
+        with processes(self.workers, _join, self.equations.problem, self.equations.engine) as self._pool:
+            yield self
 
     def results(self, task: Task, starts: Sequence[FloatArray], advance: Advance) -> list[Found]:
         """Return what a task gives for each start, in order."""
@@ -77,7 +72,8 @@ class Team:
         if self._pool is None:
             return (_done(self.equations, task, z) for z in starts)
         chunk = max(1, len(starts) // (8 * self.workers))
-        return self._pool.map(_work, [task] * len(starts), starts, chunksize=chunk)
+        with without_main():
+            return self._pool.map(_work, [task] * len(starts), starts, chunksize=chunk)
 
 
 def _equations_of(problem: FitProblem, engine: str, designs: int) -> Equations:
