@@ -43,7 +43,8 @@ def build(
             Default: native where a C compiler is found, else python.
         drive: Default of the parameter `driven_by_time`: 'time' (the laws in the file drive) or 'inputs'. Default:
             time, but inputs if a driver's law is external.
-        outputs: Coordinates such as 'coupler.x' that the FMU has. Default: all. What no output needs is not solved.
+        outputs: Coordinates such as 'coupler.x' and forces such as 'crank.torque' that the FMU has. Default: all, with
+            efforts, inertias and energies of mechanisms with masses or loads. What no output needs is not solved.
         fmi: Version of FMI, 2 or 3. The python flavour is FMI 2.0 only.
         platforms: Platforms of the native flavour: 'host' (compiled by the system's compiler) or 'all' (by zig).
         progress: Called with (platforms done, number of platforms) during compilation.
@@ -63,14 +64,22 @@ def build(
     drive = default_drive(mechanism) if drive is None else drive
     flavour = default_flavour(fmi, platforms) if flavour is None else flavour
     _check(flavour, drive, fmi, platforms)
+    from kinfmu.fmu.force_variables import chosen_outputs
     from kinfmu.plan import compile_plan
+    from kinfmu.plan.forces import force_steps, loaded_coordinates
 
     path = _file(path, mechanism.name)
-    plan = compile_plan(mechanism, outputs)
+    coordinates, names = chosen_outputs(mechanism, outputs)
+    if flavour == "native":
+        if outputs is not None and names:
+            raise RequestError(f"outputs: {listed(names)}: forces need flavour = 'python'; native FMUs have none yet")
+        names = ()
+    plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
+    forces = force_steps(plan, names, given_coefficients=True) if names else None
     if flavour == "python":
         from kinfmu.fmu import python_flavour
 
-        data = python_flavour.archive(plan, drive, VERSION)
+        data = python_flavour.archive(plan, drive, VERSION, forces)
     else:
         from kinfmu.fmu.native import archive
 

@@ -94,7 +94,9 @@ def input_table(
 
     """
     quantities = {
-        variable.name: quantity_in(variable.unit or "1", interface.length_unit) for variable in interface.part("inputs")
+        variable.name: quantity_in(variable.unit or "1", interface.length_unit)
+        for part in ("inputs", "loads")
+        for variable in interface.part(part)
     }
     if isinstance(inputs, Mapping):
         table = _from_arrays(inputs, tuple(quantities))

@@ -24,6 +24,7 @@ from importlib.metadata import distribution
 from importlib.resources import files
 
 from kinfmu.codegen.python import emit
+from kinfmu.codegen.python.forces import emit_forces
 from kinfmu.errors import FmuError
 from kinfmu.fmu import description, documentation
 from kinfmu.fmu.archive import digest, token, zipped
@@ -31,6 +32,7 @@ from kinfmu.fmu.interface import Drive, Interface
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import ForceSteps
 
 CAPABILITIES = {
     "needsExecutionTool": True,  # Python, in the process of the host
@@ -44,7 +46,7 @@ CAPABILITIES = {
 }
 RUN_TIME = ("slave.py", "slave_settings.py", "slave_outputs.py", "layout.py", "estimated_rates.py")  # of this package
 BASE_CLASS = ("_version.py", "default_experiment.py", "enums.py", "fmi2slave.py", "logmsg.py", "variables.py")
-PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source")
+PARTS_WITH_START = ("inputs", "constants", "parameters", "tolerance", "fixed", "drive", "rate_source", "loads")
 
 EXTERNAL_DEPENDENCIES = """\
 This FMU runs Python code in the process of its host. It needs:
@@ -56,20 +58,28 @@ It needs no Python packages: what it imports is the standard library and the mod
 An FMU of the same mechanism that needs none of this is the native one: kinfmu build MECH --flavour native
 """
 
-_ENTRY = '''"""The slave of the FMU '{name}'."""
-
+_LOADED_IMPORTS = """\
+from {package}.fmu.layout import Layout, PartLayout
+from {package}.fmu.loaded_slave import LoadedSlave
+from {package}.fmu.slave import hold
+from {package}.solver import forces, model
+"""
+_IMPORTS = """\
 from {package}.fmu.layout import Layout, PartLayout
 from {package}.fmu.slave import MechanismSlave, hold
 from {package}.solver import model
+"""
+_ENTRY = '''"""The slave of the FMU '{name}'."""
 
+{imports}
 hold(globals())
 
 
-class Slave(MechanismSlave):
+class Slave({base}):
     """{title}"""
 
     model = model
-    layout = Layout(
+{forces}    layout = Layout(
         token={token!r},
         start_time={start!r},
         parts=(
@@ -79,13 +89,14 @@ class Slave(MechanismSlave):
 '''
 
 
-def archive(plan: SolvePlan, drive: Drive, version: str) -> bytes:
+def archive(plan: SolvePlan, drive: Drive, version: str, forces: ForceSteps | None = None) -> bytes:
     """Return the FMU of a plan; the same plan gives the same bytes.
 
     Args:
         plan: Plan of the mechanism.
         drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
         version: Version of kinfmu.
+        forces: Steps to the forces that are outputs. Default: none.
 
     Returns:
         Bytes of the zip archive.
@@ -94,8 +105,12 @@ def archive(plan: SolvePlan, drive: Drive, version: str) -> bytes:
         FmuError: If pythonfmu is installed without its binaries.
 
     """
-    variables = interface(plan, drive)
+    variables = interface(plan, drive, forces=forces)
     contents = _contents(plan, variables, version)
+    if forces is not None:
+        contents["kinfmu/solver/forces.py"] = emit_forces(plan, forces).encode()
+        contents["kinfmu/fmu/loaded_slave.py"] = files("kinfmu.fmu").joinpath("loaded_slave.py").read_bytes()
+        contents = dict(sorted(contents.items()))
     return zipped(_named(contents, variables, version, digest(contents)))
 
 
@@ -160,9 +175,12 @@ def _entry(variables: Interface, token: str, package: str = "kinfmu") -> str:
     for part in variables.parts:
         starts = tuple(variable.start for variable in part.variables) if part.name in PARTS_WITH_START else ()
         parts.append(f"            PartLayout({part.name!r}, {part.names!r}, {starts!r}),")
+    has_forces = bool(variables.part("forces"))
     return _ENTRY.format(
         name=variables.name,
-        package=package,
+        imports=(_LOADED_IMPORTS if has_forces else _IMPORTS).format(package=package),
+        base="LoadedSlave" if has_forces else "MechanismSlave",
+        forces="    forces = staticmethod(forces.forces)\n" if has_forces else "",
         title=repr(variables.title or variables.name)[1:-1].replace('"', "'"),
         token=token,
         start=float(variables.experiment.start),

@@ -11,6 +11,7 @@ import numpy as np
 
 from kinfmu.fmu.block_estimates import BlockEstimates
 from kinfmu.fmu.description import Description
+from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.fmu.slaves import LoadedSlave
 from kinfmu.mechanism import Mechanism
@@ -18,6 +19,7 @@ from kinfmu.run import Event, Run
 from kinfmu.run.channels import absent_columns
 from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
+from kinfmu.units import ForceName
 
 PIECE = 1024 * 1024  # [bytes] of a run passed to a sink at once, or fewer after PERIOD
 FEWEST = 16  # samples in a piece of a large mechanism: each piece has a fixed cost
@@ -25,8 +27,18 @@ PERIOD = 0.5  # [s] of wall-clock time
 LAST_GOOD = int(Status.BRIDGED)  # compared in every sample, where an int is faster
 DISCARD, ERROR = 2, 3  # of FMI's statuses
 _LEVELS = ("info", "warning", "error", "error", "error", "info")  # of FMI's OK, Warning, Discard, Error, Fatal, Pending
-_REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", "margin", "errors")
+_REALS = ("values", "rates", "accelerations", "driven", "residual", "watch", "forces", "margin", "errors")
 _ESTIMATES = 2  # number of parts at the end that follow from the others
+
+
+def _force_names(interface: Interface, mechanism: Mechanism) -> tuple[ForceName, ...]:
+    """Return the names of the forces that an FMU has."""
+    if not interface.part("forces"):
+        return ()
+    from kinfmu.plan.forces import force_names  # not at the top: planning imports scipy
+
+    names = {str(name): name for name in force_names(mechanism)}
+    return tuple(names[variable.name] for variable in interface.part("forces"))
 
 
 class Samples:
@@ -51,6 +63,7 @@ class Samples:
         self._columns: tuple[Any, Any, Any] = self._t.data, self._status.data, self._iterations.data
         self._size = 0
         self._names = [variable.name for part in _REALS for variable in interface.part(part)]
+        self._force_names = _force_names(interface, mechanism)
         self._absent: frozenset[str] = frozenset()
         self._asked: list[int] | None = None  # columns that are read; None: all
         self._mechanism, self._model_description = mechanism, model_description
@@ -230,6 +243,8 @@ class Samples:
             error=np.where(part["errors"] >= UNKNOWN_ERROR, np.inf, part["errors"]),
             watch_names=tuple(v.name.removeprefix("watch.") for v in interface.part("watch")),
             watch=part["watch"],
+            force_names=self._force_names,
+            forces=part["forces"] if self._force_names else None,
             length_unit=interface.length_unit,
             mechanism_source=self._mechanism,
             model_description=self._model_description,

@@ -109,7 +109,8 @@ def simulate(
             kept = kept_samples(t, rate)
             mechanism = toml_file.parse(text_in(path, folder, MECHANISM), f"{path}: {MECHANISM}")
             try:
-                settings = _settings(interface, mechanism.settable, parameters or {}, has_inputs=table is not None)
+                drives = table is not None and any(v.name in table.names for v in interface.part("inputs"))
+                settings = _settings(interface, mechanism.settable, parameters or {}, has_inputs=drives)
             except RequestError as error:
                 raise RequestError(f"{path}: {error}") from None
             mechanism = _as_set(mechanism, settings)

@@ -8,9 +8,11 @@ from typing import Literal, NamedTuple
 
 from kinfmu.equations.graph import Node, reachable
 from kinfmu.fmu.estimated_rates import Rates
+from kinfmu.fmu.force_variables import force_variables, load_variables
 from kinfmu.fmu.interface import RATES_TYPE, STATUS_TYPE, Drive, Interface, InterfacePart, Variable
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import is_parameter
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.solver.python.status import Status
@@ -71,7 +73,9 @@ _MESSAGE = Variable(
 _TIME = Variable("time", "Real", "independent", "continuous", "Time", unit="s")
 
 
-def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False) -> Interface:
+def interface(
+    plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False, forces: ForceSteps | None = None
+) -> Interface:
     """Return the variables of the FMU of a plan.
 
     Args:
@@ -79,6 +83,7 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
         drive: Default of the parameter `driven_by_time`: 'time' (true) or 'inputs' (false).
         has_time: True for FMI 3.0: time is the last variable, and what the drivers move depends on it and on tunable
             parameters, which FMI 3.0 counts as known after initialization.
+        forces: Efforts, inertias and energies that are outputs. Default: none.
 
     Returns:
         The variables, part by part.
@@ -119,6 +124,8 @@ def interface(plan: SolvePlan, drive: Drive = "time", *, has_time: bool = False)
         "rate_source": [_RATES],
         "message": [_MESSAGE],
     }
+    if forces is not None:
+        lists |= {"loads": load_variables(mechanism), "forces": force_variables(plan, forces)}
     parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
     if has_time:
         tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}

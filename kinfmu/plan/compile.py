@@ -28,7 +28,10 @@ from kinfmu.units import CoordinateName, Quantity
 
 
 def compile_plan(
-    mechanism: Mechanism, outputs: Sequence[str] | None = None, parameters: Sequence[str] | None = None
+    mechanism: Mechanism,
+    outputs: Sequence[str] | None = None,
+    parameters: Sequence[str] | None = None,
+    solved: Sequence[str] = (),
 ) -> SolvePlan:
     """Return the plan of a mechanism.
 
@@ -36,6 +39,7 @@ def compile_plan(
         mechanism: The mechanism.
         outputs: Names of the outputs to solve for; default: all. Loops that no output depends on are not solved.
         parameters: Names of the parameters that are settable; default: all that are given as numbers.
+        solved: Coordinates of bodies to solve for though they are no outputs: forces depend on them.
 
     Returns:
         The plan, with those parameters of the geometry and the constants of the laws settable.
@@ -50,7 +54,7 @@ def compile_plan(
     """
     local, origin = localized(mechanism)
     system = System(local)
-    return plan_from(mechanism, system, origin, find_redundancy(system), outputs, parameters)
+    return plan_from(mechanism, system, origin, find_redundancy(system), outputs, parameters, solved)
 
 
 def plan_from(
@@ -60,6 +64,7 @@ def plan_from(
     redundancy: Redundancy,
     outputs: Sequence[str] | None = None,
     parameters: Sequence[str] | None = None,
+    solved: Sequence[str] = (),
 ) -> SolvePlan:
     """Return the plan of a mechanism whose redundancy is known.
 
@@ -70,6 +75,7 @@ def plan_from(
         redundancy: Of the system, with its assembly.
         outputs: As in `compile_plan`.
         parameters: As in `compile_plan`.
+        solved: As in `compile_plan`.
 
     Returns:
         The plan.
@@ -96,13 +102,13 @@ def plan_from(
     at_anchor |= {parameter_symbol(parameter.name): parameter.value for parameter in settable}
     blocks = _needed(
         [build_block(system, tracer, row, rates, part, known, at_anchor) for part in structure.blocks],
-        [motion.position for motion in motions],
+        [*(motion.position for motion in motions), *(known.get(name, tracer.symbols[name]) for name in solved)],
     )
-    solved = {name for block in blocks for name in block.coordinates}
+    moving = {name for block in blocks for name in block.coordinates}
     watches = []
     for index in (redundant.index for redundant in redundancy.redundant):
         node = row(index, known)
-        if all(symbol.name in solved for symbol in symbols([node]) if not is_parameter(symbol)):
+        if all(symbol.name in moving for symbol in symbols([node]) if not is_parameter(symbol)):
             watches.append((system.rows[index].name, node / (system.rows[index].scale * system.size)))
     return SolvePlan(
         mechanism=mechanism,

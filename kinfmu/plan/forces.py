@@ -20,6 +20,7 @@ from functools import reduce
 from typing import NamedTuple
 
 from kinfmu.equations.graph import Graph, Node
+from kinfmu.mechanism import Mechanism
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, needed_steps
@@ -49,24 +50,30 @@ class ForceSteps:
     results: list[Node]
 
 
-def force_names(plan: SolvePlan) -> tuple[ForceName, ...]:
+def force_names(mechanism: Mechanism) -> tuple[ForceName, ...]:
     """Return the names of efforts, inertias and energies of a mechanism; none without masses and loads."""
-    mechanism = plan.mechanism
     if not (mechanism.has_masses or mechanism.loads):
         return ()
     names = []
-    for k, driver in enumerate(plan.drivers):
+    for k, driver in enumerate(mechanism.drivers):
         kind = driver.quantity.kind
         effort = effort_noun(kind)
         names += [ForceName(driver.name, effort, Quantity(effort)), ForceName(driver.name, "power", Quantity("power"))]
         if mechanism.has_masses:
             names.append(ForceName(driver.name, f"bias_{effort}", Quantity(effort)))
-            for other in plan.drivers[k:]:
+            for other in mechanism.drivers[k:]:
                 noun = "reduced_inertia" if other is driver else f"reduced_inertia.{other.name}"
                 quantity = Quantity(_INERTIAS.get((kind, other.quantity.kind), _MIXED_INERTIA))
                 names.append(ForceName(driver.name, noun, quantity))
     energies = ("kinetic_energy", "potential_energy") if mechanism.has_masses else ("potential_energy",)
     return (*names, *(ForceName("", energy, Quantity("energy")) for energy in energies))
+
+
+def loaded_coordinates(mechanism: Mechanism) -> list[str]:
+    """Return the coordinates of the bodies that have masses or on which loads act."""
+    loaded = {body.name for body in mechanism.moving_bodies if body.has_mass}
+    loaded |= {body for load in mechanism.loads for body in load.bodies()}
+    return [name for name in mechanism.coordinate_names if name.owner in loaded]
 
 
 def effort_noun(kind: str) -> str:
@@ -85,7 +92,7 @@ def force_steps(plan: SolvePlan, wanted: Sequence[str], *, given_coefficients: b
 
     """
     mechanics = Mechanics(plan, given_coefficients=given_coefficients)
-    names = tuple(name for name in force_names(plan) if name in wanted)
+    names = tuple(name for name in force_names(plan.mechanism) if name in wanted)
     found = _forces(plan, mechanics)
     results = [found[name] for name in names]
     return ForceSteps(needed_steps(results, mechanics.steps), names, results)

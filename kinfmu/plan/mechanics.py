@@ -46,7 +46,7 @@ class Mechanics(Tracing):
 
     Args:
         plan: The plan. It must solve the bodies that have masses and those on which loads act.
-        given_coefficients: Derivatives of coordinates with respect to drivers are given symbols; else they are solved.
+        given_coefficients: Derivatives of unknowns with respect to drivers are given symbols; else they are solved.
 
     """
 
@@ -62,9 +62,10 @@ class Mechanics(Tracing):
         self._per_driver = [1.0 if driver.quantity.kind == "angle" else 1.0 / self.metre for driver in plan.drivers]
         for block in plan.blocks:
             if given_coefficients:
-                for name in block.coordinates:
+                for name in block.unknowns:
                     for number, change in enumerate(self.changes):
                         change[graph.symbol(name)] = graph.symbol(coefficient_symbol(name, number))
+                self.assigned(block)
             else:
                 self.positions(block)
 

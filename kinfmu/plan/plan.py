@@ -203,10 +203,10 @@ class SolvePlan:
 
     @cached_property
     def _behind(self) -> dict[str, frozenset[str]]:
-        """Inputs and parameters, by the names of their symbols, behind each output and each fixed coordinate."""
+        """Inputs and parameters, by the names of their symbols, behind each output and each coordinate."""
         behind = self._behind_coordinates
         nodes = [(motion.name, motion.position) for motion in self.outputs_motion]
-        return {name: _behind_all([node], behind) for name, node in (*nodes, *self.fixed_nodes.items())}
+        return behind | {name: _behind_all([node], behind) for name, node in (*nodes, *self.fixed_nodes.items())}
 
     @cached_property
     def _behind_coordinates(self) -> dict[str, frozenset[str]]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from kinfmu.equations.graph import Node
 from kinfmu.equations.system import System
 from kinfmu.joints import Joint
+from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.plan.block import Block
 from kinfmu.plan.forces import ForceSteps
@@ -24,8 +25,12 @@ from kinfmu.units import CoordinateName, ForceName, Quantity
 
 
 def reaction_names(plan: SolvePlan) -> tuple[ForceName, ...]:
+    """Return the names of all reactions of a plan's mechanism; see `reaction_names_of`."""
+    return reaction_names_of(plan.mechanism)
+
+
+def reaction_names_of(mechanism: Mechanism) -> tuple[ForceName, ...]:
     """Return the names of all reactions of a mechanism, one for each row of a joint; none without masses and loads."""
-    mechanism = plan.mechanism
     if not (mechanism.has_masses or mechanism.loads):
         return ()
     return tuple(name for joint in mechanism.joints for name in names_of_rows(joint))

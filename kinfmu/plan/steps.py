@@ -101,6 +101,10 @@ class Tracing:
     def positions(self, block: Block) -> None:
         """Add the steps to the derivatives of a block's coordinates, and to all that its rows give outright."""
         self.solve(self.jacobian(block), self.copied(block.residuals), block.unknowns)
+        self.assigned(block)
+
+    def assigned(self, block: Block) -> None:
+        """Add the steps to the coordinates that a block's rows give outright, and to their derivatives."""
         for name, (position, *derivatives) in block.assigned:
             self._assign(name, position)
             for order, node in enumerate(self.copied(derivatives), start=1):

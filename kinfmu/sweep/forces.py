@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.errors import RequestError
 from kinfmu.plan import SolvePlan, compile_plan
-from kinfmu.plan.forces import force_names, force_steps
+from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.mechanics import coefficient_symbol
 from kinfmu.plan.origin import localized
 from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
@@ -71,7 +71,7 @@ class ForceModel:
 
     def __init__(self, poses: Solvable) -> None:
         self.poses = poses
-        self.names = force_names(poses.plan)
+        self.names = force_names(poses.plan.mechanism)
         self._native = lru_cache(maxsize=_STAGES)(native_stage)
 
     def forces(self, run: LoadedRun) -> FloatArray:
@@ -162,8 +162,6 @@ def force_plan(plan: SolvePlan) -> SolvePlan:
         return plan
     local, _ = localized(plan.mechanism)
     local, open_ones = replace(local, coordinates="moving"), [parameter.name for parameter in plan.parameters]
-    loaded = {body.name for body in local.moving_bodies if body.has_mass}
-    loaded |= {body for load in local.loads for body in load.bodies()}
-    wanted = [name for name in moving if name.owner in loaded]
+    wanted = [name for name in loaded_coordinates(local) if name in moving]
     solved = {name for block in compile_plan(local, wanted, open_ones).blocks for name in block.coordinates}
     return compile_plan(local, [name for name in moving if name in solved], open_ones)

@@ -92,7 +92,7 @@ class Model:
         self.parameters = tuple(parameter.name for parameter in plan.parameters)
         self._input_names = tuple(name for driver in plan.drivers for name in driver.inputs)
         self._watch_names = plan.watch_names
-        self._force_names, self._reaction_names = force_names(plan), reaction_names(plan)
+        self._force_names, self._reaction_names = force_names(plan.mechanism), reaction_names(plan)
         self._load_inputs = tuple(name for load in plan.mechanism.loads for name in load.inputs())
         self.arguments = Arguments(plan)
         self._solver = lru_cache(maxsize=_SOLVERS_KEPT)(self._new_solver)

@@ -66,12 +66,7 @@ class CompiledStage:
 
 def load_stage(steps: Stage) -> CompiledStage:
     """Return the compiled stage."""
-    roots = [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
-    nodes = reachable(roots)
-    made = {name for step in steps.steps for name in _names(step)}
-    given = tuple(symbol.name for symbol in symbols(roots) if symbol.name not in made)
-    data = dict.fromkeys(node.curve[0] for node in nodes if node.op == "curve")
-    curves = {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
+    given, curves = given_symbols(steps), stage_curves(steps)
     text = _text(steps, given, curves)
     code = compile(text, "<stage>", "exec")
     constants = {name: one for one, name in curves.items()}
@@ -86,6 +81,18 @@ def load_stage(steps: Stage) -> CompiledStage:
     return CompiledStage(given, steps, text, function(_OF_NUMBERS), function(_OF_ARRAYS), few)
 
 
+def given_symbols(steps: Stage) -> tuple[str, ...]:
+    """Return the names of the symbols that no step gives."""
+    made = {name for step in steps.steps for name in _names(step)}
+    return tuple(symbol.name for symbol in symbols(_roots(steps)) if symbol.name not in made)
+
+
+def stage_curves(steps: Stage) -> dict[CurveData, str]:
+    """Return the names of the constants that hold the data of a stage's curves."""
+    data = dict.fromkeys(node.curve[0] for node in reachable(_roots(steps)) if node.op == "curve")
+    return {one: f"CURVE_{k}" for k, one in enumerate(data, start=1)}
+
+
 def stage_lines(
     steps: Stage,
     given: Sequence[str],
@@ -98,7 +105,7 @@ def stage_lines(
     solve: gives statements for rows of J, columns b and the names of the solutions.
     functions: names of functions called in place of sin and cos.
     """
-    roots = [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
+    roots = _roots(steps)
     made = [name for step in steps.steps for name in _names(step)]
     writer = Writer(Names((*given, *made), curves, functions), (), _used_again(reachable(roots), roots))
     lines = []
@@ -128,6 +135,10 @@ def _text(steps: Stage, given: Sequence[str], curves: Mapping[CurveData, str]) -
             "",
         ]
     )
+
+
+def _roots(steps: Stage) -> list[Node]:
+    return [node for step in steps.steps for node in _nodes(step)] + list(steps.results)
 
 
 def _nodes(step: Step) -> list[Node]:

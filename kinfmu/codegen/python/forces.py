@@ -1,0 +1,48 @@
+"""The force stage of an FMU as Python source: a module of the standard library, beside the model of a Solver.
+
+It holds one function, which gives efforts, inertias and energies of one sample:
+
+    forces(time, u, ud, udd, z, zd, zdd, slopes, efforts, parameters)
+
+z are the unknowns of all blocks, zd and zdd their derivatives in time; slopes are dz/du for one driver after another.
+"""
+
+from __future__ import annotations
+
+from kinfmu.codegen.forces import ARGUMENTS, places_of_symbols
+from kinfmu.codegen.python.block_code import indented, tupled
+from kinfmu.codegen.python.stage import given_symbols, stage_curves, stage_lines
+from kinfmu.codegen.writer import identifier
+from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import ForceSteps
+
+
+def emit_forces(plan: SolvePlan, steps: ForceSteps) -> str:
+    """Return the source text; steps: of coefficients that are given, so that there is nothing to solve."""
+    places, given, curves = places_of_symbols(plan), given_symbols(steps), stage_curves(steps)
+    lines, found = stage_lines(steps, given, curves, _no_solve)
+    values = iter(found)
+    results = ["0.0" if node.constant == 0.0 else next(values) for node in steps.results]
+    return "\n".join(
+        [
+            f'"""Forces of {plan.mechanism.name}: generated from its mechanism, not to be edited."""',
+            "",
+            "from math import atan2, cos, floor, sin, sqrt",
+            *(["", "from .curve import curve"] if curves else []),
+            "",
+            f"FORCES = {tuple(map(str, steps.names))!r}",
+            *(f"{name} = {data!r}" for data, name in curves.items()),
+            "",
+            "",
+            f"def forces({', '.join(ARGUMENTS)}):",
+            '    """FORCES of one sample, in SI units."""',
+            *(f"    {identifier(name)} = {places[name]}" for name in given if identifier(name) != places[name]),
+            *indented(lines),
+            f"    return {tupled(results)}",
+            "",
+        ]
+    )
+
+
+def _no_solve(*_: object) -> list[str]:
+    raise AssertionError("a force stage with given coefficients solves nothing")

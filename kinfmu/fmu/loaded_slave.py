@@ -1,0 +1,102 @@
+"""The slave of a mechanism with masses or loads: forces are outputs, efforts of external loads are inputs.
+
+The FMU has a copy: see slave.py. Forces are computed when one of them is read, and kept until a set or a step changes
+the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from pythonfmu.enums import Fmi2Status
+
+from kinfmu.fmu.estimated_rates import LARGEST
+from kinfmu.fmu.layout import NOT_A_NUMBER, Numbers
+from kinfmu.fmu.slave import MechanismSlave
+from kinfmu.fmu.slave_outputs import Shown
+from kinfmu.solver.python.pose import tangent_of
+from kinfmu.solver.python.tracks import rates_in_time
+
+
+class LoadedSlave(MechanismSlave):
+    """A mechanism with forces as an FMI 2.0 co-simulation slave; a subclass defines `forces`, the emitted stage."""
+
+    forces: ClassVar[Callable[..., Numbers]]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        parts = {part.name: part for part in self.layout.parts}
+        self._loads: Numbers = parts["loads"].starts  # efforts of external loads
+        self._committed_loads = self._loads
+        self._forces_of: Shown | None = None  # the sample of `_forces`
+        self._forces: Numbers = (NOT_A_NUMBER,) * len(parts["forces"].variables)
+
+    def _set_other_real(self, vr: int, value: float) -> None:
+        part, place = self._references.real(vr)
+        if part is None or self.layout.parts[part].name != "loads":
+            super()._set_other_real(vr, value)
+            return
+        name = self._references.name(vr)
+        if not -LARGEST <= value <= LARGEST:
+            why = f"is too large: at most {LARGEST:g} is taken" if math.isfinite(value) else "is not a finite number"
+            self._refuse(name, f"= {value!r} {why}; {self._loads[place]!r} stays")
+            return
+        self._refused.pop(name, None)
+        if value != self._loads[place]:
+            self._loads = (*self._loads[:place], float(value), *self._loads[place + 1 :])
+            self._forces_of = None
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        done = super().do_step(current_time, step_size)
+        if done:
+            self._committed_loads = self._loads
+        return done
+
+    def _read_loads(self) -> Numbers:
+        return self._loads
+
+    def _read_forces(self) -> Numbers:
+        shown = self._look()
+        if self._forces_of is not shown:
+            try:
+                self._forces = self._forces_at(shown)
+            except (ArithmeticError, ValueError) as error:  # a load without a value, such as a spring of length 0
+                self.log(f"forces have no value: {error}", Fmi2Status.warning)
+                self._forces = (NOT_A_NUMBER,) * len(self._forces)
+            self._forces_of = shown
+        return self._forces
+
+    def _forces_at(self, shown: Shown) -> Numbers:
+        model, pose = self._solver.model, shown.pose
+        u, ud, udd = self._drive(shown)
+        if len(u) == 1:
+            slopes, second = tangent_of(model, pose)
+            v, a = ud[0], udd[0]
+            zd = tuple([d * v for d in slopes])
+            zdd = tuple([dd * (v * v) + d * a for d, dd in zip(slopes, second, strict=True)])
+        else:
+            rest = (0.0,) * len(u)
+            unit = [tuple([float(k == number) for k in range(len(u))]) for number in range(len(u))]
+            slopes = tuple([d for speeds in unit for d in rates_in_time(model, pose, speeds, rest)[0]])
+            zd, zdd = rates_in_time(model, pose, ud, udd)
+        time = self._time
+        if not self._driven_by_time and self._history and (shown.stale or not self._touched):
+            time = self._history[-1][0]  # of the sample that is shown
+        loads = self._committed_loads if shown.stale else self._loads
+        return self.forces(time, u, ud, udd, pose.z, zd, zdd, slopes, loads, self._parameters)
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return super()._get_fmu_state() | {
+            "loads": list(self._loads),
+            "committed_loads": list(self._committed_loads),
+        }
+
+    def _restore(self, state: dict[str, Any]) -> None:
+        loads, committed = (
+            tuple([float(effort) for effort, _ in zip(state[name], self._loads, strict=True)])
+            for name in ("loads", "committed_loads")
+        )
+        super()._restore(state)
+        self._loads, self._committed_loads, self._forces_of = loads, committed, None

@@ -1,0 +1,275 @@
+"""Forces as outputs of FMUs: equal to those of runs, with exact dependencies, lazy, and part of the protocol."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism
+from kinfmu.errors import RequestError
+from kinfmu.fmu.description import read
+from kinfmu.fmu.unpacked import text_in, unpacked
+from kinfmu.mechanism import toml_file
+from tests.fmu.host import DISCARD, OK, Host
+from tests.sweep.test_forces import loaded
+
+FLAVOURS = [("python", 2)]
+of_each_flavour = pytest.mark.parametrize(("flavour", "fmi"), FLAVOURS)
+PRESS = """
+name = "press"
+[parameters]
+ram_mass = "3 kg"
+[units]
+length = "mm"
+[run]
+start = 0
+stop = 1
+step = 0.01
+[gravity]
+x = 0
+y = "-9.81 m/s2"
+[bodies.ground]
+points = { O = [0, 0], spring = [500, 40] }
+[bodies.crank]
+points = { O = [0, 0], P = [100, 0] }
+start = { x = 0, y = 0, phi = "40 deg" }
+mass = 1.5
+center_of_mass = [30, 5]
+inertia = "0.01 kg m2"
+[bodies.rod]
+points = { P = [0, 0], S = [300, 0] }
+start = { phi = "-10 deg" }
+mass = "0.8 kg"
+rod = ["P", "S"]
+[bodies.ram]
+points = { S = [0, 0] }
+start = { x = 380, y = 0, phi = 0 }
+mass = "ram_mass"
+[joints]
+O = { type = "revolute", between = ["ground.O", "crank.O"] }
+P = { type = "revolute", between = ["crank.P", "rod.P"] }
+S = { type = "revolute", between = ["rod.S", "ram.S"] }
+guide = { type = "translational", between = ["ground.O", "ram.S"] }
+[drivers.crank]
+type = "angle"
+of = "crank"
+law = "constant_speed"
+start = "10 deg"
+speed = "250 deg/s"
+[loads.work]
+type = "force_along"
+at = "ram.S"
+law = "external"
+[loads.return]
+type = "spring"
+between = ["ground.spring", "ram.S"]
+stiffness = "2 N/mm"
+free_length = 150
+[loads.oil]
+type = "damper"
+between = ["ground.spring", "ram.S"]
+damping = "20 N s/m"
+[loads.ramp]
+type = "torque"
+on = "rod"
+law = "constant_speed"
+start = 1
+speed = 2
+"""
+
+
+@cache
+def press() -> Mechanism:
+    return toml_file.parse(PRESS, "press")
+
+
+@pytest.fixture(scope="module")
+def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """`fmu_of(mechanism, flavour, fmi, drive)`: path of the FMU, built once."""
+    folder = tmp_path_factory.mktemp("forces")
+    paths: dict[tuple[str, str, int, str], Path] = {}
+
+    def get(mechanism: Mechanism, flavour: str, fmi: int, drive: str = "time") -> Path:
+        key = (mechanism.name, flavour, fmi, drive)
+        if key not in paths:
+            path = folder / ("_".join(map(str, key)) + ".fmu")
+            paths[key] = kinfmu.build(mechanism, path, flavour=flavour, fmi=fmi, drive=drive)  # type: ignore[arg-type]
+        return paths[key]
+
+    return get
+
+
+@pytest.fixture
+def start(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[..., Host]]:
+    """`start(flavour, fmi)`: a slave of the press that inputs drive, initialized at 0."""
+    hosts: list[Host] = []
+
+    def get(flavour: str, fmi: int, angle: float = 0.7) -> Host:
+        host = Host(fmu_of(press(), flavour, fmi, "inputs"), tmp_path / f"slave_{len(hosts)}")
+        hosts.append(host)
+        host.set({"rates": 2, "crank_angle": angle})
+        host.initialize(0.0)
+        return host
+
+    yield get
+    for host in hosts:
+        host.free()
+
+
+def assert_forces_equal(run: kinfmu.Run, reference: kinfmu.Run) -> None:
+    assert run.force_names == reference.force_names
+    assert run.force_names
+    assert np.isfinite(reference.forces).all(axis=1).tolist() == run.good.tolist()
+    largest = np.abs(reference.forces).max(axis=0)
+    assert np.nanmax(np.abs(run.forces - reference.forces) / (1.0 + largest)) < 1e-12
+
+
+@of_each_flavour
+@pytest.mark.parametrize("name", ["fourbar", "five_bar", "excavator", "rack_steering", "geared_five_bar"])
+def test_forces_equal_those_of_a_run(fmu_of: Callable[..., Path], flavour: str, fmi: int, name: str) -> None:
+    mechanism = loaded(name)
+    run = kinfmu.simulate(fmu_of(mechanism, flavour, fmi))
+    assert_forces_equal(run, kinfmu.solve(mechanism, run.t))
+
+
+@of_each_flavour
+def test_external_loads_laws_over_time_and_masses_equal_those_of_a_run(
+    fmu_of: Callable[..., Path], flavour: str, fmi: int
+) -> None:
+    t = np.linspace(0.0, 1.0, 41)
+    force = -200.0 * (1.0 + np.sin(9.0 * t))
+    run = kinfmu.simulate(
+        fmu_of(press(), flavour, fmi),
+        inputs={"time": t, "work_force": force},
+        step=t[1],
+        parameters={"ram_mass": "4.5 kg"},
+    )
+    np.testing.assert_allclose(run.t, t, atol=1e-12)
+    reference = kinfmu.compile(press()).solve(run.t, parameters={"ram_mass": 4.5}, work_force=force)
+    assert_forces_equal(run, reference)
+
+
+@of_each_flavour
+def test_declared_dependencies_are_those_that_count(start: Callable[..., Host], flavour: str, fmi: int) -> None:
+    host = start(flavour, fmi)
+    at = {"crank_angle": 0.7, "crank_speed": 3.0, "crank_acceleration": 20.0, "work_force": -150.0}
+    forces = host.about.interface.part("forces")
+    names = [variable.name for variable in forces]
+    host.set(at)
+    before = np.array(host.get(*names))
+    for changed, value in at.items():
+        host.set({changed: value * 1.01})
+        change = np.abs(np.array(host.get(*names)) - before) / (1.0 + np.abs(before))
+        host.set(at)
+        for variable, difference in zip(forces, change, strict=True):
+            assert (changed in (variable.dependencies or ())) == (difference > 1e-13), (variable.name, changed)
+    units = {variable.name: variable.unit for variable in forces}
+    assert units["crank.torque"] == units["crank.bias_torque"] == "N m"
+    assert units["crank.reduced_inertia"] == "kg m2"
+    assert (units["crank.power"], units["kinetic_energy"]) == ("W", "J")
+
+
+@of_each_flavour
+def test_effort_is_reduced_inertia_times_acceleration_plus_bias(
+    start: Callable[..., Host], flavour: str, fmi: int
+) -> None:
+    host = start(flavour, fmi)
+    host.set({"crank_speed": 3.0, "crank_acceleration": 20.0, "work_force": -150.0})
+    torque, bias, inertia, power = host.get("crank.torque", "crank.bias_torque", "crank.reduced_inertia", "crank.power")
+    assert torque == pytest.approx(bias + inertia * 20.0, rel=1e-14)
+    assert power == pytest.approx(torque * 3.0, rel=1e-14)
+    host.set({"crank_acceleration": 0.0})
+    assert host.get("crank.torque", "crank.bias_torque") == pytest.approx([bias, bias], rel=1e-13)
+
+
+@of_each_flavour
+def test_states_keep_external_loads_to_the_bit(start: Callable[..., Host], flavour: str, fmi: int) -> None:
+    host = start(flavour, fmi)
+    host.set({"crank_angle": 0.8, "crank_speed": 1.0, "work_force": -150.0})
+    assert host.step(0.0, 0.1) == OK
+    before = host.outputs()
+    state = host.state()
+    data = host.serialize(state)
+    host.set({"crank_angle": 1.1, "work_force": 20.0})
+    assert host.step(0.1, 0.1) == OK
+    assert host.outputs() != before
+    host.restore(state)
+    assert host.outputs() == before
+    assert host.get("work_force") == [-150.0]
+    other = start(flavour, fmi)
+    again = other.deserialize(data)
+    other.restore(again)
+    assert other.outputs() == before
+    host.free_state(state)
+    other.free_state(again)
+
+
+@of_each_flavour
+def test_a_load_that_is_no_number_is_refused(start: Callable[..., Host], flavour: str, fmi: int) -> None:
+    host = start(flavour, fmi)
+    host.set({"work_force": -150.0})
+    text = host.refusal({"work_force": math.nan})
+    assert text == "work_force = nan is not a finite number; -150.0 stays"
+    assert host.get("work_force") == [-150.0]
+    assert host.step_after_refusal(0.0, 0.1) == OK
+
+
+def test_an_unreachable_sample_keeps_the_forces_of_the_last_good_one(
+    fmu_of: Callable[..., Path], tmp_path: Path
+) -> None:
+    mechanism = loaded("triple_rocker")
+    limits = kinfmu.check(mechanism)
+    assert limits
+    host = Host(fmu_of(mechanism, "python", 2, "inputs"), tmp_path / "slave")
+    name = host.about.interface.part("inputs")[0].name
+    host.set({"rates": 2})
+    host.initialize(0.0)
+    assert host.step(0.0, 0.1) == OK
+    before = host.get(*(variable.name for variable in host.about.interface.part("forces")))
+    host.set({name: host.get(name)[0] + math.pi})
+    assert host.status() > 2
+    assert host.get(*(variable.name for variable in host.about.interface.part("forces"))) == before
+    assert host.step(0.1, 0.1) == DISCARD
+    host.free()
+
+
+@pytest.mark.parametrize(
+    ("outputs", "forces"),
+    [(["ram.x"], []), (["ram.x", "crank.torque"], ["crank.torque"])],
+)
+def test_outputs_choose_forces(outputs: Sequence[str], forces: Sequence[str], tmp_path: Path) -> None:
+    path = kinfmu.build(press(), tmp_path, flavour="python", outputs=outputs)
+    with unpacked(path) as folder:
+        interface = read(text_in(path, folder, "modelDescription.xml").encode(), str(path)).interface
+        assert any(folder.glob("resources/*/solver/forces.py")) == bool(forces)
+    assert [variable.name for variable in interface.part("values")] == ["ram.x"]
+    assert [variable.name for variable in interface.part("forces")] == list(forces)
+    run = kinfmu.simulate(path)
+    reference = kinfmu.solve(press(), run.t)
+    for name in forces:
+        np.testing.assert_allclose(run[name], reference[name], atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "message"),
+    [
+        (["crank.torque"], "outputs: crank.torque: name a coordinate, too, such as 'crank.x'"),
+        (["ram.x", "guide.moment"], "outputs: 'guide.moment' is a reaction, and FMUs have no reactions yet"),
+        (["ram.x", "crank.torqe"], "outputs: 'crank.torqe' is not one; did you mean 'crank.torque'?"),
+    ],
+)
+def test_outputs_that_an_fmu_cannot_have(outputs: Sequence[str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(RequestError, match=re.escape(message)):
+        kinfmu.build(press(), tmp_path, flavour="python", outputs=outputs)
+
+
+def test_native_fmus_refuse_forces(tmp_path: Path) -> None:
+    with pytest.raises(RequestError, match=r"outputs: crank\.torque: forces need flavour = 'python'"):
+        kinfmu.build(press(), tmp_path, flavour="native", outputs=["ram.x", "crank.torque"])
