@@ -22,7 +22,7 @@ def with_open_lengths(mechanism: Mechanism) -> Mechanism:
     lines = []
     for line in text(mechanism).split("\n"):
         key, sign, rest = line.partition(" = ")
-        is_length = key in ("points", "length", "radius", "radii")
+        is_length = key in ("points", "length", "radius", "radii") and not rest.startswith("[[")  # no table of a law
         lines.append(f"{key}{sign}{_NUMBER.sub(opened, rest)}" if is_length else line)
     head = [f'p{k} = "{value} {mechanism.length_unit}"' for k, value in enumerate(values)]
     if "[parameters]" in lines:

@@ -29,6 +29,11 @@ class Member:
         """Times of the reference's samples."""
         return [float(row["time"]) for row in self.reference]
 
+    @property
+    def has_forces(self) -> bool:
+        """Whether it has masses or loads."""
+        return self.mechanism.has_masses or bool(self.mechanism.loads)
+
     @cached_property
     def plan(self) -> SolvePlan:
         """How it is solved."""

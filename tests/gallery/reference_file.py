@@ -1,6 +1,7 @@
 """fmus/<name>/reference.csv: the reference of a mechanism in numbers, as scripts/references writes it.
 
     time, then q, qd, qdd of every output of the mechanism, 20 digits; about 20 samples of the mechanism's run
+    of a mechanism with masses then also efforts of the drivers, reactions of the joints and the kinetic energy
 
 `python -m tests.gallery.reference_file [name ...]` writes those of the mechanisms named, or of all.
 """
@@ -14,6 +15,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tests.gallery.forces import force_row
 from tests.gallery.references import REFERENCES
 from tests.power_series import mp
 
@@ -48,6 +50,7 @@ def row(name: str, t: float) -> dict[str, str]:
         for coordinate, series in motion.items():
             owner, _, letter = coordinate.rpartition(".")
             cells[f"{owner}.{RATES[letter][order]}"] = _written(mp.factorial(order) * series.c[order])
+    cells |= {column: _written(value) for column, value in force_row(name, t).items()}
     return cells
 
 

@@ -178,6 +178,14 @@ def slider_crank(u: Series) -> Coordinates:
     return {"crank.phi": u, **body("rod", p, heading(s - p, 0)), "piston.x": s.x}
 
 
+@reference(crank_angle=turning(0, 18000))
+def engine(u: Series) -> Coordinates:
+    """The same dimensions, the piston on x = 0 above the crank, whose angle is 0 where it points to the piston."""
+    p = turned(u, 0, 45)
+    s = Vector(0, p.y + sqrt(144**2 - p.x * p.x))
+    return {"crank.phi": u, **body("rod", p, heading(s - p, 1.5) - mp.pi / 2), "piston.y": s.y}
+
+
 @reference(crank_angle=turning(0, 180))
 def offset_slider_crank(u: Series) -> Coordinates:
     """Crank 30, rod 100, its end on y = 20."""
@@ -244,6 +252,21 @@ def watt_six_bar(u: Series) -> Coordinates:
         **body("left", r, heading(t - r, 1)),
         **body("right", s, heading(t - s, 2)),
         **point("T", t),
+    }
+
+
+@reference(crank_angle=turning(90, 360))
+def toggle_press(u: Series) -> Coordinates:
+    """Crank 80 about (-520, 300), rod 430 to the knee of two links of 300; the upper one hangs from (0, 600)."""
+    p, top = Vector(-520, 300) + turned(u, 80), Vector(0, 600)
+    k = meet(p, 430, top, 300, RIGHT)
+    s = Vector(0, k.y - sqrt(300**2 - k.x * k.x))
+    return {
+        "crank.phi": u,
+        **body("rod", p, heading(k - p, 0)),
+        "upper_link.phi": heading(k - top, -1.8),
+        **body("lower_link", k, heading(s - k, -1.3)),
+        "ram.y": s.y,
     }
 
 
@@ -320,6 +343,12 @@ def jansen_leg(u: Series) -> Coordinates:
         **body("leg", bottom, heading(knee - bottom, 3)),
         **point("foot", foot),
     }
+
+
+@reference(crank_angle=turning(0, 360))
+def jansen_leg_loaded(u: Series) -> Coordinates:
+    """The same lengths."""
+    return jansen_leg(u)
 
 
 @reference(stylus_x_position=swinging(80, 20, 0.25, 90), stylus_y_position=swinging(30, 20, 0.25))
@@ -409,11 +438,14 @@ def geared_five_bar(u: Series) -> Coordinates:
     }
 
 
-@reference(
-    boom_cylinder_length=rising(2.25, (1, 4, 0.4), shape=three_four_five),
-    stick_cylinder_length=rising(2.45, (0, 4, 0.45), shape=three_four_five),
-    bucket_cylinder_length=rising(1.85, (0.5, 4, 0.5), shape=three_four_five),
-)
+_DIGGING: dict[str, Law] = {
+    "boom_cylinder_length": rising(2.25, (1, 4, 0.4), shape=three_four_five),
+    "stick_cylinder_length": rising(2.45, (0, 4, 0.45), shape=three_four_five),
+    "bucket_cylinder_length": rising(1.85, (0.5, 4, 0.5), shape=three_four_five),
+}
+
+
+@reference(**_DIGGING)
 def excavator(boom_length: Series, stick_length: Series, bucket_length: Series) -> Coordinates:
     """Boom, stick and bucket, each by the triangle that its cylinder spans; the bucket behind a four-bar linkage."""
     eye, stick_foot, p = Vector(2.4, 0.9), Vector(2.9, 1.3), Vector(5.6, 0)
@@ -444,6 +476,12 @@ def excavator(boom_length: Series, stick_length: Series, bucket_length: Series) 
         **body("bucket", q, bucket_phi),
         **point("tip", q + turned(bucket_phi, 1.4, 0)),
     }
+
+
+@reference(**_DIGGING)
+def excavator_loaded(boom_length: Series, stick_length: Series, bucket_length: Series) -> Coordinates:
+    """The same dimensions and laws."""
+    return excavator(boom_length, stick_length, bucket_length)
 
 
 def _length(way: Vector) -> Quantity:

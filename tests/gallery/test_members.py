@@ -20,6 +20,7 @@ from tests.gallery.references import REFERENCES
 from tests.oracle import mp
 
 AGREEMENT = 1e-11  # of a column's largest magnitude
+FORCES_AGREE = 1e-11  # of a column's largest magnitude; of the largest reaction, if a column is zero
 CLOSURE = 1e-12  # of the size
 
 every_member = pytest.mark.parametrize("name", gallery.names())
@@ -44,7 +45,11 @@ def test_the_reference_holds_samples_of_the_run_and_every_output(name: str, memb
     run = kinfmu.solve(asked.plan, asked.times[:1])
     columns = [column.name for column in run.columns()]
     first = 1 + len(run.input_names)
-    assert list(asked.reference[0]) == ["time", *columns[first : first + 3 * len(run.outputs)]]
+    motion = ["time", *columns[first : first + 3 * len(run.outputs)]]
+    assert list(asked.reference[0])[: len(motion)] == motion
+    forces = list(asked.reference[0])[len(motion) :]
+    efforts = [name for name in run.force_names if name.noun in {"torque", "force"}]
+    assert sorted(forces) == sorted([*efforts, *run.reaction_names, "kinetic_energy"] if asked.has_forces else [])
     assert 15 <= len(asked.reference) <= 25
     grid = kinfmu.sweep.run_times(asked.mechanism.run)
     assert set(asked.times) <= set(grid.tolist())
@@ -67,7 +72,9 @@ def test_check_finds_nothing_wrong_and_a_driver_for_every_freedom(name: str, mem
 @every_member
 def test_solved_it_equals_the_reference(name: str, member: Callable[[str], Member]) -> None:
     asked = member(name)
-    assert _largest_disagreement(kinfmu.solve(asked.plan, asked.times), asked) <= AGREEMENT
+    run = kinfmu.solve(asked.plan, asked.times)
+    assert _largest_disagreement(run, asked) <= AGREEMENT
+    assert _largest_force_disagreement(run, asked) <= FORCES_AGREE
 
 
 @every_member
@@ -102,9 +109,8 @@ def _largest_disagreement(run: Run, asked: Member) -> float:
     """
     np.testing.assert_allclose(run.t, asked.times, rtol=1e-12, atol=1e-12)
     assert run.good.all()
-    exact = {
-        name: [mp.mpf(sample[name]) for sample in asked.reference] for name in asked.reference[0] if name != "time"
-    }
+    coordinates = list(asked.reference[0])[1 : 1 + 3 * len(run.outputs)]
+    exact = {name: [mp.mpf(sample[name]) for sample in asked.reference] for name in coordinates}
     largest = {name: max(map(abs, column)) for name, column in exact.items()}
 
     def scale(name: str) -> object:
@@ -115,6 +121,17 @@ def _largest_disagreement(run: Run, asked: Member) -> float:
         float(abs(mp.mpf(float(ours)) - value) / scale(name))
         for name, column in exact.items()
         for ours, value in zip(run[name], column, strict=True)
+    )
+
+
+def _largest_force_disagreement(run: Run, asked: Member) -> float:
+    """Return the largest |ours - reference| of all forces, each relative to its largest magnitude."""
+    names = [name for name in (*run.force_names, *run.reaction_names) if name in asked.reference[0]]
+    exact = {name: np.array([float(sample[name]) for sample in asked.reference]) for name in names}
+    usual = max((np.abs(column).max() for column in exact.values()), default=0.0)
+    return max(
+        (float(np.abs(run[name] - column).max() / (np.abs(column).max() or usual)) for name, column in exact.items()),
+        default=0.0,
     )
 
 

@@ -23,7 +23,7 @@ every_member = pytest.mark.parametrize("name", gallery.names())
 
 @cache
 def loaded(name: str) -> Mechanism:
-    """A mechanism of the gallery whose bodies have masses beside their origins."""
+    """A mechanism of the gallery whose bodies have masses beside their origins, without its own loads."""
     mechanism = gallery.load(name)
     metre = METRES[mechanism.length_unit]
     size = max(abs(value) for body in mechanism.bodies for point in body.points.values() for value in point)
@@ -33,12 +33,13 @@ def loaded(name: str) -> Mechanism:
         else replace(
             body,
             mass=1.0 + 0.37 * k,
+            rod=None,
             center_of_mass=(size * (0.3 + 0.01 * k), size * (0.11 - 0.02 * k)),
             inertia=(0.4 + 0.1 * k) * (size * metre) ** 2,
         )
         for k, body in enumerate(mechanism.bodies)
     ]
-    return replace(mechanism, bodies=tuple(bodies), gravity=(GRAVITY[0] / metre, GRAVITY[1] / metre))
+    return replace(mechanism, bodies=tuple(bodies), gravity=(GRAVITY[0] / metre, GRAVITY[1] / metre), loads=())
 
 
 def some_samples(run: Run, count: int = 7) -> list[int]:
