@@ -28,11 +28,12 @@ def single(
     run: Run,
     scene: Scene | None,
     curves: Mapping[tuple[str, str], Group],
+    forces: Sequence[Group],
     solver: Sequence[Group],
 ) -> rrb.Blueprint:
     """Return the layout of one run: linkage on the left; on the right one row per order, one column per unit.
 
-    The solver's diagnostics are below the curves.
+    Efforts and energies, then the solver's diagnostics are below the curves.
     """
     import rerun.blueprint as rrb
 
@@ -41,6 +42,9 @@ def single(
         found = [curves[order, kind] for kind in KINDS if (order, kind) in curves]
         if found:
             rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run]) for group in found]))
+    if forces:
+        width = NARROW if len(forces) > len(KINDS) else PLOT
+        rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], width) for group in forces]))
     shares = [2.0] * len(rows)
     if solver:
         rows.append(rrb.Horizontal(*[plot(group.title, [("", group)], timeline, [run], NARROW) for group in solver]))

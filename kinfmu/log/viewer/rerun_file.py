@@ -4,6 +4,8 @@
     /linkage/paths/...  where points of interest go; /linkage/trails/...: where they just came from
     /position/angle     and /position/length, /velocity/..., /acceleration/...: one entity for each kind of quantity,
                         one curve a coordinate, in rad and the mechanism's unit of length
+    /forces/torque      efforts of drivers, with /forces/force, /forces/power, /forces/energy [N m, N, W, J]
+    /linkage/forces     arrows of the forces that joints transmit, with a legend
     /solver/accuracy    log10 of residual and watches; /solver/error: of the estimated errors; /solver/margin
     /solver/iterations  of Newton's method
     /solver/status      a lane of states
@@ -30,11 +32,12 @@ import numpy as np
 from kinfmu.errors import LogError
 from kinfmu.log.cdr import nanoseconds
 from kinfmu.log.target import replacing
+from kinfmu.log.viewer.arrows import log_arrows
 from kinfmu.log.viewer.blueprint import single
 from kinfmu.log.viewer.card import card
 from kinfmu.log.viewer.decimated import decimated
 from kinfmu.log.viewer.linkage import APPLICATION, Linkage, send
-from kinfmu.log.viewer.series import Group, accuracy, error_estimates, groups, iterations, margin
+from kinfmu.log.viewer.series import Group, accuracy, efforts, error_estimates, groups, iterations, margin
 from kinfmu.log.viewer.timeline import Timeline, timeline_of
 from kinfmu.run import Run
 from kinfmu.run.verdict import changes, label, notable_events, sentence
@@ -71,13 +74,16 @@ def write_rrd(run: Run, path: str | Path) -> None:
     scene, note = drawable(shown)
     curves = groups(shown)
     solver = [group for group in (accuracy(shown), error_estimates(shown), margin(shown), iterations(shown)) if group]
+    forces = efforts(shown)
     name = run.info.get("title") or run.info.get("name") or Path(path).stem
-    layout = single(timeline, shown, scene, curves, solver)
-    with recording(path, name, layout, application([shown], curves.values())) as rec:
+    layout = single(timeline, shown, scene, curves, forces, solver)
+    with recording(path, name, layout, application([shown], [*curves.values(), *forces])) as rec:
         rec.send_property("kinfmu", _properties(run))
         if scene:
-            Linkage(rec, "/linkage", timeline, shown, scene).log()
-        for group in (*curves.values(), *solver):
+            linkage = Linkage(rec, "/linkage", timeline, shown, scene)
+            linkage.log()
+            log_arrows(linkage)
+        for group in (*curves.values(), *forces, *solver):
             log_group(rec, "", timeline, shown, group)
         log_status(rec, "", timeline, timeline.placed(run))
         log_card(rec, card(run, " ".join([*left_out(run, shown), note]).strip()))

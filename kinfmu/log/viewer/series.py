@@ -64,6 +64,28 @@ def groups(run: Run) -> dict[tuple[str, str], Group]:
     return found
 
 
+def efforts(run: Run) -> list[Group]:
+    """Return efforts, bias efforts and power of the drivers, and the energies, one group for each unit."""
+    found = []
+    for kind in ("torque", "force", "power", "energy"):
+        columns = [k for k, name in enumerate(run.force_names) if name.quantity.kind == kind and name not in run.absent]
+        if not columns or run.forces is None:
+            continue
+        values = np.where(run.good[:, None], run.forces[:, columns], np.nan)
+        size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+        found.append(
+            Group(
+                path=f"forces/{kind}",
+                title=f"{kind} [{unit_of(Quantity(kind), run.length_unit)}]",
+                names=tuple(str(run.force_names[k]) for k in columns),
+                colours=tuple(palette.body(place) for place in range(len(columns))),
+                values=values,
+                shown=shown_range(values, size),
+            )
+        )
+    return found
+
+
 def _title(quantity: Quantity, length_unit: str) -> str:
     """Return a title such as 'angular velocity [rad/s]'."""
     words = {"angle": ("angle", "angular velocity", "angular acceleration"), "length": ORDERS}[quantity.kind]

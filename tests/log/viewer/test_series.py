@@ -9,11 +9,12 @@ import pytest
 
 import kinfmu
 from kinfmu.log.viewer.blueprint import plot
-from kinfmu.log.viewer.series import SMALLEST, accuracy, error_estimates, groups, margin
+from kinfmu.log.viewer.series import SMALLEST, accuracy, efforts, error_estimates, groups, margin
 from kinfmu.log.viewer.timeline import timeline_of
 from kinfmu.run import Run
 from kinfmu.scene import palette
 from tests.log.runs import fourbar, with_gap
+from tests.sweep.test_forces import loaded
 
 
 def test_curves_are_grouped_by_unit(run: Run) -> None:
@@ -111,3 +112,17 @@ def test_errors_are_drawn_where_they_are_estimated(run: Run) -> None:
     assert np.flatnonzero(np.isfinite(group.values).all(axis=1)).tolist() == [0, 180]
     assert group.is_scattered
     assert error_estimates(dataclasses.replace(run, error=np.zeros_like(run.error))) is None
+
+
+def test_efforts_and_energies_have_a_plot_for_each_unit() -> None:
+    run = kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21))
+    found = efforts(run)
+    assert [group.title for group in found] == ["torque [N m]", "power [W]", "energy [J]"]
+    assert found[0].names == ("crank.torque", "crank.bias_torque")
+    np.testing.assert_array_equal(found[2].values[:, 0], run["kinetic_energy"])
+    kept = efforts(run.without(["crank.torque", "crank.bias_torque"]))
+    assert [group.path for group in kept] == ["forces/power", "forces/energy"]
+
+
+def test_a_run_without_masses_has_no_plot_of_forces(run: Run) -> None:
+    assert efforts(run) == []

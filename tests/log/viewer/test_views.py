@@ -17,6 +17,7 @@ from kinfmu.run.channels import select
 from kinfmu.sweep import run_times
 from tests.log.runs import KINDS, fourbar, with_gap
 from tests.log.viewer.test_rerun_file import verified
+from tests.sweep.test_forces import loaded
 
 MOST_SAMPLES = 60  # of a mechanism of the gallery
 
@@ -37,12 +38,17 @@ def _compared(path: Path) -> None:
     write_comparison(fourbar(np.arange(181.0)), with_gap(fourbar(np.arange(0.0, 181.0, 0.5)), 40, 60), path)
 
 
+def _loaded(path: Path) -> None:
+    write_rrd(kinfmu.solve(loaded("slider_crank"), np.linspace(0.0, 0.1, 21)), path)
+
+
 @pytest.mark.parametrize(
     ("name", "write", "views"),
     [
         ("gap.rrd", _single, {"linkage", "angular velocity [rad/s]", "log10 margin", "solver status", "log", "run"}),
         ("one.rrd", _one_sample, {"linkage", "position [m]"}),
         ("selected.rrd", _selected, {"linkage", "angle [rad]", "solver status"}),
+        ("loaded.rrd", _loaded, {"linkage", "torque [N m]", "power [W]", "energy [J]"}),
         ("compared.rrd", _compared, {"linkage", "B - A: position [m]", "position [m] of A (wide) and B"}),
     ],
 )

@@ -1,0 +1,53 @@
+"""Force arrows of a recording, at the joints of the moving linkage, and their legend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinfmu.log.viewer.linkage import MARGIN, Linkage, send
+from kinfmu.scene.forces import arrows
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+_COLOUR = (185, 28, 28)
+_ORDER = 50.0  # above the linkage
+_RADIUS = 0.005  # as a part of the size
+
+
+def log_arrows(linkage: Linkage) -> None:
+    """Log the forces that joints transmit, as the scene scales them; samples without numbers have no arrows."""
+    import rerun as rr
+
+    run, scene, path = linkage.run, linkage.scene, f"{linkage.root}/forces"
+    found = arrows(run, run.mechanism, scene) if run.reaction_names and run.mechanism else None
+    if found is None:
+        return
+    look: dict[str, Any] = {
+        "colors": [_COLOUR],
+        "radii": [_RADIUS * linkage.size],
+        "draw_order": linkage.layer + _ORDER,
+    }
+    for name, along in found.along.items():
+        entity = f"{path}/{name}"
+        known = np.asarray(np.isfinite(along + found.at[name]).all(axis=1))
+        linkage.rec.log(entity, rr.Arrows2D.from_fields(**look, labels=[name], show_labels=False), static=True)
+        tails, vectors = found.at[name].astype(np.float32), along.astype(np.float32)
+
+        def columns(
+            rows: slice, known: Any = known, tails: Any = tails, vectors: Any = vectors
+        ) -> Iterable[rr.ComponentColumn]:
+            chosen = known[rows]
+            columns = rr.Arrows2D.columns(origins=tails[rows][chosen], vectors=vectors[rows][chosen])
+            return columns.partition(chosen.astype(int))
+
+        send(linkage.rec, entity, linkage.timeline, run.t, columns)
+    corner = [float(scene.low[0]), float(scene.low[1] - 0.6 * MARGIN * scene.size)]
+    linkage.rec.log(
+        f"{path}/legend",
+        rr.Arrows2D(origins=[corner], vectors=[[found.length, 0.0]], labels=[found.legend], show_labels=True, **look),
+        static=True,
+    )
