@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from kinfmu.display import aligned
+
 SLICE = 0.02  # [s] that a way should run for in a round
 
 
@@ -34,12 +36,7 @@ def spread(measured: Sequence[float]) -> Spread:
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table: the first column to the left, the others to the right, as wide as their cells."""
-    lines = [head, *rows]
-    width, *widths = (max(map(len, column)) for column in zip(*lines, strict=True))
-    return [
-        "  ".join([name.ljust(width), *(cell.rjust(k) for cell, k in zip(cells, widths, strict=True))])
-        for name, *cells in lines
-    ]
+    return aligned([head, *rows], left=1, indent="")
 
 
 def in_turn(

@@ -1,8 +1,9 @@
-"""Values that show themselves in notebooks, and the HTML of their tables."""
+"""Values that show themselves in notebooks; their tables as HTML and as text."""
 
 from __future__ import annotations
 
+from kinfmu.display.columns import aligned
 from kinfmu.display.displayed import Displayed, html_of, svg_of
 from kinfmu.display.html import escaped, page, table
 
-__all__ = ["Displayed", "escaped", "html_of", "page", "svg_of", "table"]
+__all__ = ["Displayed", "aligned", "escaped", "html_of", "page", "svg_of", "table"]

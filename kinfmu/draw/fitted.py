@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -41,26 +41,26 @@ class Chart(NamedTuple):
     labels: tuple[str, str]
 
 
-def fitted(
-    mechanism: Mechanism,
-    path: str | Path | None,
-    ax: Axes | None,
-    at: float | None,
-    curves: Sequence[Curve],
-    charts: Sequence[Chart],
-) -> Axes | None:
+class Fitted(NamedTuple):
+    """What the figure of a fit shows.
+
+    mechanism: The mechanism, drawn where its only driver has the value `at`. curves: Paths in its plane. charts:
+    Functions; each has a panel of its own.
+    """
+
+    mechanism: Mechanism
+    at: float | None
+    curves: Sequence[Curve]
+    charts: Sequence[Chart]
+
+
+def fitted(path: str | Path | None, ax: Axes | None, content: Callable[[], Fitted]) -> None:
     """Draw a fitted mechanism.
 
     Args:
-        mechanism: The mechanism.
         path: The .svg or .png file.
         ax: Axes to draw into, in place of a file: the mechanism and curves, or the first chart without curves.
-        at: Value of the only driver at which the mechanism is drawn.
-        curves: Paths in the plane of the mechanism.
-        charts: Functions; each has a panel of its own.
-
-    Returns:
-        `ax`; None for a file.
+        content: Returns what is drawn.
 
     Raises:
         FigureError: As in `figure`.
@@ -68,35 +68,36 @@ def fitted(
 
     """
     check_target("figure", path, ax)
-    if path is None and ax is not None:
-        if curves or not charts:
-            _mechanism(ax, mechanism, at, curves)
-        else:
-            _chart(ax, charts[0])
-        return ax
-
-    def draw() -> Figure:
-        from matplotlib.figure import Figure
-
-        count = 1 + len(charts)
-        made = Figure(figsize=(count * _SIDE / INCH, 0.85 * _SIDE / INCH), dpi=INCH, facecolor="white")
-        panels = [made.add_subplot(1, count, k + 1) for k in range(count)]
-        made.subplots_adjust(left=0.12 / count, right=1.0 - 0.05 / count, bottom=0.11, top=0.9, wspace=0.22)
-        _mechanism(panels[0], mechanism, at, curves)
-        for axes, chart in zip(panels[1:], charts, strict=True):
-            _chart(axes, chart)
-        return made
-
-    write(Path(str(path)), draw)
-    return None
+    if ax is None:
+        write(Path(str(path)), lambda: figure_of(content()))
+        return
+    shown = content()
+    if shown.curves or not shown.charts:
+        _mechanism(ax, shown)
+    else:
+        _chart(ax, shown.charts[0])
 
 
-def _mechanism(axes: Axes, mechanism: Mechanism, at: float | None, curves: Sequence[Curve]) -> None:
-    figure(mechanism, at=at, ax=axes)
-    for curve in curves:
+def figure_of(shown: Fitted) -> Figure:
+    """Return the figure of matplotlib: the mechanism with the curves, and a panel for each chart."""
+    from matplotlib.figure import Figure
+
+    count = 1 + len(shown.charts)
+    made = Figure(figsize=(count * _SIDE / INCH, 0.85 * _SIDE / INCH), dpi=INCH, facecolor="white")
+    panels = [made.add_subplot(1, count, k + 1) for k in range(count)]
+    made.subplots_adjust(left=0.12 / count, right=1.0 - 0.05 / count, bottom=0.11, top=0.9, wspace=0.22)
+    _mechanism(panels[0], shown)
+    for axes, chart in zip(panels[1:], shown.charts, strict=True):
+        _chart(axes, chart)
+    return made
+
+
+def _mechanism(axes: Axes, shown: Fitted) -> None:
+    figure(shown.mechanism, at=shown.at, ax=axes)
+    for curve in shown.curves:
         _draw(axes, curve)
-    if curves:
-        points = np.vstack([curve.wanted for curve in curves])
+    if shown.curves:
+        points = np.vstack([curve.wanted for curve in shown.curves])
         low, high = points.min(axis=0), points.max(axis=0)
         x, y = axes.get_xlim(), axes.get_ylim()
         space = 0.03 * max(x[1] - x[0], y[1] - y[0])  # for the marks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +14,16 @@ from kinfmu.draw.scatter import MOST_COLUMNS, scatter_matrix
 from kinfmu.draw.study_panels import Quantities
 from kinfmu.draw.writing import check_suffix, write
 from kinfmu.errors import FigureError, StudyError, listed, suggestion
-
-if TYPE_CHECKING:
-    from kinfmu.studies.result import StudyResult
+from kinfmu.studies.rows import StudyRows
 
 
-def draw(result: StudyResult, path: Path, measures: tuple[str, ...]) -> None:
+def draw(result: StudyRows, path: Path, measures: tuple[str, ...]) -> None:
     """Draw the results of a study into a file; measures: which, default: all."""
     check_suffix(path)
     write(path, lambda: figure_of(result, measures))
 
 
-def figure_of(result: StudyResult, measures: tuple[str, ...] = ()) -> Any:
+def figure_of(result: StudyRows, measures: tuple[str, ...] = ()) -> Any:
     """Return the Figure of matplotlib that shows the results of a study.
 
     Raises:
@@ -65,7 +63,7 @@ def figure_of(result: StudyResult, measures: tuple[str, ...] = ()) -> Any:
     return scatter_matrix(parameters, columns, f"{title}: {len(result)} designs")
 
 
-def picture_of(result: StudyResult) -> str:
+def picture_of(result: StudyRows) -> str:
     """Return 'response', 'contours', 'contributions' or 'scatter'."""
     if result.nominal.deviations:
         return "contributions"
@@ -73,11 +71,11 @@ def picture_of(result: StudyResult) -> str:
     return {1: "response", 2: "contours"}.get(len(grids), "scatter") if all(grids) else "scatter"
 
 
-def _column(result: StudyResult, name: str) -> Quantities:
+def _column(result: StudyRows, name: str) -> Quantities:
     return Quantities(name, result.units[name], result[name])
 
 
-def _contributed(result: StudyResult, name: str) -> Contributed:
+def _contributed(result: StudyRows, name: str) -> Contributed:
     parts = result.nominal.contributions(name)
     known = parts if np.isfinite(list(parts.values())).all() else {}
     return Contributed(

@@ -20,7 +20,8 @@ from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.nominal import nominal
 from kinfmu.studies.parts import Parts, remove_finished
-from kinfmu.studies.result import StudyResult, is_result_of
+from kinfmu.studies.result import StudyResult
+from kinfmu.studies.rows import is_result_of
 from kinfmu.studies.sampling import METHODS
 from kinfmu.studies.table import join, part_bytes, schema_of
 from kinfmu.studies.workers import results

@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from kinfmu.studies.result import StudyResult
+from kinfmu.display import aligned
+from kinfmu.studies.rows import StudyRows
 
 MOST_CONTRIBUTIONS = 5  # of a measure
 _HEADER = ("measure", "unit", "nominal", "mean", "deviation", "min", "max", "failures")
 _FIRST_ORDER = "first order"
 
 
-def summary(result: StudyResult) -> str:
+def summary(result: StudyRows) -> str:
     """Return the summary table of a study, and for tolerances what each contributes."""
-    lines = [about(result), "", *_aligned(measure_rows(result))]
+    lines = [about(result), "", *aligned(measure_rows(result), left=2)]
     if result.nominal.reason:
         lines += ["", f"the design as written has no numbers: {result.nominal.reason}"]
     if result.nominal.deviations:
         lines += ["", "contributions to the variance, to first order:"]
-        lines += _aligned([_contributions(result, name) for name in result.measures], left=3)
+        lines += aligned([_contributions(result, name) for name in result.measures], left=3)
     failed = failures(result)
     if failed:
         lines += ["", failed]
-    return "\n".join(line.rstrip() for line in lines)
+    return "\n".join(lines)
 
 
-def failures(result: StudyResult) -> str:
+def failures(result: StudyRows) -> str:
     """Return how many designs lack a measure, and why the first does, as a line; '' if none does."""
     if result.first_failure is None:
         return ""
@@ -35,7 +34,7 @@ def failures(result: StudyResult) -> str:
     return f"{count} of {len(result)} designs lack a measure, the first is design {first}: {reason}"
 
 
-def about(result: StudyResult) -> str:
+def about(result: StudyRows) -> str:
     """Return what was studied, as a line."""
     said = result.definition
     how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[said["sampling"]]
@@ -44,7 +43,7 @@ def about(result: StudyResult) -> str:
     return f"{result.mechanism.name}: {len(result)} designs ({how}{seed}) over {varied}; {said['motion']['over']}"
 
 
-def measure_rows(result: StudyResult) -> list[tuple[str, ...]]:
+def measure_rows(result: StudyRows) -> list[tuple[str, ...]]:
     """Return the header of the summary table, and a row for each measure."""
     has_tolerances = bool(result.nominal.deviations)
     header = list(_HEADER)
@@ -61,7 +60,7 @@ def measure_rows(result: StudyResult) -> list[tuple[str, ...]]:
     return rows
 
 
-def _contributions(result: StudyResult, measure: str) -> tuple[str, ...]:
+def _contributions(result: StudyRows, measure: str) -> tuple[str, ...]:
     """Return a line: the largest contributions to a measure, and how its derivatives were found."""
     found = result.nominal.contributions(measure)
     method = f"(by {result.nominal.measures[measure].method})"
@@ -77,16 +76,3 @@ def _contributions(result: StudyResult, measure: str) -> tuple[str, ...]:
 
 def _short(number: float, digits: int = 6) -> str:
     return f"{number:.{digits}g}" if isfinite(number) else "-"
-
-
-def _aligned(rows: list[tuple[str, ...]], left: int = 2) -> list[str]:
-    """Return rows as lines with columns of equal width; the first columns are aligned to the left, others right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  "
-        + "  ".join(
-            text.ljust(width) if k < left else text.rjust(width)
-            for k, (text, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    ]

@@ -12,8 +12,9 @@ from kinfmu.errors import AssemblyError, RequestError
 from kinfmu.run import FloatArray
 from kinfmu.sweep.model import require_engine
 from kinfmu.synthesis.fit_file import read_problem
+from kinfmu.synthesis.outcome import Optimum
 from kinfmu.synthesis.problem import FitProblem
-from kinfmu.synthesis.result import FitResult, Optimum, result_of
+from kinfmu.synthesis.result import FitResult, result_of
 from kinfmu.synthesis.search import Found, distinct, start_points
 from kinfmu.synthesis.team import Team
 

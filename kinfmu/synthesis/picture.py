@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinfmu.draw.fitted import Chart, Curve, fitted
+from kinfmu.draw.fitted import Chart, Curve, Fitted, fitted
 from kinfmu.run import FloatArray
 from kinfmu.sweep import solve
-from kinfmu.synthesis.result import FitResult, TargetErrors, argument_unit
+from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
 from kinfmu.synthesis.sampled import Sampled
 
 if TYPE_CHECKING:
@@ -20,8 +20,13 @@ if TYPE_CHECKING:
 _SAMPLES = 361
 
 
-def draw(result: FitResult, path: str | Path | None, ax: Axes | None) -> None:
+def draw(result: FitOutcome, path: str | Path | None, ax: Axes | None) -> None:
     """Draw the targets and the mechanism of a result; errors as in `kinfmu.draw.figure`."""
+    fitted(path, ax, lambda: content_of(result))
+
+
+def content_of(result: FitOutcome) -> Fitted:
+    """Return what the figure of a result shows."""
     argument = result.problem.argument
     curves, charts, at = [], [], None
     for target, errors in zip(result.problem.sampled, result.errors, strict=False):
@@ -39,17 +44,17 @@ def draw(result: FitResult, path: str | Path | None, ax: Axes | None) -> None:
             curves.append(Curve(target.name, errors.wanted[:, :2], errors.reached[:, :2], whole))
         if at is None and argument.input:
             at = float(errors.at[0])
-    fitted(result.mechanism, path, ax, at, curves, charts)
+    return Fitted(result.mechanism, at, curves, charts)
 
 
-def _outputs(result: FitResult, names: tuple[str, ...], values: FloatArray) -> FloatArray:
+def _outputs(result: FitOutcome, names: tuple[str, ...], values: FloatArray) -> FloatArray:
     """Return outputs of the mechanism found (n, names)."""
     mechanism = replace(result.mechanism, points=result.problem.traced.points)
     run = solve(mechanism, **result.problem.argument.keywords(values))
     return np.column_stack([run[name] for name in names])
 
 
-def _chart(result: FitResult, target: Sampled, errors: TargetErrors) -> Chart:
+def _chart(result: FitOutcome, target: Sampled, errors: TargetErrors) -> Chart:
     """Return a function over the driver or another output, angles in degrees."""
     argument = result.problem.argument
     low, high = float(errors.at.min()), float(errors.at.max())

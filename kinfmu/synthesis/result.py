@@ -1,100 +1,29 @@
-"""FitResult: the mechanism that a fit found, its errors, and the other optima."""
+"""FitResult: what a fit found, as text, as a figure and in notebooks."""
 
 from __future__ import annotations
 
-import html
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError
-from kinfmu.mechanism import Mechanism
-from kinfmu.run import FloatArray
 from kinfmu.sweep.continued import continued
 from kinfmu.synthesis.equations import Equations, Evaluation, NotAssembledError
+from kinfmu.synthesis.outcome import ConstraintResult, FitOutcome, Optimum, TargetErrors
 from kinfmu.synthesis.problem import FitProblem
-from kinfmu.units import unit_of
+from kinfmu.synthesis.text import report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HOLDS = 1e-6  # violation relative to the limit, or to 1, up to which a constraint holds
-MOST_OPTIMA = 10  # in a text
 _SAME = 1e-6  # relative difference of sums up to which a mechanism file gives the motion that was fitted
 
 
-@dataclass(frozen=True)
-class Optimum:
-    """A local optimum.
-
-    Attributes:
-        parameters: Values of the unknowns by name.
-        total: Weighted sum of squares, with penalties.
-        searches: Number of whole searches that ended there.
-
-    """
-
-    parameters: Mapping[str, float]
-    total: float
-    searches: int
-
-
-@dataclass(frozen=True, eq=False)
-class TargetErrors:
-    """The errors of a target.
-
-    Attributes:
-        name: Name of the target.
-        type: Its type, such as 'path'.
-        names: Names of the d columns.
-        units: Their units.
-        argument: Name of the driver, or 'time'.
-        at: (m,) its values at the points; empty for a measure.
-        wanted: (m, d).
-        reached: (m, d).
-        errors: (m, d) reached minus wanted; of angles without whole turns.
-        rms: Root of the mean square of the points' errors; angles of poses count times their length.
-        largest: Largest error of a point.
-
-    """
-
-    name: str
-    type: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    argument: str
-    at: FloatArray
-    wanted: FloatArray
-    reached: FloatArray
-    errors: FloatArray
-    rms: float
-    largest: float
-
-
-@dataclass(frozen=True)
-class ConstraintResult:
-    """How far a constraint is met.
-
-    Attributes:
-        name: Name of the constraint.
-        text: The value and its limit.
-        violation: By how much the limit is exceeded; 0 if it is not.
-        holds: Whether it is met, within a millionth of the limit.
-
-    """
-
-    name: str
-    text: str
-    violation: float
-    holds: bool
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FitResult:
+class FitResult(FitOutcome, Displayed):
     """The best design that a fit found.
 
     Attributes:
@@ -112,27 +41,11 @@ class FitResult:
 
     """
 
-    problem: FitProblem
-    parameters: Mapping[str, float]
-    mechanism: Mechanism
-    errors: tuple[TargetErrors, ...]
-    residuals: FloatArray
-    squares: float
-    constraints: tuple[ConstraintResult, ...]
-    optima: tuple[Optimum, ...]
-    tried: int
-    refused: Mapping[str, int]
-    note: str = ""
+    def __repr__(self) -> str:
+        return f"<Fit of {self.mechanism.name}: sum of squares {self.squares:.6g}, rms {self.rms:.6g}>"
 
-    @property
-    def rms(self) -> float:
-        """Root of the mean of the squares of the residuals."""
-        return math.sqrt(self.squares / max(1, len(self.residuals)))
-
-    @property
-    def holds(self) -> bool:
-        """Whether all constraints are met."""
-        return all(one.holds for one in self.constraints)
+    def __str__(self) -> str:
+        return "\n".join(report(self))
 
     def figure(self, path: str | Path | None = None, *, ax: Axes | None = None) -> None:
         """Draw what was wanted, what is reached, and the mechanism at one pose.
@@ -149,19 +62,6 @@ class FitResult:
         from kinfmu.synthesis.picture import draw
 
         draw(self, path, ax)
-
-    def __str__(self) -> str:
-        from kinfmu.synthesis.text import report
-
-        return report(self)
-
-    def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}</td><td style='text-align:right'>{value:.9g}</td></tr>"
-            for name, value in self.parameters.items()
-        )
-        title = f"{html.escape(self.mechanism.name)}: sum of squares {self.squares:.6g}, rms {self.rms:.6g}"
-        return f"<table><caption>{title}</caption><tr><th>unknown</th><th>value</th></tr>{rows}</table>"
 
 
 def result_of(equations: Equations, optima: Sequence[Optimum], tried: int, refused: Mapping[str, int]) -> FitResult:
@@ -261,8 +161,3 @@ def _constraints(problem: FitProblem, found: Evaluation) -> list[ConstraintResul
         text = f"{aim.reading.type} = {float(value):.6g}{shown}, {' and '.join(limits)}{shown}"
         constraints.append(ConstraintResult(aim.name, text, violation, violation <= HOLDS * size))
     return constraints
-
-
-def argument_unit(problem: FitProblem) -> str:
-    """Return the unit of the argument of the motion."""
-    return unit_of(problem.argument.quantity, problem.mechanism.length_unit)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
-from kinfmu.synthesis.result import MOST_OPTIMA, FitResult, TargetErrors, argument_unit
+from kinfmu.display import aligned
+from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
 from kinfmu.units import unit_of
 
+MOST_OPTIMA = 10
 _MOST_POINTS = 40  # of a target in the table
 
 
-def report(result: FitResult) -> str:
-    """Return the report as lines."""
+def report(result: FitOutcome) -> list[str]:
+    """Return the lines of the report."""
     lines = [
         f"{result.mechanism.name}: sum of squares {result.squares:.9g}, rms {result.rms:.6g}, "
         f"{result.tried} designs tried"
@@ -30,15 +32,16 @@ def report(result: FitResult) -> str:
         for met in result.constraints:
             verdict = "holds" if met.holds else f"VIOLATED by {met.violation:.3g}"
             lines.append(f"  {met.name}: {verdict}; {met.text}")
-    lines += ["", "parameters", *_parameters(result), "", "local optima"]
+    lines += ["", "parameters", *aligned([("", "value", "unit", "bounds", ""), *parameter_rows(result)])]
+    lines += ["", "local optima"]
     rows = [
         (f"{k}", f"{one.total:.9g}", f"{one.searches}", *(f"{value:.6g}" for value in one.parameters.values()))
         for k, one in enumerate(result.optima[:MOST_OPTIMA], start=1)
     ]
-    lines += _table(("", "sum of squares", "searches", *result.parameters), rows)
+    lines += aligned([("", "sum of squares", "searches", *result.parameters), *rows])
     if len(result.optima) > MOST_OPTIMA:
         lines.append(f"  and {len(result.optima) - MOST_OPTIMA} more")
-    return "\n".join(lines)
+    return lines
 
 
 def _target(one: TargetErrors, unit: str) -> Iterable[str]:
@@ -67,16 +70,16 @@ def _target(one: TargetErrors, unit: str) -> Iterable[str]:
         u, wanted, reached, error = row
         size = math.sqrt(float(error @ error)) if len(set(one.units)) == 1 else float(np.abs(error).max())
         rows.append((f"{k}", f"{u:.4f}", *(f"{n:.6g}" for n in wanted), *(f"{n:.6g}" for n in reached), f"{size:.3g}"))
-    yield from _table(titles, rows[:_MOST_POINTS])
+    yield from aligned([titles, *rows[:_MOST_POINTS]])
     if len(rows) > _MOST_POINTS:
         yield f"  and {len(rows) - _MOST_POINTS} more points"
 
 
-def _parameters(result: FitResult) -> Iterable[str]:
-    """Yield the unknowns with their units and bounds."""
+def parameter_rows(result: FitOutcome) -> list[tuple[str, ...]]:
+    """Return the unknowns with their values, units and bounds, and at which bound they are."""
     problem = result.problem
     settable = problem.mechanism.settable
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, value in result.parameters.items():
         setting = settable.constants.get(name) or problem.mechanism.parameters.get(name)
         quantity = setting.quantity if setting is not None else None
@@ -85,13 +88,4 @@ def _parameters(result: FitResult) -> Iterable[str]:
         near = 1e-6 * (high - low)
         at = "at its lower bound" if value - low < near else "at its upper bound" if high - value < near else ""
         rows.append((name, f"{value:.12g}", unit, f"[{low:.6g}, {high:.6g}]", at))
-    return _table(("", "value", "unit", "bounds", ""), rows)
-
-
-def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Return lines of columns that are aligned to the right."""
-    widths = [max(len(row[k]) for row in (titles, *rows)) for k in range(len(titles))]
-    return [
-        ("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))).rstrip()
-        for row in (titles, *rows)
-    ]
+    return rows

@@ -109,7 +109,11 @@ def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     saved = kinfmu.load(str(out))
     assert {name: saved.parameters[name].value for name in BOUNDS} == pytest.approx(dict(expected.parameters))
     assert "curve: wanted" in figure.read_text(encoding="utf-8")
-    assert "<table>" in expected._repr_html_()
+    page = expected._repr_html_()
+    assert page is not None
+    assert all(f">{name}<" in page for name in (*BOUNDS, "curve"))
+    assert page.count("<img ") == 1
+    assert "curve: wanted" in str(expected._repr_svg_())
 
 
 def _path(**keys: Any) -> dict[str, Any]:

@@ -1,0 +1,110 @@
+"""What a fit found: the mechanism, its errors, what its constraints say, and the other optima."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from kinfmu.mechanism import Mechanism
+from kinfmu.run import FloatArray
+from kinfmu.synthesis.problem import FitProblem
+from kinfmu.units import unit_of
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A local optimum.
+
+    Attributes:
+        parameters: Values of the unknowns by name.
+        total: Weighted sum of squares, with penalties.
+        searches: Number of whole searches that ended there.
+
+    """
+
+    parameters: Mapping[str, float]
+    total: float
+    searches: int
+
+
+@dataclass(frozen=True, eq=False)
+class TargetErrors:
+    """The errors of a target.
+
+    Attributes:
+        name: Name of the target.
+        type: Its type, such as 'path'.
+        names: Names of the d columns.
+        units: Their units.
+        argument: Name of the driver, or 'time'.
+        at: (m,) its values at the points; empty for a measure.
+        wanted: (m, d).
+        reached: (m, d).
+        errors: (m, d) reached minus wanted; of angles without whole turns.
+        rms: Root of the mean square of the points' errors; angles of poses count times their length.
+        largest: Largest error of a point.
+
+    """
+
+    name: str
+    type: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    argument: str
+    at: FloatArray
+    wanted: FloatArray
+    reached: FloatArray
+    errors: FloatArray
+    rms: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class ConstraintResult:
+    """How far a constraint is met.
+
+    Attributes:
+        name: Name of the constraint.
+        text: The value and its limit.
+        violation: By how much the limit is exceeded; 0 if it is not.
+        holds: Whether it is met, within a millionth of the limit.
+
+    """
+
+    name: str
+    text: str
+    violation: float
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FitOutcome:
+    """What a fit found; attributes as in `FitResult`."""
+
+    problem: FitProblem
+    parameters: Mapping[str, float]
+    mechanism: Mechanism
+    errors: tuple[TargetErrors, ...]
+    residuals: FloatArray
+    squares: float
+    constraints: tuple[ConstraintResult, ...]
+    optima: tuple[Optimum, ...]
+    tried: int
+    refused: Mapping[str, int]
+    note: str = ""
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean of the squares of the residuals."""
+        return math.sqrt(self.squares / max(1, len(self.residuals)))
+
+    @property
+    def holds(self) -> bool:
+        """Whether all constraints are met."""
+        return all(one.holds for one in self.constraints)
+
+
+def argument_unit(problem: FitProblem) -> str:
+    """Return the unit of the argument of the motion."""
+    return unit_of(problem.argument.quantity, problem.mechanism.length_unit)
