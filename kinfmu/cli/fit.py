@@ -29,6 +29,12 @@ def fit(file: Path, output: Path | None, picture: Path | None, starts: int, seed
     """
     from kinfmu.gallery import save
     from kinfmu.synthesis import fit as fitted
+    from kinfmu.synthesis.fit_file import mechanism_file
+
+    if output is not None:
+        for own, what in ((file, "the fit file"), (mechanism_file(file), "its mechanism")):
+            if own is not None and output.exists() and output.samefile(own):
+                raise click.UsageError(f"-o {output} would replace {what}; choose another name")
 
     with Progress("fitting", 1) as show:
         result = fitted(file, starts=starts, seed=seed, workers=workers, progress=show)

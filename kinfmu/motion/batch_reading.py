@@ -16,7 +16,7 @@ from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
-from kinfmu.motion.measure import chosen_measures, measure, reason_without_value
+from kinfmu.motion.measure import chosen_measures, listed_measures, measure, reason_without_value
 from kinfmu.motion.motion import Motion, argument_of
 from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
@@ -74,9 +74,13 @@ class BatchReading:
     ) -> None:
         if inputs and t is not None:
             raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
+        if not isinstance(model, Model):
+            raise RequestError(f"measure_designs needs a model, not {type(model).__name__}; kinfmu.compile gives one")
         mechanism = model.mechanism
-        asked = [measures] if isinstance(measures, str) else None if measures is None else list(measures)
+        asked = None if measures is None else listed_measures(measures)
         self._readings = chosen_measures(mechanism, asked)
+        if not self._readings:
+            raise RequestError(f"there are no measures: {mechanism.name} declares none, or measures = []; give some")
         self._asked = dict(zip((one.name for one in self._readings), asked or mechanism.measures, strict=True))
         self._batch = batch = Batch(model, parameters)
         self.parameters, self._count = batch.parameters, batch.count

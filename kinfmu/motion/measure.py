@@ -99,14 +99,31 @@ def chosen_measures(
         return mechanism.measures
     own = {reading.name: reading for reading in mechanism.measures}
     chosen: list[Reading] = []
-    for one in [measures] if isinstance(measures, str | Reading) else measures:
-        if not isinstance(one, str):
+    for one in listed_measures(measures):
+        if isinstance(one, Reading):
             chosen.append(one)
         elif one in own:
             chosen.append(own[one])
         else:
             raise RequestError(f"there is no measure '{one}'{suggestion(one, own)}; measures: {listed(own)}")
     return replace(mechanism, measures=tuple(chosen)).measures
+
+
+def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[Reading | str]:
+    """Return the measures of a call, of which one can come without a list.
+
+    Raises:
+        RequestError: They are neither measures nor names.
+
+    """
+    alone = isinstance(measures, str | Reading)
+    if not alone and not isinstance(measures, Iterable):
+        raise RequestError(f"measures = {measures!r} must be a list of measures or of names of measures")
+    found = [measures] if alone else list(measures)  # type: ignore[arg-type]
+    for one in found:
+        if not isinstance(one, str | Reading):
+            raise RequestError(f"measures: {one!r} is neither a measure such as kinfmu.readings.Range nor a name")
+    return found  # type: ignore[return-value]
 
 
 def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:

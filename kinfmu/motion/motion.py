@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.equations.taylor import Taylor
-from kinfmu.errors import RequestError, listed, suggestion
+from kinfmu.errors import RequestError
 from kinfmu.measures import PoseQuantity
 from kinfmu.measures.arithmetic import Value, sqrt
 from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, unit_vector
@@ -350,8 +350,8 @@ class Motion:
             return Track(self.x, constant, 0.0 * constant, 0.0 * constant, self.is_closed)
         if name not in self.outputs:
             raise RequestError(
-                f"the run has no output '{name}', which a measure needs{suggestion(name, self.outputs)}; "
-                f"outputs: {listed(self.outputs)}"
+                f"there is no output '{name}', which a measure needs; solve or compile the mechanism with it, or with "
+                f"all outputs"
             )
         k = [str(output) for output in self.outputs].index(name)
         value, rate, acceleration = (table[..., k] for table in self.tables)
@@ -390,7 +390,8 @@ def argument_of(run: HasAxis) -> tuple[FloatArray, str]:
         return run.t, "time"
     per = rates_per(run)
     if run.axis not in run.input_names:
-        raise RequestError("measures need samples over time or over one driver; here several drivers change")
+        changes = "several drivers change" if len(run.input_names) > 3 else "no driver moves"
+        raise RequestError(f"measures need samples over time or over one driver; here {changes}")
     column = run.input_names.index(run.axis)
     speed = run.inputs[:, column + 1]
     others = np.delete(run.inputs, (column, column + 1, column + 2), axis=1)

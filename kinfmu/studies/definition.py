@@ -32,6 +32,7 @@ from kinfmu.sweep.model import WORTH_COMPILING, require_engine
 SAMPLES = 1000  # of sampled parameters, by default
 SEED = 0
 OWN_COLUMNS = DESIGN, STATUS, REASON = "design", "solver.status", "reason"
+MOST_OF_A_HYPERCUBE = 50_000_000  # numbers; a gigabyte while they are drawn
 _SAMPLES_AT_ONCE = {"native": 1_500_000, "python": 200_000}  # of a part: 0.2 to 2 s
 _MOST, _FEWEST = 4096, 32  # designs of a part
 _PARTS = 32  # at least, so that all cores have work and progress shows
@@ -189,7 +190,8 @@ def define(
     is_sampled = any(not isinstance(one, Grid) for one in variations)
     count = whole_number("designs", designs, 1) if is_sampled else 1
     samples = Sampling(variations, sampling, count, whole_number("seed", seed, 0))
-    whole_number("the number of designs, of all grids and samples together,", len(samples), 1)
+    whole_number("the number of designs, of all grids and samples together,", samples.grid_points * samples.samples, 1)
+    _refuse_large_hypercube(samples)
     readings = chosen_measures(mechanism, measures)
     if not readings:
         raise RequestError(f"{mechanism.name} declares no measures; give some, as [measures] or measures=")
@@ -207,6 +209,16 @@ def define(
     return Study(mechanism, samples, motion, engine, file_text)
 
 
+def _refuse_large_hypercube(sampling: Sampling) -> None:
+    """Raise a RequestError for a Latin hypercube that would fill the memory: it is drawn as a whole."""
+    most = MOST_OF_A_HYPERCUBE // max(1, len(sampling.sampled))
+    if sampling.method == METHODS[1] and sampling.samples > most:
+        raise RequestError(
+            f"designs = {sampling.samples}: a Latin hypercube is drawn as a whole and has at most {most} designs here; "
+            f"Sobol points (sampling = '{METHODS[0]}') are drawn part by part"
+        )
+
+
 def _refuse_equal_names(parameters: Sequence[str], measures: Sequence[str]) -> None:
     """Raise a RequestError where two columns of the results would have one name."""
     taken = set(OWN_COLUMNS)
@@ -222,10 +234,10 @@ def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, Arra
     if inputs and t is not None:
         raise RequestError(f"give times or inputs, not both: t and {listed(inputs)}")
     if t is not None:
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.atleast_1d(_samples("t", t))
         return StudyMotion(times, {}, over or f"t = {times[0]:.6g} to {times[-1]:.6g} s")
     if inputs:
-        arrays = {name: _array(name, value) for name, value in inputs.items()}
+        arrays = {name: _samples(name, value) for name, value in inputs.items()}
         longest = max(arrays, key=lambda name: np.size(arrays[name]))
         values = np.atleast_1d(arrays[longest])
         return StudyMotion(None, arrays, over or f"{longest} = {values[0]:.6g} to {values[-1]:.6g}")
@@ -240,12 +252,12 @@ def _motion(mechanism: Mechanism, t: ArrayLike | None, inputs: Mapping[str, Arra
     return StudyMotion(times, {}, f"the run of the file, t = {times[0]:.6g} to {times[-1]:.6g} s")
 
 
-def _array(name: str, value: ArrayLike) -> FloatArray | float:
+def _samples(name: str, value: ArrayLike) -> FloatArray | float:
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise RequestError(f"{name} must be a number or an array of numbers") from None
-    if array.ndim > 1:
+    if array.ndim > 1 or not array.size:
         raise RequestError(f"{name} must be a number or (n,), not of shape {array.shape}")
     return array if array.ndim else float(array)
 

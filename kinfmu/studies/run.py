@@ -122,6 +122,8 @@ def run_study(
             path = Path(folder) / f"study{RESULTS}"
             _run(study, path, workers, dask, progress or _quiet, restart=False)
             return StudyResult.of_bytes(path.read_bytes())
+    if not isinstance(output, str | Path):
+        raise RequestError(f"output = {output!r} must be the path of a file, {RESULTS}")
     path = Path(output)
     if suffix_of(path) != RESULTS:
         raise RequestError(f"{path}: results are written as Parquet; the name must end in {RESULTS}")
@@ -154,7 +156,7 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
             progress(done, len(study))
         try:
             with replacement(path) as temporary:
-                join(schema, (parts.path(first) for first in study.parts), temporary)
+                join(schema, ((k, min(size, len(study) - k), parts.path(k)) for k in study.parts), temporary)
         except OSError as error:
             raise StudyError(f"{path}: cannot be written ({error.strerror or error})") from None
         parts.remove()

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.errors import MechanismError, RequestError, StudyError
+from kinfmu.errors import KinfmuError, MechanismError, StudyError
 from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism import Mechanism, RunSettings
 from kinfmu.mechanism.number import read_constant
 from kinfmu.mechanism.toml_file import document_of, read_measures, text_in
 from kinfmu.mechanism.toml_tables import check_keys, table_of
 from kinfmu.mechanism.valid import quoted
+from kinfmu.motion.track import FEWEST
 from kinfmu.run import MOST_SAMPLES
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.sampling import METHODS
@@ -49,7 +50,7 @@ def read_study(path: str | Path, *, engine: str = "auto") -> Study:
         raise StudyError(str(error)) from None
     try:
         return _study(document, path.parent, engine, text)
-    except (MechanismError, RequestError, StudyError) as error:
+    except KinfmuError as error:
         raise StudyError(f"{path}: {error}", **error.data) from None
 
 
@@ -112,8 +113,8 @@ def _motion(mechanism: Mechanism, table: Mapping[str, Any]) -> tuple[Any, dict[s
     first, last = (
         read_constant(f"{where} {k}", table[k], value.quantity, mechanism.length_unit) for k in ("from", "to")
     )
-    samples = whole_number(f"{where} samples", table.get("samples", 361), 2)
-    if samples > MOST_SAMPLES:
-        raise StudyError(f"{where} samples = {samples} is more than {MOST_SAMPLES}")
+    if first == last:
+        raise StudyError(f"{where}: 'from' and 'to' are equal: {first:.9g}; measures need a driver that moves")
+    samples = whole_number(f"{where} samples", table.get("samples", 361), FEWEST, MOST_SAMPLES)
     rate = read_constant(f"{where} speed", table.get("speed", 1.0), speed.quantity, mechanism.length_unit)
     return None, {value: np.linspace(first, last, samples), speed: rate}

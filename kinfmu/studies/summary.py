@@ -40,7 +40,8 @@ def about(result: StudyRows) -> str:
     how = {"grid": "on a grid", "sobol": "Sobol points", "latin_hypercube": "a Latin hypercube"}[said["sampling"]]
     seed = "" if said["sampling"] == "grid" else f", seed {said['seed']}"
     varied = ", ".join(result.parameters)
-    return f"{result.mechanism.name}: {len(result)} designs ({how}{seed}) over {varied}; {said['motion']['over']}"
+    count = f"{len(result)} design{'' if len(result) == 1 else 's'}"
+    return f"{result.mechanism.name}: {count} ({how}{seed}) over {varied}; {said['motion']['over']}"
 
 
 def measure_rows(result: StudyRows) -> list[tuple[str, ...]]:

@@ -17,7 +17,12 @@ from kinfmu.studies.definition import DESIGN, REASON, STATUS, Study
 from kinfmu.studies.nominal import Nominal
 
 _PREFIX = "kinfmu."
-_LOOK: dict[str, Any] = {"compression": "zstd", "use_dictionary": False, "write_statistics": True}
+_LOOK: dict[str, Any] = {
+    "compression": "zstd",
+    "use_dictionary": False,
+    "write_statistics": True,
+    "write_page_checksum": True,
+}
 
 
 def schema_of(study: Study, nominal: Nominal) -> Any:
@@ -65,11 +70,16 @@ def part_bytes(schema: Any, first: int, columns: Columns) -> bytes:
     return file.getvalue()
 
 
-def join(schema: Any, parts: Iterable[Path], target: Path) -> None:
+def join(schema: Any, parts: Iterable[tuple[int, int, Path]], target: Path) -> None:
     """Write the rows of all parts into one file, part after part; equal parts give equal bytes.
 
+    Args:
+        schema: Of the table.
+        parts: First design, number of designs and file of each part.
+        target: The file.
+
     Raises:
-        StudyError: A part cannot be read.
+        StudyError: A part cannot be read, or holds other designs.
 
     """
     import pyarrow as pa
@@ -77,13 +87,16 @@ def join(schema: Any, parts: Iterable[Path], target: Path) -> None:
 
     bare = schema.remove_metadata()
     with pq.ParquetWriter(target, schema, **_LOOK) as writer:
-        for path in parts:
+        for first, count, path in parts:
             try:
-                table = pq.ParquetFile(path).read()
-            except (OSError, pa.ArrowInvalid) as error:
+                table = pq.ParquetFile(path, page_checksum_verification=True).read().cast(bare)
+                if table.column(DESIGN).to_pylist() != list(range(first, first + count)):
+                    raise ValueError(f"it does not hold designs {first} to {first + count - 1}")
+            except (OSError, ValueError, pa.ArrowException) as error:
                 path.unlink(missing_ok=True)
-                raise StudyError(f"{path}: cannot be read ({error}); the same command measures it again") from None
-            writer.write_table(table.cast(bare).replace_schema_metadata(schema.metadata))
+                reason = " ".join(str(error).split())
+                raise StudyError(f"{path}: cannot be read ({reason}); the same command measures it again") from None
+            writer.write_table(table.replace_schema_metadata(schema.metadata))
 
 
 def metadata_of(schema: Any) -> Mapping[str, str]:

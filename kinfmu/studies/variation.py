@@ -21,6 +21,7 @@ from kinfmu.units import unit_of
 KEYS = ("values", "from", "to", "count", "tolerance", "distribution", "deviations", "nominal")
 DISTRIBUTIONS = ("normal", "uniform")
 MOST_DESIGNS = 10**9
+MOST_OF_A_GRID = 10**6  # values, which are part of the definition of the study
 _EXAMPLE = '{ from = 1, to = 2, count = 5 }, { from = 1, to = 2 } or { tolerance = 0.1, distribution = "normal" }'
 
 
@@ -132,6 +133,8 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
 
     """
     settable = mechanism.settable
+    if not isinstance(name, str):
+        raise MechanismError(f"{where}: parameters have names, not {quoted(name)}")
     settable.check_name(name)
     if not isinstance(table, Mapping):
         raise MechanismError(f"{where} = {quoted(table)} must be a table such as {_EXAMPLE}")
@@ -167,7 +170,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
             raise MechanismError(f"{where} needs the key 'to'")
         low, high = number("from", table["from"]), number("to", table["to"])
         if "count" in table:
-            count = whole_number(f"{where} count", table["count"], 2)
+            count = whole_number(f"{where} count", table["count"], 2, MOST_OF_A_GRID)
             return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()))
         if low == high:
             raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
@@ -189,10 +192,10 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
     return Tolerance(name, unit, nominal, tolerance, distribution, float(deviations))
 
 
-def whole_number(where: str, value: object, least: int) -> int:
-    """Return a whole number of at least `least`, at most MOST_DESIGNS."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= MOST_DESIGNS:
-        raise MechanismError(f"{where} = {quoted(value)} must be a whole number from {least} to {MOST_DESIGNS}")
+def whole_number(where: str, value: object, least: int, most: int = MOST_DESIGNS) -> int:
+    """Return a whole number from `least` to `most`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise MechanismError(f"{where} = {quoted(value)} must be a whole number from {least} to {most}")
     return int(value)
 
 

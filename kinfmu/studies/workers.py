@@ -38,6 +38,8 @@ def results(
         for part in parts:
             yield part, call(*arguments(part))
         return
+    if not parts:  # a study that was ended before its parts were joined
+        return
     with _cluster(dask, workers) if dask is not None else _processes(min(workers, len(parts))) as (pool, count):
         yield from _in_pool(pool, count * AHEAD, call, arguments, parts)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinfmu.display import Displayed
 from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.mechanism import LawConstant
+from kinfmu.mechanism.valid import LARGEST_NUMBER
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.run import FloatArray, Run
@@ -149,9 +150,11 @@ class Batch:
         return {name: float(array[design % len(array)]) for name, array in self.parameters.items()}
 
     def invalid(self) -> NDArray[np.bool_]:
-        """(m,) True for designs with a number that is not finite, or a law constant that must be positive."""
+        """(m,) True for designs with a number that is not finite or too large, or not positive where it must be."""
         positive = [constant.is_positive for constant in self.plan.law_constants]
-        found = ~np.isfinite(self.values).all(axis=1) | ~np.isfinite(self.constants).all(axis=1)
+        found = ~np.logical_and.reduce(
+            [(np.abs(table) <= LARGEST_NUMBER).all(axis=1) for table in (self.values, self.constants)]
+        )
         return np.asarray(found | ~(self.constants[:, positive] > 0.0).all(axis=1))
 
     def _rows(self, declared: Sequence[PlanParameter | LawConstant]) -> FloatArray:
@@ -309,6 +312,10 @@ def _alone(
 
 def _arrays(model: Solvable, parameters: Mapping[str, ArrayLike | str]) -> dict[str, FloatArray]:
     """Return the parameters as arrays (m,) or (1,) of numbers."""
+    if not isinstance(parameters, Mapping):
+        raise RequestError(
+            f"parameters must be arrays by name, such as {{'a': [1.0, 1.1]}}, not {type(parameters).__name__}"
+        )
     arrays: dict[str, FloatArray] = {}
     for name, value in parameters.items():
         if isinstance(value, str):

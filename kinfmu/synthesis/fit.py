@@ -68,6 +68,8 @@ def fit(
         raise RequestError(f"starts = {starts!r} must be a positive whole number")
     if not (isinstance(seed, int) and seed >= 0):
         raise RequestError(f"seed = {seed!r} must be a whole number, 0 or above")
+    if not isinstance(problem, FitProblem | str | Path):
+        raise RequestError(f"fit needs a FitProblem or the path of a fit file, not {type(problem).__name__}")
     if not isinstance(problem, FitProblem):
         problem = read_problem(problem)
     steps = (_DRAWN + _SHORT + 1) * starts + _POLISHED

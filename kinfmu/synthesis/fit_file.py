@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinfmu.errors import MechanismError, RequestError, listed
+from kinfmu.files.whole_file import suffix_of
 from kinfmu.gallery.load import load_named_in
 from kinfmu.mechanism.table_file import read_table
 from kinfmu.mechanism.toml_file import document_of, text_in
@@ -36,6 +37,12 @@ def read_problem(path: str | Path) -> FitProblem:
         return _problem(document, path.parent)
     except (MechanismError, RequestError) as error:
         raise MechanismError(f"{path}: {error}", **error.data) from None
+
+
+def mechanism_file(path: Path) -> Path | None:
+    """Return the mechanism file that a fit file names; None for a mechanism of the gallery."""
+    name = document_of(text_in(path, "a fit file"), str(path)).get("mechanism")
+    return path.parent / name if isinstance(name, str) and suffix_of(name) == ".toml" else None
 
 
 def _problem(document: Mapping[str, Any], folder: Path) -> FitProblem:

@@ -64,11 +64,14 @@ class Lengths:
             link = link if isinstance(link, Expression) else Expression(f"{link!r}", unit)
             link.refuse_unknown(known)
             read.append(link)
+        gap = read_constant(f"{where} gap", constraint.gap, LENGTH, unit)
+        if gap < 0.0:
+            raise MechanismError(f"{where} gap = {quoted(constraint.gap)} must be 0 or more")
         return cls(
             constraint.name,
             tuple(read),
             None if shortest is None else list(links).index(shortest),
-            read_constant(f"{where} gap", constraint.gap, LENGTH, unit),
+            gap,
             float(read_weights(f"{where} weight", constraint.weight, 1)[0]) ** 0.5,
             mechanism.parameters,
         )

@@ -145,6 +145,10 @@ def measuring_of(
         }
         if all(value is None for value in limits.values()):
             raise MechanismError(f"{where} needs 'minimum' or 'maximum', or both")
+        if isinstance(one, MarginConstraint) and not 0.0 < (limits["minimum"] or 0.0) < 1.0:
+            raise MechanismError(
+                f"{where} minimum = {quoted(one.minimum)} must be between 0 and 1, as 1 / condition is"
+            )
         root = float(read_weights(f"{where} weight", one.weight, 1)[0]) ** 0.5
         aims.append(Aim(one.name, reading, **limits, root=root, unit=unit))
     return Measuring(model, inputs, aims)

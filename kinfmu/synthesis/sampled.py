@@ -230,6 +230,8 @@ def _timing(
     start = read_free(f"{where} start", target.start, argument.quantity, unit)
     if target.step is not None:
         step = read_constant(f"{where} step", target.step, argument.quantity, unit)
+        if not step:
+            raise MechanismError(f"{where} step = {quoted(target.step)} must not be 0")
         return np.asarray(step * np.arange(count), dtype=float), start
     at: Any = target.at
     if isinstance(at, str) or not isinstance(at, Sequence | np.ndarray) or len(at) != count:

@@ -283,6 +283,14 @@ def test_the_result_is_a_table() -> None:
         ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0]}, "there are 2 samples; measures need 3 or more"),
         ({"height": [1.0]}, [READ[0]], {"crank_angle": [0.0, 1.0, 1.0]}, "measures need samples over time or over one"),
         ({"height": [1.0]}, [READ[0]], {"t": [0.0, 1.0, 2.0], "crank_angle": TURN}, "give times or inputs, not both"),
+        (
+            {"height": [1.0]},
+            [READ[0]],
+            {"crank_angle": [1.0, 1.0, 1.0]},
+            "measures need samples over time or over one dri",
+        ),
+        ({"height": [1.0]}, [], {"crank_angle": TURN}, "there are no measures: "),
+        ({"height": [1.0]}, 5, {"crank_angle": TURN}, "measures = 5 must be a list of measures"),
         ({"height": [1.0]}, [READ[0]], {"crank_angle": TURN, "workers": 0}, "workers = 0 must be a positive whole"),
     ],
 )
@@ -292,3 +300,15 @@ def test_a_wrong_request_is_refused_in_one_line(
     with pytest.raises(RequestError) as error:
         kinfmu.measure_designs(kinfmu.compile(crank_rocker()), parameters, measures, **arguments)  # type: ignore[arg-type]
     assert str(error.value).startswith(message)
+
+
+def test_what_a_model_lacks_is_named_with_what_helps() -> None:
+    with pytest.raises(RequestError, match=r"measure_designs needs a model, not Mechanism; kinfmu\.compile gives one"):
+        kinfmu.measure_designs(crank_rocker(), {}, [READ[0]], crank_angle=TURN)  # type: ignore[arg-type]
+    model = kinfmu.compile(crank_rocker(), ["rocker.phi"])
+    with pytest.raises(
+        RequestError, match=r"there is no output 'coupler.x', .*; solve or compile the mechanism with it"
+    ):
+        kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="coupler.x")], crank_angle=TURN)
+    with pytest.raises(RequestError, match="here no driver moves"):
+        kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="rocker.phi")], crank_angle=[1.0, 1.0, 1.0])

@@ -99,6 +99,48 @@ def test_parts_that_are_whole_are_kept_and_damaged_ones_measured_again(tmp_path:
     assert not folder.exists()
 
 
+def test_a_study_that_ended_before_its_parts_were_joined_is_finished(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    path.mkdir()
+    given = {"measures": "swing", "designs": 64, "output": path, "engine": "python"}
+    with pytest.raises(StudyError, match=r"rows\.parquet: cannot be written \(Is a directory\)"):
+        kinfmu.study(linkage(), RANGES, workers=1, **given)  # type: ignore[arg-type]
+    path.rmdir()
+    found = kinfmu.study(linkage(), RANGES, workers=2, **given)  # type: ignore[arg-type]
+    assert found["design"].tolist() == list(range(64))
+
+
+@pytest.mark.parametrize("damage", ["another part", "a changed byte", "other columns"])
+def test_a_part_with_other_content_is_never_joined(damage: str, tmp_path: Path) -> None:
+    path, alone = tmp_path / "rows.parquet", tmp_path / "alone.parquet"
+    given = {"measures": "swing", "designs": 160, "workers": 1}
+    kinfmu.study(linkage(), RANGES, output=alone, **given)  # type: ignore[arg-type]
+    interrupted(path)
+    first, second = sorted((tmp_path / "rows.parquet.parts").glob("part-*"))[:2]
+    if damage == "another part":
+        second.write_bytes(first.read_bytes())
+    elif damage == "other columns":
+        second.write_bytes(_without_a_column(second))
+    else:
+        content = bytearray(second.read_bytes())
+        content[content.index(b"\x28\xb5\x2f\xfd") + 12] ^= 1  # of the first page, after the mark of its compression
+        second.write_bytes(content)
+    with pytest.raises(StudyError, match=r"part-0000000032\.parquet: cannot be read .* the same command measures it"):
+        kinfmu.study(linkage(), RANGES, output=path, **given)  # type: ignore[arg-type]
+    kinfmu.study(linkage(), RANGES, output=path, **given)  # type: ignore[arg-type]
+    assert path.read_bytes() == alone.read_bytes()
+
+
+def _without_a_column(path: Path) -> bytes:
+    import io
+
+    import pyarrow.parquet as pq
+
+    file = io.BytesIO()
+    pq.write_table(pq.read_table(path, partitioning=None).drop_columns("swing"), file)
+    return file.getvalue()
+
+
 def test_parts_that_a_finished_study_left_are_removed(tmp_path: Path) -> None:
     path = tmp_path / "rows.parquet"
     interrupted(path)

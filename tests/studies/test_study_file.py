@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,17 @@ WRONG = {
     f"{CRANK}[run]\nfrom = 1": "[run] needs the key 'to'",
     f"{CRANK}[run]\nfrom = '1 mm'\nto = 2": "[run] from = '1 mm': unit 'mm' must be one of rad, deg, rev",
     f"{CRANK}[run]\nstop = 1\nstep = 0": "[run] must have a positive step, and stop after start",
-    f"{CRANK}[run]\nfrom = 1\nto = 2\nsamples = 1": "[run] samples = 1 must be a whole number from 2",
+    f"{CRANK}[run]\nfrom = 1\nto = 2\nsamples = 1": "[run] samples = 1 must be a whole number from 3 to 1",
+    f"{CRANK}[run]\nfrom = 1\nto = 1": "[run]: 'from' and 'to' are equal: 1; measures need a driver that moves",
+    f"{CRANK}[run]\nstop = 1\nstep = '1e-12 s'": "[run] 0 to 1 s in steps of 1e-12 s: more than 10000000 samples",
+    f"designs = 1000000000\nsampling = 'latin_hypercube'\n{CRANK}": (
+        "designs = 1000000000: a Latin hypercube is drawn as a whole and has at most 50000000 designs here; "
+        "Sobol points (sampling = 'sobol') are drawn part by part"
+    ),
+    f"{CRANK}base = {{ from = 1, to = 2, count = 100000 }}\nrocker = {{ from = 1, to = 2, count = 100000 }}\n"
+    '"crank.start" = { from = 1, to = 2, count = 100000 }\n"crank.speed" = { from = 1, to = 2, count = 100000 }': (
+        "the number of designs, of all grids and samples together, = 100000000000000000000000 must be a whole number"
+    ),
     f"{CRANK}[run]\nend = 1": "[run] end: unknown key",
     'mechanism = "hoeken.toml"\n[parameters]\n"crank.speed" = { values = [1, 2] }': (
         "crank.speed is a constant of a law, which acts over time: give times ([run] start, stop and step"
@@ -54,6 +65,7 @@ WRONG_PARAMETERS = {
     "from = 1": "needs the key 'to'",
     "from = 1, to = 1": "'from' and 'to' are equal: 1",
     "from = 1, to = 2, count = 1": "count = 1 must be a whole number from 2",
+    "from = 1, to = 2, count = 1000000000": "count = 1000000000 must be a whole number from 2 to 1000000",
     "from = 1, to = 2, distribution = 'normal'": "distribution: does not go with 'from'; keys with it: count, from, to",
     "from = '1 deg', to = 2": "from = '1 deg': unit 'deg' must be one of m, mm",
     "from = 'a', to = 2": "from = 'a' must be a number, alone or with a unit",
@@ -161,3 +173,30 @@ def test_arguments_of_a_call_are_refused_likewise(tmp_path: Path) -> None:
         kinfmu.study(linkage(), ranges, crank_angle=[[0.0, 1.0]])
     with pytest.raises(KinfmuError, match="crank_agle"):
         kinfmu.study(linkage(), ranges, designs=2, workers=1, crank_agle=[0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "arguments", "message"),
+    [
+        ({5: {"values": [20]}}, {}, "[parameters.5]: parameters have names, not 5"),
+        ({"crank": {"values": [20]}}, {"t": "x"}, "t must be a number or an array of numbers"),
+        ({"crank": {"values": [20]}}, {"t": []}, "t must be a number or (n,), not of shape (0,)"),
+        ({"crank": {"values": [20]}}, {"t": [[1, 2]]}, "t must be a number or (n,), not of shape (1, 2)"),
+        ({"crank": {"values": [20]}}, {"crank_angle": []}, "crank_angle must be a number or (n,), not of shape (0,)"),
+        (
+            {"crank": {"values": [20]}},
+            {"measures": 5},
+            "measures = 5 must be a list of measures or of names of measures",
+        ),
+        (
+            {"crank": {"values": [20]}},
+            {"measures": [5]},
+            "measures: 5 is neither a measure such as kinfmu.read",
+        ),
+        ({"crank": {"values": [20]}}, {"output": 5}, "output = 5 must be the path of a file, .parquet"),
+    ],
+)
+def test_so_is_one_in_a_call(parameters: dict[Any, Any], arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(RequestError) as error:
+        kinfmu.study(linkage(), parameters, workers=1, **arguments)
+    assert str(error.value).startswith(message)

@@ -159,6 +159,7 @@ def test_derivatives_that_nobody_wants_are_not_computed() -> None:
         ({"a": [[1.0]]}, {}, r"parameter 'a' must be a number or \(m,\), not of shape \(1, 1\)"),
         ({"a": ["1 mm", "2 mm"]}, {}, "parameter 'a' must be numbers"),
         ({"a": 1.0}, {"derivatives": 3}, "derivatives = 3 must be 0, 1 or 2"),
+        (None, {}, "parameters must be arrays by name, such as"),
         ({"a": 1.0}, {"workers": 0}, "workers = 0 must be a positive whole number"),
         ({"a": [1.0, 2.0]}, {"crank_angle": np.zeros((3, 4))}, r"crank_angle must be of shape \(n,\) or \(2, n\)"),
         ({"a": 1.0}, {"t": [0.0], "crank_angle": [0.0]}, "give times or inputs, not both"),

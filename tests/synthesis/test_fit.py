@@ -116,6 +116,20 @@ def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     assert "curve: wanted" in str(expected._repr_svg_())
 
 
+def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> None:
+    (tmp_path / "linkage.toml").write_text(toml_text.text(four_bar()), encoding="utf-8")
+    path = tmp_path / "fit.toml"
+    path.write_text('mechanism = "linkage.toml"\nunknowns = { crank = [1, 2] }\n', encoding="utf-8")
+    for name, what in (("linkage.toml", "its mechanism"), ("fit.toml", "the fit file")):
+        before = (tmp_path / name).read_bytes()
+        done = CliRunner().invoke(main, ["fit", str(path), "-o", str(tmp_path / name)])
+        assert done.exit_code == 2
+        assert f"would replace {what}; choose another name" in done.output
+        assert (tmp_path / name).read_bytes() == before
+    with pytest.raises(kinfmu.KinfmuError, match="fit needs a FitProblem or the path of a fit file, not int"):
+        kinfmu.fit(5)  # type: ignore[arg-type]
+
+
 def _path(**keys: Any) -> dict[str, Any]:
     return {"targets": [PathTarget(**{"name": "t", "of": "coupler.X", "points": POINTS, **keys})]}
 
@@ -141,6 +155,9 @@ CASES: list[tuple[dict[str, Any], str]] = [
     (_path(points=[(1, 2, 3)]), r"list \[\[x, y\], ...\]; number 1 is"),
     (_path(at=[1]), "at must be a list of 4 values of crank"),
     (_path(start=1), "start needs 'at' or 'step'"),
+    (_path(step="0 deg"), "step = '0 deg' must not be 0"),
+    ({"constraints": [GrashofConstraint(name="g", links=[*LENGTHS][:4], gap=-1)]}, "gap = -1 must be 0 or more"),
+    ({"constraints": [MarginConstraint(name="m", minimum=2)]}, "minimum = 2 must be between 0 and 1"),
     (_path(weight=-1.0), "weights must be positive"),
     (_poses(of="rokker"), "moving body; did you mean 'rocker'"),
     (_poses(length=0), "length = 0 must be positive"),
