@@ -70,10 +70,6 @@ def build(
 
     path = _file(path, mechanism.name)
     coordinates, names = chosen_outputs(mechanism, outputs)
-    if flavour == "native":
-        if outputs is not None and names:
-            raise RequestError(f"outputs: {listed(names)}: forces need flavour = 'python'; native FMUs have none yet")
-        names = ()
     plan = compile_plan(mechanism, coordinates, solved=loaded_coordinates(mechanism) if names else ())
     forces = force_steps(plan, names, given_coefficients=True) if names else None
     if flavour == "python":
@@ -83,7 +79,7 @@ def build(
     else:
         from kinfmu.fmu.native import archive
 
-        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress)
+        data = archive.archive(plan, drive, VERSION, FMI_VERSIONS[fmi], platforms, progress, forces)
     _write(path, data)
     return path
 

@@ -113,6 +113,7 @@ def interface(
         "parameters": _parameters(plan),
         "tolerance": [_TOLERANCE],
         "fixed": _fixed(plan),
+        **({} if forces is None else {"loads": load_variables(mechanism), "forces": force_variables(plan, forces)}),
         "counts": [
             _solver_output(
                 plan, "solver.status", _STATUS_TEXT, kind="Enumeration", minimum=min(Status), maximum=max(Status)
@@ -124,8 +125,6 @@ def interface(
         "rate_source": [_RATES],
         "message": [_MESSAGE],
     }
-    if forces is not None:
-        lists |= {"loads": load_variables(mechanism), "forces": force_variables(plan, forces)}
     parts = [InterfacePart(name, tuple(variables)) for name, variables in lists.items()]
     if has_time:
         tunable = {variable.name for part in parts for variable in part.variables if variable.variability == "tunable"}

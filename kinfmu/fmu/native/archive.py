@@ -26,6 +26,7 @@ from kinfmu.fmu.native.sources import headers, sources
 from kinfmu.fmu.variables import interface
 from kinfmu.mechanism import toml_text
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import ForceSteps
 
 OPTIMIZED = ("-O3", "-falign-functions=64", "-falign-loops=32")  # without alignment a step takes up to a tenth longer
 FLAGS = (*OPTIMIZED, "-fvisibility=hidden", "-s")  # only FMI's functions are exported
@@ -59,6 +60,7 @@ def archive(
     fmi: FmiVersion,
     platforms: str,
     progress: Callable[[int, int], None] | None = None,
+    forces: ForceSteps | None = None,
 ) -> bytes:
     """Return the FMU of a plan; the same plan and the same compiler give the same bytes.
 
@@ -69,6 +71,7 @@ def archive(
         fmi: Version of FMI.
         platforms: 'host', compiled by the system's compiler, or 'all', compiled by zig.
         progress: Called with (platforms done, number of platforms).
+        forces: Steps to the forces that are outputs. Default: none.
 
     Returns:
         Bytes of the zip archive.
@@ -77,9 +80,9 @@ def archive(
         CompilerError: If no compiler is found.
 
     """
-    variables = interface(plan, drive, has_time=fmi == "3.0")
-    unnamed = _contents(plan, variables, version, fmi, "")
-    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)))
+    variables = interface(plan, drive, has_time=fmi == "3.0", forces=forces)
+    unnamed = _contents(plan, variables, version, fmi, "", forces)
+    contents = _contents(plan, variables, version, fmi, token(digest(unnamed)), forces)
     wanted = [host()] if platforms == "host" else list(PLATFORMS)
     for done, platform in enumerate(wanted):
         if progress is not None:
@@ -91,9 +94,11 @@ def archive(
     return zipped(contents)
 
 
-def _contents(plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersion, guid: str) -> dict[str, bytes]:
+def _contents(
+    plan: SolvePlan, variables: Interface, version: str, fmi: FmiVersion, guid: str, forces: ForceSteps | None
+) -> dict[str, bytes]:
     """Return every file except the binaries, by path in the FMU."""
-    code = sources(plan, variables, fmi, guid)
+    code = sources(plan, variables, fmi, guid, forces)
     units = tuple(compiler.units(code))
     about = Description(variables, guid, variables.name, f"kinfmu {version}", fmi, units if fmi == "2.0" else ())
     contents = {

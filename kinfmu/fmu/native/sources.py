@@ -9,6 +9,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from kinfmu.codegen.c import compiler, emit
+from kinfmu.codegen.c.forces import emit_forces
 from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
 from kinfmu.codegen.writer import Names, Writer, identifier
 from kinfmu.errors import MissingPackageError
@@ -16,6 +17,7 @@ from kinfmu.fmu.estimated_rates import Rates
 from kinfmu.fmu.interface import Interface
 from kinfmu.fmu.layout import UNKNOWN_ERROR
 from kinfmu.plan import SolvePlan
+from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.trace import parameter_symbol
 
 RUNTIME = Path(__file__).with_name("runtime")
@@ -40,10 +42,13 @@ _HINTS = (  # in short steps, vector loads of values just stored stall, and bran
     '#pragma GCC optimize("no-tree-vectorize", "no-tree-slp-vectorize", "no-if-conversion")',
     "#endif",
 )
+_OF_FORCES = re.compile(r"^#if KF_FORCES\n.*?^#endif\n", re.DOTALL | re.MULTILINE)  # left out where there are none
 _OTHER_VERSION = {"2.0": "fmi3.c", "3.0": "fmi2.c"}
 
 
-def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> dict[str, str]:
+def sources(
+    plan: SolvePlan, variables: Interface, version: str, token: str, forces: ForceSteps | None = None
+) -> dict[str, str]:
     """Return all C files and headers of the FMU by name, except the headers of FMI.
 
     Args:
@@ -51,10 +56,16 @@ def sources(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         variables: Variables of the FMU.
         version: Version of FMI, "2.0" or "3.0".
         token: Hash of the FMU's content.
+        forces: Steps to the forces that are outputs. Default: none.
 
     """
     instance = {file.name: file.read_text("utf-8") for file in sorted(RUNTIME.iterdir()) if file.suffix in (".c", ".h")}
     del instance[_OTHER_VERSION[version]]
+    if forces is None:
+        del instance["forces_at.c"]
+        instance = {name: _OF_FORCES.sub("", text) for name, text in instance.items()}
+    else:
+        instance["forces.c"] = emit_forces(plan, forces)
     tables = {"interface.h": _header(plan, variables, version, token), "interface.c": _tables(variables)}
     tables |= {"step.c": _step(version), "events.c": _events(plan)}
     files = emit(plan) | compiler.sources(compiler.SOLVER) | instance | tables
@@ -98,6 +109,8 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
     names = [part.name for part in variables.parts if part.name not in NOT_REAL]
     real = sum(len(variables.part(name)) for name in names)
     words = _WORDS[version]
+    forces = [f"#define KF_{name.upper()} {len(variables.part(name))}" for name in ("forces", "loads")]
+    forces = [*forces, ""] if variables.part("forces") else []
     lines = [
         f"/* Variables of the FMU of {variables.name}: generated from its mechanism, not to be edited. */",
         "#ifndef KF_INTERFACE_H",
@@ -129,6 +142,7 @@ def _header(plan: SolvePlan, variables: Interface, version: str, token: str) -> 
         f'#define KF_ENUMERATION_WORD "{words[1]}"',
         f'#define KF_ITERATIONS_WORD "{words[2]}"',
         "",
+        *forces,
         "extern const char *const kf_variable_names[KF_VARIABLES];",
         *array("static int kf_part_first", [0, *accumulate(len(variables.part(name)) for name in names)]),
         "extern const unsigned char kf_part_of[KF_REALS];",

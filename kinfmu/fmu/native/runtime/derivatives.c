@@ -192,6 +192,11 @@ static bool add_differences(kf_instance *instance, const double *du, kf_solver *
             if (!try_at(solver, start, pose, drive, parts, instance->trial)) {
                 return false;
             }
+#if KF_FORCES
+            if (parts & KF_BIT(KF_PART_FORCES)) {
+                kf_forces_of_trial(s, solver, pose, drive, instance->trial + kf_part_first[KF_PART_FORCES]);
+            }
+#endif
             for (k = 0; k < KF_REALS; ++k) {
                 total[k] += sign * weights[j - 1] / h * instance->trial[k];
             }
@@ -280,6 +285,12 @@ static kf_answer along(kf_instance *instance, double time_seed, unsigned parts)
         driven[1] = direction.dv[k];
         driven[2] = direction.da[k];
     }
+#if KF_FORCES
+    if (parts & KF_BIT(KF_PART_FORCES)) { /* before the trials, which overwrite the pose */
+        kf_add_force_slopes(s, direction.dv, direction.da, seed + kf_part_first[KF_PART_LOADS], time_seed,
+                            slope + kf_part_first[KF_PART_FORCES]);
+    }
+#endif
     if (largest_rate(direction.du) > 0.0 && (parts & ~linear)) {
         answer = differences(instance, direction.du, NULL, NULL, largest_rate(direction.du), parts & ~linear & ~KF_BIT(KF_PART_DRIVEN));
     }

@@ -125,6 +125,9 @@ static void commit_pose(kf_state *s)
 {
     memcpy(s->committed_u, KF_POSE_U(&s->poses[s->asked]), sizeof s->committed_u);
     memcpy(s->committed_inputs, s->real, sizeof s->committed_inputs);
+#if KF_FORCES
+    memcpy(s->committed_efforts, KF_REAL(s, KF_PART_LOADS), KF_LOADS * sizeof *s->committed_efforts);
+#endif
     s->committed = s->asked;
     s->committed_status = s->status;
     s->touched = false;

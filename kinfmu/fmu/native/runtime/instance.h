@@ -71,6 +71,9 @@ typedef struct {
     double input_rates[3 * KF_DRIVERS][KF_INPUT_ORDERS];
     double ended_step, ended_ud[KF_DRIVERS], ended_udd[KF_DRIVERS]; /* of the step that ended so: its size, the rates at its end */
     double committed_u[KF_DRIVERS], committed_inputs[3 * KF_DRIVERS];
+#if KF_FORCES
+    double committed_efforts[KF_ROOM(KF_LOADS)]; /* of external loads */
+#endif
     int samples;
     kf_sample history[KF_SAMPLES]; /* the last commits, oldest first */
     bool failed, terminated;
@@ -159,8 +162,30 @@ kf_answer kf_deserialize(kf_instance *instance, const unsigned char *bytes, size
      KF_BIT(KF_PART_WATCH))
 #define KF_GIVEN_PARTS                                                                                                 \
     (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE))
+#if KF_FORCES
+#undef KF_POSE_PARTS
+#undef KF_GIVEN_PARTS
+#define KF_POSE_PARTS                                                                                                  \
+    (KF_BIT(KF_PART_VALUES) | KF_BIT(KF_PART_RATES) | KF_BIT(KF_PART_ACCELERATIONS) | KF_BIT(KF_PART_ERRORS) |          \
+     KF_BIT(KF_PART_WATCH) | KF_BIT(KF_PART_FORCES))
+#define KF_GIVEN_PARTS                                                                                                 \
+    (KF_BIT(KF_PART_INPUTS) | KF_BIT(KF_PART_CONSTANTS) | KF_BIT(KF_PART_PARAMETERS) | KF_BIT(KF_PART_TOLERANCE) |      \
+     KF_BIT(KF_PART_LOADS))
+#endif
 #define KF_REAL(state, part) ((state)->real + kf_part_first[part])
 
+#if KF_FORCES
+void kf_forces(double time, const double *u, const double *ud, const double *udd, const double *z, const double *zd,
+               const double *zdd, const double *slopes, const double *efforts, const double *parameters,
+               double *forces); /* generated: all forces of one sample */
+void kf_forces_at(const kf_solver *solver, kf_pose *pose, double t, const double *const drive[3], const double *efforts,
+                  double *forces);
+void kf_read_forces(kf_state *state);
+void kf_forces_of_trial(kf_state *state, const kf_solver *solver, kf_pose *pose, const double *const drive[3],
+                        double *forces);
+void kf_add_force_slopes(kf_state *state, const double *dv, const double *da, const double *loads, double dt,
+                         double *slope);
+#endif
 void kf_forget(kf_state *state);        /* the driver values may have changed */
 void kf_forget_motion(kf_state *state); /* the rates may have changed */
 bool kf_holds(const kf_state *state);    /* discrete variables keep their values */

@@ -82,6 +82,11 @@ kf_answer kf_read(kf_instance *instance, unsigned parts)
             if (missing & KF_BIT(KF_PART_ERRORS)) {
                 kf_find_errors(s, KF_REAL(s, KF_PART_ERRORS));
             }
+#if KF_FORCES
+            if (missing & KF_BIT(KF_PART_FORCES)) {
+                kf_read_forces(s);
+            }
+#endif
             if (missing & KF_BIT(KF_PART_WATCH)) {
                 kf_watches(&s->solver.model, &kf_shown(s)->found, KF_REAL(s, KF_PART_WATCH));
             }
@@ -213,6 +218,18 @@ static KF_RARE kf_answer set_other(kf_instance *instance, unsigned reference, do
     const unsigned place = KF_PLACE(reference);
     const int part = place < KF_REALS ? kf_part_of[place] : KF_PARTS;
     const char *const name = kf_name_of(reference);
+#if KF_FORCES
+    if (part == KF_PART_LOADS && fabs(value) <= KF_LARGEST) {
+        s->real[place] = value;
+        kf_touch(s);
+        if (s->ahead) {
+            kf_forget(s);
+        }
+        s->known &= ~KF_BIT(KF_PART_FORCES);
+        return KF_DONE;
+    }
+    if (part != KF_PART_LOADS)
+#endif
     if (part != KF_PART_INPUTS && part != KF_PART_CONSTANTS && part != KF_PART_PARAMETERS && part != KF_PART_TOLERANCE) {
         return kf_not_settable(instance, reference, KF_REAL_WORD);
     }
