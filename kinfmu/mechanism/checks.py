@@ -14,13 +14,15 @@ from kinfmu.measures.placement import Reference
 from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.mechanism.declared import keys_of
 from kinfmu.mechanism.expression import Expression
+from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.members import Bodies, Members, NumberPath, path_text
 from kinfmu.mechanism.parameters import Parameter
 from kinfmu.mechanism.valid import check_line, check_name, quoted
 from kinfmu.readings import Reading
-from kinfmu.readings.extremes import PeakAcceleration, PeakSpeed
+from kinfmu.readings.extremes import Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.units import METRES, CoordinateName
 
+OF_FORCES = (Minimum, Maximum, Range, Peak)  # measures that read forces
 MOST_BODIES = 20_000  # fits into the memory of an ordinary computer
 
 
@@ -128,9 +130,18 @@ def _check_reading(members: Members, known: Mapping[str, Any], reading: Reading)
         if not isinstance(value, str):
             raise MechanismError(f"{where}{key.name} = {quoted(value)} must be a coordinate or a measured quantity")
         is_point = isinstance(reading, PeakSpeed | PeakAcceleration) and value in members.body_points
+        forces = measured_forces(members)
+        if value in forces and value not in known:
+            if not isinstance(reading, OF_FORCES):
+                valid = listed(cls.type for cls in OF_FORCES)
+                raise MechanismError(
+                    f"{where}{key.name}: {quoted(value)} is a force, which has no rates; types for forces: {valid}"
+                )
+            continue
         if value not in known and not is_point:
+            near = suggestion(value, [*known, *forces])
             raise MechanismError(
-                f"{where}{key.name}: {quoted(value)} is not a coordinate of this mechanism{suggestion(value, known)}; "
+                f"{where}{key.name}: {quoted(value)} is not a coordinate of this mechanism{near}; "
                 f"coordinates: {listed(name for name, (_, order) in known.items() if not order)}"
             )
     reading.check()

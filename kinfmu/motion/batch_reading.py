@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinfmu.codegen.python import load_model
 from kinfmu.equations.graph import Node, evaluate, symbols
 from kinfmu.errors import KinfmuError, RequestError, listed
+from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.measure import chosen_measures, listed_measures, measure, reason_without_value
@@ -360,10 +361,11 @@ class BatchReading:
         elif driven[0].ndim == 3:
             return names
         chosen = replace(self._model.mechanism, measures=self._readings)
+        forces = measured_forces(self._model.mechanism)
         dependent = {place[1] for place in dependent_numbers(chosen, self._open) if place[0] == "measures"}
         return {
             reading.name for reading in self._readings if reading.name in dependent or isinstance(reading, LowestMargin)
-        }
+        } | {reading.name for reading in self._readings if getattr(reading, "of", None) in forces}
 
     def _units_of_parameters(self) -> dict[str, str]:
         """Return the units of the parameters and law constants that are given."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kinfmu.display import Displayed
 from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import needed
 from kinfmu.readings import LowestMargin, Reading
@@ -144,8 +145,17 @@ def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
         driver=motion.driver,
         at=at,
         at_unit=unit_of(motion.driver_quantity, unit),
-        reason="" if np.isfinite(value) else reason_without_value(run, run.good),
+        reason="" if np.isfinite(value) else _reason(run, reading),
     )
+
+
+def _reason(run: Run, reading: Reading) -> str:
+    """Return why a measure of a run has no value."""
+    of = getattr(reading, "of", None)
+    made = measured_forces(run.mechanism).get(of, ()) if run.mechanism and isinstance(of, str) else ()
+    if any(run.good.any() and not np.isfinite(run[name][run.good]).any() for name in made):
+        return f"'{of}' is not determined: redundant rows share the load, or laws of loads have no times"
+    return reason_without_value(run, run.good)
 
 
 def reason_without_value(samples: HasAxis, good: NDArray[np.bool_]) -> str:

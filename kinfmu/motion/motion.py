@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -17,15 +18,17 @@ from kinfmu.measures.placement import GROUND, BodyFrame, Placement, body_of, uni
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
+from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.members import kind_of_measured
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
 from kinfmu.motion.quintic import FloatArray, IntArray
+from kinfmu.motion.sampled import sampled_track
 from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
 from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
-from kinfmu.units import CoordinateName, Quantity
+from kinfmu.units import CoordinateName, ForceName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
 _SAME = 1e-9  # of the way of the driver; values of it closer than this are equal
@@ -49,6 +52,7 @@ class Motion:
         margin: (..., n) 1 / condition of the samples; None if unknown.
         is_closed: True if the motion goes round: the last sample is the first, after one period.
         window: First and last argument of the part that readings see; None: all of it.
+        force: The samples (..., n) of a force by its name; None if the motion has none.
         computed: Outputs that are quantities which measures read, by the quantity.
 
     """
@@ -65,6 +69,7 @@ class Motion:
     margin: FloatArray | None = None
     is_closed: bool = False
     window: tuple[float, float] | None = None
+    force: Callable[[str], FloatArray] | None = None
     computed: Mapping[QuantityRead, CoordinateName] = field(default_factory=dict)
     _tracks: dict[QuantityRead, Track] = field(default_factory=dict, repr=False)
     _known: dict[str, tuple[CoordinateName, int]] = field(default_factory=dict, repr=False)  # of all parts
@@ -111,6 +116,7 @@ class Motion:
             mechanism.body_points,
             driver,
             run.margin[order] if with_margin else None,
+            force=lambda name: _force(run, name)[order],
         )
         outputs = [(motion.quantity_track(name), name.is_angle) for name in run.outputs]
         return motion.going_round(bool(outputs) and bool(goes_round(outputs)))
@@ -229,9 +235,17 @@ class Motion:
 
     def quantity(self, of: str | PoseQuantity, order: int = 0) -> Quantity:
         """Return what a quantity, or its derivative of an order, measures."""
+        if of in self._forces:
+            return self._forces[of][0].quantity
         own = self._orders.get(of) if isinstance(of, str) else None
         order += own[1] if own else 0
         return Quantity(kind_of_measured(of), order, self.per if order else "time")
+
+    @cached_property
+    def _forces(self) -> dict[str, tuple[ForceName, ...]]:
+        """Forces that are measured, by name."""
+        own = coordinate_orders(self.mechanism)
+        return {name: made for name, made in measured_forces(self.mechanism).items() if name not in own}
 
     def ratio_quantity(self, of: str | PoseQuantity, to: str | None, *, inverse: bool = False) -> Quantity:
         """Return what the ratio of two speeds measures."""
@@ -334,10 +348,19 @@ class Motion:
 
     def _whole(self, of: str | PoseQuantity) -> Track:
         """Return a quantity as `track` does, without regard to the window."""
+        if of in self._forces:
+            return self._force_track(str(of))
         if isinstance(of, str):
             name, order = self._orders.get(of, (of, 0))
             return _derived(self.quantity_track(name), order)  # type: ignore[arg-type]  # unknown names are refused
         return self.quantity_track(of)
+
+    def _force_track(self, name: str) -> Track:
+        """Return a force, of which only samples are known."""
+        if self.force is None:
+            unknown = np.full(self.tables[0].shape[:-1], np.nan)
+            return Track(self.x, unknown, unknown, unknown, self.is_closed)
+        return sampled_track(self.x, self.force(name), is_closed=self.is_closed)
 
     def _path(self, point: str) -> tuple[Track, Track]:
         """Return the world coordinates of a point, without regard to the window."""
@@ -377,6 +400,13 @@ class Motion:
         """Return a computed quantity as a track of this motion."""
         like = Track(self.x, self.x, self.x, self.x, self.is_closed)
         return Track.of(like, value if isinstance(value, Taylor) else Taylor(float(value)))
+
+
+def _force(run: Run, name: str) -> FloatArray:
+    """Return a force of a run, (n,); the size of a pin's force from its components."""
+    if name in (*run.force_names, *run.reaction_names):
+        return np.asarray(run[name], dtype=float)
+    return np.asarray(np.hypot(run[f"{name}_x"], run[f"{name}_y"]))
 
 
 def _derived(track: Track, order: int) -> Track:

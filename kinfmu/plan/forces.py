@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 from kinfmu.equations.graph import Graph, Node
 from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism.force_names import effort_noun, force_names
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Step, needed_steps
-from kinfmu.units import ForceName, Quantity
+from kinfmu.units import ForceName
 
-_INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
-_MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
+__all__ = ["ForceSteps", "effort_noun", "force_names", "force_steps", "loaded_coordinates"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,35 +50,11 @@ class ForceSteps:
     results: list[Node]
 
 
-def force_names(mechanism: Mechanism) -> tuple[ForceName, ...]:
-    """Return the names of efforts, inertias and energies of a mechanism; none without masses and loads."""
-    if not (mechanism.has_masses or mechanism.loads):
-        return ()
-    names = []
-    for k, driver in enumerate(mechanism.drivers):
-        kind = driver.quantity.kind
-        effort = effort_noun(kind)
-        names += [ForceName(driver.name, effort, Quantity(effort)), ForceName(driver.name, "power", Quantity("power"))]
-        if mechanism.has_masses:
-            names.append(ForceName(driver.name, f"bias_{effort}", Quantity(effort)))
-            for other in mechanism.drivers[k:]:
-                noun = "reduced_inertia" if other is driver else f"reduced_inertia.{other.name}"
-                quantity = Quantity(_INERTIAS.get((kind, other.quantity.kind), _MIXED_INERTIA))
-                names.append(ForceName(driver.name, noun, quantity))
-    energies = ("kinetic_energy", "potential_energy") if mechanism.has_masses else ("potential_energy",)
-    return (*names, *(ForceName("", energy, Quantity("energy")) for energy in energies))
-
-
 def loaded_coordinates(mechanism: Mechanism) -> list[str]:
     """Return the coordinates of the bodies that have masses or on which loads act."""
     loaded = {body.name for body in mechanism.moving_bodies if body.has_mass}
     loaded |= {body for load in mechanism.loads for body in load.bodies()}
     return [name for name in mechanism.coordinate_names if name.owner in loaded]
-
-
-def effort_noun(kind: str) -> str:
-    """Return what drives an angle, a torque, or a length, a force."""
-    return "torque" if kind == "angle" else "force"
 
 
 def force_steps(plan: SolvePlan, wanted: Sequence[str], *, given_coefficients: bool = False) -> ForceSteps:

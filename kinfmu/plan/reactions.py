@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from kinfmu.equations.graph import Node
 from kinfmu.equations.system import System
-from kinfmu.joints import Joint
-from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.body import GROUND_NAME
+from kinfmu.mechanism.force_names import names_of_rows, reaction_names_of
 from kinfmu.plan.block import Block
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.mechanics import Mechanics
@@ -21,29 +20,21 @@ from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
 from kinfmu.plan.steps import Assignment, needed_steps
 from kinfmu.plan.structure import RowTracer
-from kinfmu.units import CoordinateName, ForceName, Quantity
+from kinfmu.units import CoordinateName, ForceName
+
+__all__ = [
+    "names_of_rows",
+    "reaction_names",
+    "reaction_names_of",
+    "reaction_steps",
+    "row_names",
+    "undetermined_reactions",
+]
 
 
 def reaction_names(plan: SolvePlan) -> tuple[ForceName, ...]:
     """Return the names of all reactions of a plan's mechanism; see `reaction_names_of`."""
     return reaction_names_of(plan.mechanism)
-
-
-def reaction_names_of(mechanism: Mechanism) -> tuple[ForceName, ...]:
-    """Return the names of all reactions of a mechanism, one for each row of a joint; none without masses and loads."""
-    if not (mechanism.has_masses or mechanism.loads):
-        return ()
-    return tuple(name for joint in mechanism.joints for name in names_of_rows(joint))
-
-
-def names_of_rows(joint: Joint) -> list[ForceName]:
-    """Return the reactions of a joint: 'pin.force_x', 'pin.force_y'; 'slide.force', 'slide.moment'."""
-    kinds, names = joint.kinds(), []
-    for label, kind in zip(joint.labels, kinds, strict=True):
-        noun, quantity = ("force", "force") if kind == "length" else ("moment", "torque")
-        suffix = f"_{label}" if kinds.count(kind) > 1 else ""
-        names.append(ForceName(joint.name, noun + suffix, Quantity(quantity)))
-    return names
 
 
 def undetermined_reactions(plan: SolvePlan) -> dict[ForceName, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinfmu.readings.extremes import LowestMargin, Maximum, Minimum, PeakAcceleration, PeakSpeed, Range
+from kinfmu.readings.extremes import LowestMargin, Maximum, Minimum, Peak, PeakAcceleration, PeakSpeed, Range
 from kinfmu.readings.paths import PathDistance, Roundness, Straightness
 from kinfmu.readings.reading import Finding, Measured, Reading
 from kinfmu.readings.timing import Dwell, TimeRatio
@@ -12,6 +12,7 @@ READINGS: tuple[type[Reading], ...] = (
     Minimum,
     Maximum,
     Range,
+    Peak,
     PeakSpeed,
     PeakAcceleration,
     TimeRatio,
@@ -36,6 +37,7 @@ __all__ = [
     "MechanicalAdvantage",
     "Minimum",
     "PathDistance",
+    "Peak",
     "PeakAcceleration",
     "PeakSpeed",
     "PressureAngle",

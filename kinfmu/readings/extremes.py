@@ -62,6 +62,22 @@ class Range(Reading):
 
 
 @dataclass(frozen=True)
+class Peak(Reading):
+    """The largest size of a quantity: the peak torque of a driver, the largest force on a pin."""
+
+    type: ClassVar[str] = "peak"
+
+    name: str
+    of: Measured
+    begin: Begin = None
+    end: End = None
+
+    def read(self, motion: Motion) -> Finding:
+        peak = motion.track(self.of).largest_size()
+        return Finding(peak.value, motion.quantity(self.of), (peak.x,))
+
+
+@dataclass(frozen=True)
 class PeakSpeed(Reading):
     """The largest size of the speed of a quantity, or of a point 'body.point'."""
 

@@ -19,7 +19,8 @@ PerDesign = Any  # (...) an array with one number per design
 
 Measured = Annotated[
     str | PoseQuantity,
-    "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle",
+    "a coordinate such as 'rocker.phi' or its rate, or a quantity such as a distance or a relative angle; of extremes "
+    "also a force such as 'crank.torque'",
 ]
 Begin = Annotated[float | None, LawQuantity("argument"), "value of the driver where the part of the motion begins"]
 End = Annotated[float | None, LawQuantity("argument"), "value of the driver at the end of the part"]

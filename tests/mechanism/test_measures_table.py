@@ -26,6 +26,7 @@ width = "1 mm"
 low = { type = "minimum", of = "tracer.vy" }
 reach = { type = "maximum", of = { measure = "distance", between = ["ground.O", "coupler.tracer"] } }
 swing = { type = "range", of = "rocker.phi", begin = "10 deg", end = "0.5 rev" }
+peak = { type = "peak", of = "rocker.phi" }
 speed = { type = "peak_speed", of = "coupler.tracer" }
 push = { type = "peak_acceleration", of = { measure = "angle", of = "rocker", to = "coupler" } }
 ratio = { type = "time_ratio", of = "rocker.phi" }

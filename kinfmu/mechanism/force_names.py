@@ -1,0 +1,87 @@
+"""Names of the forces of a mechanism: efforts, reduced inertias, energies and reactions; those that measures read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from kinfmu.drivers import Driver
+from kinfmu.joints import Joint
+from kinfmu.loads import Load
+from kinfmu.mechanism.body import Body
+from kinfmu.units import ForceName, Quantity
+
+_INERTIAS = {("angle", "angle"): "inertia", ("length", "length"): "mass"}
+_MIXED_INERTIA = "mass_moment"  # of a turning and a sliding driver
+
+
+class HasForces(Protocol):
+    """The parts of a mechanism by which forces have names."""
+
+    @property
+    def bodies(self) -> Sequence[Body]: ...
+
+    @property
+    def joints(self) -> Sequence[Joint]: ...
+
+    @property
+    def drivers(self) -> Sequence[Driver]: ...
+
+    @property
+    def loads(self) -> Sequence[Load]: ...
+
+
+def force_names(mechanism: HasForces) -> tuple[ForceName, ...]:
+    """Return the names of efforts, inertias and energies of a mechanism; none without masses and loads."""
+    has_masses = any(body.has_mass for body in mechanism.bodies)
+    if not (has_masses or mechanism.loads):
+        return ()
+    names = []
+    for k, driver in enumerate(mechanism.drivers):
+        kind = driver.quantity.kind
+        effort = effort_noun(kind)
+        names += [ForceName(driver.name, effort, Quantity(effort)), ForceName(driver.name, "power", Quantity("power"))]
+        if has_masses:
+            names.append(ForceName(driver.name, f"bias_{effort}", Quantity(effort)))
+            for other in mechanism.drivers[k:]:
+                noun = "reduced_inertia" if other is driver else f"reduced_inertia.{other.name}"
+                quantity = Quantity(_INERTIAS.get((kind, other.quantity.kind), _MIXED_INERTIA))
+                names.append(ForceName(driver.name, noun, quantity))
+    energies = ("kinetic_energy", "potential_energy") if has_masses else ("potential_energy",)
+    return (*names, *(ForceName("", energy, Quantity("energy")) for energy in energies))
+
+
+def effort_noun(kind: str) -> str:
+    """Return what drives an angle, a torque, or a length, a force."""
+    return "torque" if kind == "angle" else "force"
+
+
+def reaction_names_of(mechanism: HasForces) -> tuple[ForceName, ...]:
+    """Return the names of all reactions of a mechanism, one for each row of a joint; none without masses and loads."""
+    if not (mechanism.loads or any(body.has_mass for body in mechanism.bodies)):
+        return ()
+    return tuple(name for joint in mechanism.joints for name in names_of_rows(joint))
+
+
+def names_of_rows(joint: Joint) -> list[ForceName]:
+    """Return the reactions of a joint: 'pin.force_x', 'pin.force_y'; 'slide.force', 'slide.moment'."""
+    kinds, names = joint.kinds(), []
+    for label, kind in zip(joint.labels, kinds, strict=True):
+        noun, quantity = ("force", "force") if kind == "length" else ("moment", "torque")
+        suffix = f"_{label}" if kinds.count(kind) > 1 else ""
+        names.append(ForceName(joint.name, noun + suffix, Quantity(quantity)))
+    return names
+
+
+def measured_forces(mechanism: HasForces) -> dict[str, tuple[ForceName, ...]]:
+    """Return the forces that measures read, by name, with the columns they are made of.
+
+    The size of a pin's force, 'pin.force', is made of 'pin.force_x' and 'pin.force_y'.
+    """
+    names = [*force_names(mechanism), *reaction_names_of(mechanism)]
+    found: dict[str, tuple[ForceName, ...]] = {str(name): (name,) for name in names}
+    for name in names:
+        other = f"{name.owner}.force_y"
+        if name.noun == "force_x" and other in found:
+            found[f"{name.owner}.force"] = (name, *found[other])
+    return found
