@@ -17,7 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.errors import FmuError, MechanismError, RequestError
+from kinfmu.dynamics import torque_driven
+from kinfmu.dynamics.stepping import METHODS
+from kinfmu.dynamics.torque_driven import TOLERANCE
+from kinfmu.errors import FmuError, MechanismError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
 from kinfmu.fmu.estimated_rates import Rates
@@ -35,26 +38,30 @@ from kinfmu.run.run import Sink
 from kinfmu.solver.python.status import Status
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 LAST_STEP = 1e-6  # of a step: a shorter remainder before `stop` is rounding, not a step
 
 
 def simulate(
-    fmu_path: str | Path,
+    fmu_path: str | Path | Mechanism,
     *,
+    drive: str | None = None,
     start: float | None = None,
     stop: float | None = None,
     step: float | None = None,
-    inputs: str | Path | Mapping[str, ArrayLike] | None = None,
+    inputs: str | Path | Mapping[str, Any] | None = None,
     parameters: Mapping[str, float | str | bool] | None = None,
+    state: Mapping[str, float] | None = None,
+    tolerance: float | None = None,
+    method: str | None = None,
     wrap: bool = False,
     channels: Sequence[str] | None = None,
     rate: float | None = None,
     sink: Sink | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
-    """Step an FMU that kinfmu built from start to stop, both included.
+    """Step an FMU that kinfmu built, or integrate the motion of a mechanism under torques, both from start to stop.
 
     Samples are at t_k = start + k step; a shorter last step ends at stop. If a pose cannot be reached, the run ends:
     its last sample has the status and no numbers, and an event of level "error" states driver, value and limit.
@@ -65,14 +72,29 @@ def simulate(
     Probable mistakes (inputs that no column drives, angles that jump by more than half a turn, radians that look like
     degrees) are reported by events of level "warning" and "info".
 
+    With a mechanism and drive="torque" the drivers apply efforts, and their values and speeds are integrated:
+
+        J(u) udd = T - bias(u, ud)        u: driver values, T: efforts, J: reduced inertia
+
+    Efforts and external loads are inputs, such as crank_torque [N m] or wind_force [N], 0 by default: numbers, laws of
+    time such as Harmonic(...), functions of t, functions of t and the state (a mapping of crank_angle, crank_speed),
+    or arrays over "time". At jumps of laws and at rows of arrays the integrator restarts. The motion ends at a limit of
+    the drivers with an event as above, and goes through change points.
+
     Args:
-        fmu_path: File of the FMU.
+        fmu_path: File of the FMU; a mechanism with masses for drive="torque".
+        drive: 'torque' for a mechanism; None for an FMU.
         start: Start time [s]. Default: of the FMU's default experiment; with inputs, of their first row.
         stop: Stop time [s]. Default: of the FMU's default experiment; with inputs, of their last row.
         step: Step [s]. Default: of the FMU's default experiment.
         inputs: CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit,
             or a mapping of arrays by name; linear between rows. With inputs, `driven_by_time` is false by default.
         parameters: Values by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}.
+        state: With a mechanism: initial values and speeds, such as {"crank_angle": 0.5, "crank_speed": 2.0} [rad,
+            rad/s]. Default: those of the laws at the start.
+        tolerance: With a mechanism: error of a step, relative, and absolute in rad and sizes. Default: 1e-9.
+        method: With a mechanism: 'DOP853' or, for stiff springs and dampers, 'Radau', of scipy.integrate. Default:
+            'DOP853'.
         wrap: True: angles among the inputs that jump by a turn, such as from 2 pi to 0, are unwrapped. False: such a
             jump is a turn back.
         channels: Channels to record of every sample, such as ["q", "qd"] or ["-error", "-margin"]: see
@@ -92,7 +114,32 @@ def simulate(
 
     """
     if isinstance(fmu_path, Mechanism):
-        raise RequestError(f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'")
+        if drive != "torque":
+            raise RequestError(
+                f"simulate steps an FMU; build(mechanism) makes one of mechanism '{fmu_path.name}'; "
+                f"simulate(mechanism, drive='torque') integrates its motion under torques"
+            )
+        if wrap or channels is not None or rate is not None or isinstance(inputs, str | Path):
+            raise RequestError("wrap, channels, rate and files of inputs are for FMUs, not for a mechanism")
+        run = torque_driven(
+            fmu_path,
+            _times(fmu_path.run, start, stop, fmu_path.run.step if step is None else step),
+            inputs=inputs,
+            state=state,
+            parameters=parameters,
+            tolerance=TOLERANCE if tolerance is None else tolerance,
+            method=METHODS[0] if method is None else method,
+            progress=progress,
+        )
+        if sink is not None:
+            sink.begin(run.part(slice(0, 0)))
+            sink.add(run)
+            sink.end(run, "")
+        return run
+    only = {"drive": drive, "state": state, "tolerance": tolerance, "method": method}
+    given = [name for name, value in only.items() if value is not None]
+    if given:
+        raise RequestError(f"{listed(given)}: for a mechanism driven by torques, not for FMU {fmu_path}")
     path = Path(fmu_path)
     interrupted = Interruption()
     try:
