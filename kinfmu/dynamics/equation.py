@@ -65,7 +65,7 @@ class EquationOfMotion:
         biases = [f"{driver.name}.bias_{effort_noun(driver.quantity.kind)}" for driver in plan.drivers]
         pairs = [(k, j) for k in range(d) for j in range(k, d)]
         reduced = [self._inertia_name(k, j) for k, j in pairs]
-        known = force_names(plan)
+        known = force_names(plan.mechanism)
         stage = load_stage(force_steps(plan, [*biases, *reduced], given_coefficients=True))
         order = [str(name) for name in known if name in {*biases, *reduced}]
         self._places, self._count = list(stage.places), len(order)
