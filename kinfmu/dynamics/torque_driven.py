@@ -36,8 +36,8 @@ def torque_driven(
     inputs: Mapping[str, Any] | None = None,
     state: Mapping[str, float] | None = None,
     parameters: Settings | None = None,
-    tolerance: float = TOLERANCE,
-    method: str = METHODS[0],
+    tolerance: float | None = None,
+    method: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Run:
     """Integrate the motion of a mechanism under efforts of its drivers.
@@ -50,8 +50,8 @@ def torque_driven(
         inputs: Efforts by the names of inputs, such as crank_torque [N m] or wind_force [N]; 0 by default.
         state: Initial values and speeds, such as crank_angle [rad] and crank_speed [rad/s]. Default: of the laws.
         parameters: Values of parameters and law constants, as in `solve`.
-        tolerance: Error of a step, relative, and absolute in rad and sizes; 1e-13 to 1e-4.
-        method: 'DOP853', or 'Radau' for stiff dampers and springs.
+        tolerance: Error of a step, relative, and absolute in rad and sizes; 1e-13 to 1e-4. Default: 1e-9.
+        method: 'DOP853', or 'Radau' for stiff dampers and springs. Default: 'DOP853'.
         progress: Called with (samples done, number of samples).
 
     Returns:
@@ -63,6 +63,8 @@ def torque_driven(
         KinfmuError: The mechanism cannot be solved.
 
     """
+    tolerance = TOLERANCE if tolerance is None else tolerance
+    method = METHODS[0] if method is None else method
     if not (is_number(tolerance) and LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE):
         raise RequestError(f"tolerance = {quoted(tolerance)} must be {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g}")
     if method not in METHODS:

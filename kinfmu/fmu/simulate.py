@@ -17,9 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinfmu.dynamics import torque_driven
-from kinfmu.dynamics.stepping import METHODS
-from kinfmu.dynamics.torque_driven import TOLERANCE
 from kinfmu.errors import FmuError, MechanismError, RequestError, listed
 from kinfmu.fmu import description
 from kinfmu.fmu.block_estimates import BlockEstimates, block_estimates
@@ -121,14 +118,16 @@ def simulate(
             )
         if wrap or channels is not None or rate is not None or isinstance(inputs, str | Path):
             raise RequestError("wrap, channels, rate and files of inputs are for FMUs, not for a mechanism")
+        from kinfmu.dynamics import torque_driven  # steps of FMUs do not need the planner
+
         run = torque_driven(
             fmu_path,
             _times(fmu_path.run, start, stop, fmu_path.run.step if step is None else step),
             inputs=inputs,
             state=state,
             parameters=parameters,
-            tolerance=TOLERANCE if tolerance is None else tolerance,
-            method=METHODS[0] if method is None else method,
+            tolerance=tolerance,
+            method=method,
             progress=progress,
         )
         if sink is not None:
