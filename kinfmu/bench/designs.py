@@ -1,4 +1,4 @@
-"""Many designs: a call with other lengths, and thousands of crank-rockers over a turn, beside other ways."""
+"""Many designs: a call with other lengths, and thousands of crank-rockers over a turn, compared with other ways."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a step of the python FMU costs in fmpy's low-level loop, beside a pythonfmu toy (sine and cosine)."""
+"""What a step of the python FMU costs in fmpy's low-level loop, compared with a pythonfmu toy (sine and cosine)."""
 
 from __future__ import annotations
 

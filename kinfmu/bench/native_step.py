@@ -1,4 +1,4 @@
-"""What a step of the native FMU costs in a C host, beside an FMU of closed forms written by hand."""
+"""What a step of the native FMU costs in a C host, compared with an FMU of closed forms written by hand."""
 
 from __future__ import annotations
 

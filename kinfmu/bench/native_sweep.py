@@ -1,6 +1,4 @@
-"""A sweep by the native engine beside a four-bar's closed form written by hand, beside what numba makes of one,
-and beside pylinkage, which numba compiles too.
-"""
+"""A sweep by the native engine, compared with a four-bar's closed form: by hand, by numba, and by pylinkage."""
 
 from __future__ import annotations
 

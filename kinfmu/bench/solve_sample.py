@@ -1,4 +1,4 @@
-"""Time a sample: the readable reference beside the Python engine on the four-bar, with the error of both."""
+"""Time a sample: the readable reference and the Python engine on the four-bar, with the error of both."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.draw.chart import SMALL
 from kinfmu.draw.sheet import GREY, ink
-from kinfmu.draw.study_panels import Layout, Quantities, few_ticks, name_axes, sheet_of, titled
+from kinfmu.draw.study_panels import PanelGrid, Quantities, few_ticks, name_axes, sheet_of, titled
 from kinfmu.run import FloatArray
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def contours(x: Quantities, y: Quantities, measures: Sequence[Quantities], title
 
     """
     columns = min(_ABREAST, len(measures))
-    layout = Layout(-(-len(measures) // columns), columns, _WIDTH, _HEIGHT, (118.0, 56.0), left=52.0, right=66.0)
+    layout = PanelGrid(-(-len(measures) // columns), columns, _WIDTH, _HEIGHT, (118.0, 56.0), left=52.0, right=66.0)
     made, panels = sheet_of(layout, title)
     every = [axes for row in panels for axes in row]
     for axes in every[len(measures) :]:

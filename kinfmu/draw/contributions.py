@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from kinfmu.draw.chart import SMALL
 from kinfmu.draw.sheet import GREY, INK, ink
-from kinfmu.draw.study_panels import Layout, colour_of, name_axes, sheet_of, titled
+from kinfmu.draw.study_panels import PanelGrid, colour_of, name_axes, sheet_of, titled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +39,7 @@ def contributions(measures: Sequence[Contributed], title: str) -> Figure:
 
     """
     most = max([min(len(one.parts), MOST_BARS) for one in measures] + [1])
-    layout = Layout(len(measures), 1, 330.0, most * _BAR + 4.0, (0.0, 40.0), left=100.0, right=48.0)
+    layout = PanelGrid(len(measures), 1, 330.0, most * _BAR + 4.0, (0.0, 40.0), left=100.0, right=48.0)
     made, panels = sheet_of(layout, title)
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
         shown = list(measure.parts.items())[:MOST_BARS]

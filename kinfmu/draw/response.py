@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinfmu.draw.sheet import ink
-from kinfmu.draw.study_panels import Layout, Quantities, colour_of, few_ticks, name_axes, sheet_of
+from kinfmu.draw.study_panels import PanelGrid, Quantities, colour_of, few_ticks, name_axes, sheet_of
 from kinfmu.run import FloatArray
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def response(over: Quantities, measures: Sequence[Quantities], title: str) -> Fi
         title: Title of the figure.
 
     """
-    made, panels = sheet_of(Layout(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
+    made, panels = sheet_of(PanelGrid(len(measures), 1, 360.0, 110.0, (0.0, 22.0)), title)
     order = np.argsort(over.values, kind="stable")
     for k, (measure, (axes,)) in enumerate(zip(measures, panels, strict=True)):
         marker = "o" if len(order) <= _MARKED else ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinfmu.draw.chart import SMALL
 from kinfmu.draw.sheet import ink
-from kinfmu.draw.study_panels import Layout, Quantities, colour_of, few_ticks, name_axes, sheet_of
+from kinfmu.draw.study_panels import PanelGrid, Quantities, colour_of, few_ticks, name_axes, sheet_of
 from kinfmu.scene import palette
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def scatter_matrix(parameters: Sequence[Quantities], measures: Sequence[Quantiti
     columns = [*parameters, *measures]
     count = len(columns)
     size = 86.0 if count > 4 else 110.0
-    made, panels = sheet_of(Layout(count, count, size, size, (10.0, 10.0), left=70.0, bottom=48.0), title)
+    made, panels = sheet_of(PanelGrid(count, count, size, size, (10.0, 10.0), left=70.0, bottom=48.0), title)
     step = -(-len(columns[0].values) // MOST_DOTS)
     for row, (vertical, line) in enumerate(zip(columns, panels, strict=True)):
         is_measure = row >= len(parameters)

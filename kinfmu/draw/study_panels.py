@@ -30,7 +30,7 @@ class Quantities(NamedTuple):
         return f"{self.name}{unit}"
 
 
-class Layout(NamedTuple):
+class PanelGrid(NamedTuple):
     """Panels on a sheet, all in points.
 
     rows, columns: Number of panels. width, height: Of a panel. between: Horizontal and vertical distance of panels.
@@ -47,7 +47,7 @@ class Layout(NamedTuple):
     bottom: float = 40.0
 
 
-def sheet_of(layout: Layout, title: str) -> tuple[Figure, list[list[Axes]]]:
+def sheet_of(layout: PanelGrid, title: str) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure with a title and its panels, row by row."""
     from matplotlib.figure import Figure
 

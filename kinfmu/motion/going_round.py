@@ -33,7 +33,7 @@ def goes_round(tracks: Sequence[tuple[Track, bool]]) -> NDArray[np.bool_]:
 
 
 def _is_same(tracks: Sequence[tuple[Track, bool]], step: int) -> NDArray[np.bool_]:
-    """Compare the ends with the largest values among every so manieth sample, of angles and of other quantities."""
+    """Compare the ends with the largest values among some of the samples, of angles and of other quantities."""
     is_same, moves = np.asarray(True), np.asarray(False)
     for order in range(3):
         scales: dict[bool, NDArray[np.float64]] = {}

@@ -77,10 +77,12 @@ class Nominal:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, said: Mapping[str, Any]) -> Nominal:
+    def from_json(cls, content: Mapping[str, Any]) -> Nominal:
         """Return what `as_json` gave."""
-        measures = {name: NominalMeasure(**{**one, "at": tuple(one["at"])}) for name, one in said["measures"].items()}
-        return cls(measures, said["deviations"], said["reason"])
+        measures = {
+            name: NominalMeasure(**{**one, "at": tuple(one["at"])}) for name, one in content["measures"].items()
+        }
+        return cls(measures, content["deviations"], content["reason"])
 
 
 def nominal(study: Study, job: Job) -> Nominal:

@@ -51,7 +51,7 @@ class Parts:
                 f"{self.folder}: a study in progress writes there; wait for it, or choose another file with -o"
             ) from None
         own = {"fingerprint": self._study.fingerprint, **self._study.definition}
-        found = self._said()
+        found = self._written_manifest()
         if restart or found is None:
             for path in self.folder.glob("part-*"):
                 path.unlink()
@@ -67,15 +67,15 @@ class Parts:
         self._lock = os.open(self._manifest, os.O_RDWR)
         lock_for_writing(self._lock)
 
-    def _said(self) -> dict[str, Any] | None:
-        """Return what the manifest says; None without one."""
+    def _written_manifest(self) -> dict[str, Any] | None:
+        """Return the manifest of the folder; None without one."""
         try:
-            said = json.loads(self._manifest.read_bytes())
+            manifest = json.loads(self._manifest.read_bytes())
         except (OSError, ValueError):
             if any(self.folder.glob("part-*")):
                 return {}
             return None
-        return said if isinstance(said, dict) else {}
+        return manifest if isinstance(manifest, dict) else {}
 
     def __enter__(self) -> Parts:
         return self
@@ -118,8 +118,8 @@ def remove_finished(target: Path, study: Study) -> None:
     """Remove the parts of a study whose results are written, if it was killed before it removed them."""
     folder = folder_of(target)
     with suppress(OSError, ValueError):
-        said = json.loads((folder / _MANIFEST).read_bytes())
-        if said.get("fingerprint") == study.fingerprint:
+        manifest = json.loads((folder / _MANIFEST).read_bytes())
+        if manifest.get("fingerprint") == study.fingerprint:
             shutil.rmtree(folder, ignore_errors=True)
 
 

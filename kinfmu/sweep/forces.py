@@ -24,7 +24,7 @@ from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Setting
 from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.driving import column_of
-from kinfmu.sweep.sensitivities import native_stage, stage_results
+from kinfmu.sweep.stages import native_stage, stage_results
 
 _STAGES = 3  # forces, the same with coefficients given, reactions
 Given = dict[str, FloatArray | float]

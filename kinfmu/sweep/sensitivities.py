@@ -13,23 +13,20 @@ from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.display import Displayed
-from kinfmu.errors import CompilerError, RequestError, listed, suggestion
+from kinfmu.errors import RequestError, listed, suggestion
 from kinfmu.plan import SolvePlan, compile_plan, localized
 from kinfmu.plan.sensitivity import scale_of, sensitivity_steps
 from kinfmu.plan.steps import law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
-from kinfmu.simd.stage import empty_results, is_printable, load_native_stage
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Settings
 from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.interpolated import SPACING, Columns, interpolated
+from kinfmu.sweep.stages import Native, native_stage, stage_results
 
 OPEN = 1e-7  # derivative of a row relative to the size, for a change by the size or by 1, above which it would open
-AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
 _STAGES_KEPT = 16
-
-Native = Callable[[Sequence[FloatArray | float], FloatArray], bool]  # fills results (rows, n) from arrays (n,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,16 +165,6 @@ class SensitivityModel:
         return load_stage(steps), steps.gap_names
 
 
-def native_stage(stage: CompiledStage) -> Native | None:
-    """Return the stage as compiled C; None where it stays in Python."""
-    if not is_printable(stage):
-        return None
-    try:
-        return load_native_stage(stage)
-    except CompilerError:  # the library of the model was found in the cache
-        return None
-
-
 def plan_of_unknowns(plan: SolvePlan) -> SolvePlan:
     """Return the plan whose outputs are the unknowns of all blocks, seen from its own origin; or the same plan."""
     if set(plan.unknowns) <= set(plan.outputs) and plan.origin == (0.0, 0.0):
@@ -269,38 +256,6 @@ def _evaluated(
         tables = whole
     values, rates, values_by, rates_by = tables
     return Sensitivities(outputs, parameters, run.t, values, rates, values_by, rates_by, run.status, refused)
-
-
-def stage_results(
-    stage: CompiledStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
-) -> tuple[FloatArray, bool]:
-    """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
-
-    numbers: arrays (n,), or one number each.
-    """
-    n = shape[1]
-    results = empty_results(*shape)
-    for rows_at_zero in stage.zeros:
-        results[rows_at_zero] = 0.0
-    if native is not None:
-        return results, native(numbers, results)
-    if n <= stage.few:
-        columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
-        rows = []
-        for given in zip(*columns, strict=True):
-            try:
-                rows.append(stage.of_sample(given))
-            except (ArithmeticError, ValueError):
-                rows.append((np.nan,) * len(stage.places))
-        results[list(stage.places)] = np.array(rows, dtype=float).reshape(n, len(stage.places)).T
-    else:
-        with np.errstate(all="ignore"):
-            for start in range(0, n, AT_ONCE):
-                part = slice(start, start + AT_ONCE)
-                own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
-                for place, result in zip(stage.places, stage.of_samples(own), strict=True):
-                    results[place, part] = result
-    return results, bool(np.isfinite(results).all())
 
 
 def _refused(

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinfmu.readings import Reading
+from kinfmu.synthesis.numbers import Numeral
 
-Numeral = float | str
 WEIGHT = 100.0
 
 

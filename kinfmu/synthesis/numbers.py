@@ -13,6 +13,8 @@ from kinfmu.mechanism.valid import is_number, quoted
 from kinfmu.run import FloatArray
 from kinfmu.units import Quantity
 
+Numeral = float | str  # bare or with a unit
+
 
 class Bounds(NamedTuple):
     """Bounds of an unknown."""
@@ -77,5 +79,5 @@ def read_weights(where: str, value: Any, count: int) -> FloatArray:
         raise MechanismError(f"{where} has {len(weights)} numbers for {count} points")
     found = np.array(weights, dtype=float)
     if not (np.isfinite(found).all() and (found >= 0.0).all() and found.any()):
-        raise MechanismError(f"{where} = {quoted(value)}: weights must be positive")
+        raise MechanismError(f"{where} = {quoted(value)}: weights must be 0 or more, and one of them above 0")
     return found

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 from kinfmu.readings import Reading
 from kinfmu.run import FloatArray
+from kinfmu.synthesis.numbers import Numeral
 
-Numeral = float | str
 Free = Numeral | Sequence[Numeral]
 Row = Sequence[Numeral] | FloatArray
 Rows = Sequence[Sequence[Numeral]] | FloatArray

@@ -158,7 +158,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     (_path(step="0 deg"), "step = '0 deg' must not be 0"),
     ({"constraints": [GrashofConstraint(name="g", links=[*LENGTHS][:4], gap=-1)]}, "gap = -1 must be 0 or more"),
     ({"constraints": [MarginConstraint(name="m", minimum=2)]}, "minimum = 2 must be between 0 and 1"),
-    (_path(weight=-1.0), "weights must be positive"),
+    (_path(weight=-1.0), "weights must be 0 or more"),
     (_poses(of="rokker"), "moving body; did you mean 'rocker'"),
     (_poses(length=0), "length = 0 must be positive"),
     ({"targets": [FunctionTarget(name="f", of="rocker.ph", points=[(0, 1)])]}, "did you mean 'rocker.phi'"),

@@ -1,0 +1,58 @@
+"""Stages at all samples of a run, by compiled C or by Python: sensitivities, forces and reactions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from kinfmu.codegen.python.stage import CompiledStage
+from kinfmu.errors import CompilerError
+from kinfmu.run import FloatArray
+from kinfmu.simd.stage import empty_results, is_printable, load_native_stage
+
+AT_ONCE = 512  # samples; the arrays of a stage then stay in the processor's cache
+
+Native = Callable[[Sequence[FloatArray | float], FloatArray], bool]  # fills results (rows, n) from arrays (n,)
+
+
+def native_stage(stage: CompiledStage) -> Native | None:
+    """Return the stage as compiled C; None where it stays in Python."""
+    if not is_printable(stage):
+        return None
+    try:
+        return load_native_stage(stage)
+    except CompilerError:  # the library of the model was found in the cache
+        return None
+
+
+def stage_results(
+    stage: CompiledStage, native: Native | None, numbers: Sequence[FloatArray | float], shape: tuple[int, int]
+) -> tuple[FloatArray, bool]:
+    """Return all results of a stage, (rows, n), and whether all are finite; they are not where a block is singular.
+
+    numbers: arrays (n,), or one number each.
+    """
+    n = shape[1]
+    results = empty_results(*shape)
+    for rows_at_zero in stage.zeros:
+        results[rows_at_zero] = 0.0
+    if native is not None:
+        return results, native(numbers, results)
+    if n <= stage.few:
+        columns = [number.tolist() if isinstance(number, np.ndarray) else [number] * n for number in numbers]
+        rows = []
+        for given in zip(*columns, strict=True):
+            try:
+                rows.append(stage.of_sample(given))
+            except (ArithmeticError, ValueError):
+                rows.append((np.nan,) * len(stage.places))
+        results[list(stage.places)] = np.array(rows, dtype=float).reshape(n, len(stage.places)).T
+    else:
+        with np.errstate(all="ignore"):
+            for start in range(0, n, AT_ONCE):
+                part = slice(start, start + AT_ONCE)
+                own = [number[part] if isinstance(number, np.ndarray) else number for number in numbers]
+                for place, result in zip(stage.places, stage.of_samples(own), strict=True):
+                    results[place, part] = result
+    return results, bool(np.isfinite(results).all())
