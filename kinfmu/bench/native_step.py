@@ -7,6 +7,7 @@ import math
 import tempfile
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from time import perf_counter, process_time
@@ -17,7 +18,7 @@ from kinfmu.codegen.c import compiler
 from kinfmu.fmu import description
 from kinfmu.fmu.build import build
 from kinfmu.fmu.native.archive import OPTIMIZED
-from kinfmu.mechanism import Mechanism
+from kinfmu.mechanism import Gravity, Mechanism, Point
 
 STEPS = 360 * 200  # in a round, of one degree each: whole turns
 ROUNDS = 40
@@ -30,25 +31,42 @@ _WORDS = {2: "Real", 3: "Float64"}
 def run(mechanism: Mechanism, rounds: int = ROUNDS) -> str:
     """Return a table: processor time of a step (set 1, step, get 15) of the native FMU and of closed forms.
 
-    In both versions of FMI, with their ratio and what it takes to instantiate the FMU.
+    In both versions of FMI, with their ratio and what it takes to instantiate the FMU; and of a step that also reads
+    the driver's effort, of the mechanism with masses, compared with the step without.
     """
-    rows = []
+    rows, of_forces = [], []
     for fmi in (2, 3):
         with tempfile.TemporaryDirectory(prefix="kinfmu_bench_", ignore_cleanup_errors=True) as folder:
-            ours, instantiate = _ours(mechanism, fmi, Path(folder))
-            ways = [ours, _closed_form(fmi)]
+            ours, instantiate = _ours(mechanism, fmi, Path(folder, "plain"))
+            loaded, _ = _ours(with_masses(mechanism), fmi, Path(folder, "loaded"), forces=1)
+            ways = [ours, _closed_form(fmi), loaded]
             ns = [[value / STEPS * 1e9 for value in row] for row in in_turn(ways, rounds, process_time)]
-        ratio = spread([a / b for a, b in zip(*ns, strict=True)])
-        mine, other = (spread(row).median for row in ns)
-        name = f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us"
-        quartiles = f"{ratio.lower:.2f} to {ratio.upper:.2f}"
-        rows.append((name, f"{mine:.0f} ns", f"{other:.0f} ns", f"{ratio.median:.2f}", quartiles))
+        rows.append(_row(f"FMI {fmi}.0, instantiate {instantiate * 1e6:.0f} us", ns[0], ns[1]))
+        of_forces.append(_row(f"FMI {fmi}.0", ns[2], ns[0]))
     head = ("native FMU step: set 1, step 1 deg, get 15", "ours", "closed form", "ratio", "quartiles")
-    return "\n".join(table(head, rows))
+    head_of_forces = ("the same with masses, get also the driver's effort", "with", "without", "ratio", "quartiles")
+    return "\n".join([*table(head, rows), "", *table(head_of_forces, of_forces)])
 
 
-def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], None], float]:
-    """A round of the mechanism's FMU, and the seconds that an instance takes."""
+def _row(name: str, ns: Sequence[float], others: Sequence[float]) -> tuple[str, ...]:
+    """A row of the table: medians, and the ratio with its quartiles."""
+    ratio = spread([a / b for a, b in zip(ns, others, strict=True)])
+    quartiles = f"{ratio.lower:.2f} to {ratio.upper:.2f}"
+    return name, f"{spread(ns).median:.0f} ns", f"{spread(others).median:.0f} ns", f"{ratio.median:.2f}", quartiles
+
+
+def with_masses(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with gravity, and bodies of 1 kg whose centres of mass are beside their origins."""
+    bodies = [
+        body if body.is_ground else replace(body, mass=1.0, center_of_mass=Point(0.3, 0.1), inertia=0.1)
+        for body in mechanism.bodies
+    ]
+    return replace(mechanism, bodies=tuple(bodies), gravity=Gravity(0.0, -9.81))
+
+
+def _ours(mechanism: Mechanism, fmi: int, folder: Path, *, forces: int = 0) -> tuple[Callable[[], None], float]:
+    """A round of the mechanism's FMU, and the seconds that an instance takes; forces: how many of them are read."""
+    folder.mkdir()
     fmu = build(mechanism, folder / "ours.fmu", flavour="native", fmi=fmi, drive="inputs")
     with zipfile.ZipFile(fmu) as zipped:
         zipped.extractall(folder)
@@ -79,6 +97,7 @@ def _ours(mechanism: Mechanism, fmi: int, folder: Path) -> tuple[Callable[[], No
     library[f"{prefix}ExitInitializationMode"](instance)
     references = about.interface.value_references()
     motion = [about.interface.part(part)[:5] for part in ("values", "rates", "accelerations")]
+    motion.append(about.interface.part("forces")[:forces])
     outputs = [references[variable.name] for variables in motion for variable in variables]
     return _rounds(fmi, library, instance, outputs), seconds
 

@@ -119,7 +119,8 @@ def _fmu(
     given = checked_settings(mech, settings, (TOLERANCE, DRIVEN_BY_TIME, RATES))
     with errors_of(model):
         mech = given.mechanism()
-        drive = "inputs" if has_inputs else default_drive(mech)
+        has_load_inputs = any(load.inputs() for load in mech.loads)  # a table may give these alone
+        drive = "inputs" if has_inputs and not has_load_inputs else default_drive(mech)
         fmu = build(mech, folder, flavour="python", drive=drive)  # compiling would take longer than this one run
     return fmu, dict(given.of_run)
 

@@ -85,7 +85,8 @@ def simulate(
         stop: Stop time [s]. Default: of the FMU's default experiment; with inputs, of their last row.
         step: Step [s]. Default: of the FMU's default experiment.
         inputs: CSV file with the columns `time` and inputs such as `crank_angle`, or `crank_angle [deg]` with a unit,
-            or a mapping of arrays by name; linear between rows. With inputs, `driven_by_time` is false by default.
+            or a mapping of arrays by name; linear between rows. `driven_by_time` is then false by default, unless all
+            of them are efforts of external loads.
         parameters: Values by name, such as {"crank.speed": 2.0} or {"crank.speed": "20 rpm"}.
         state: With a mechanism: initial values and speeds, such as {"crank_angle": 0.5, "crank_speed": 2.0} [rad,
             rad/s]. Default: those of the laws at the start.
@@ -217,7 +218,7 @@ def _times(span: RunSettings | InputTable, start: float | None, stop: float | No
 def _settings(
     interface: Interface, settable: Settable, parameters: Mapping[str, float | str | bool], *, has_inputs: bool
 ) -> dict[str, float | bool | str]:
-    """Return the checked parameters to set in the FMU; with inputs, `driven_by_time` is false by default."""
+    """Return the checked parameters to set in the FMU; with inputs of drivers, `driven_by_time` is false by default."""
     known = {variable.name: variable for variable in interface if variable.causality == "parameter"}
     chosen: dict[str, float | bool | str] = {}
     for name, value in parameters.items():

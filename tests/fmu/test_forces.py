@@ -315,3 +315,39 @@ def test_model_exchange_has_the_forces_of_a_run(fmu_of: Callable[..., Path], fmi
         host.fmu.setTime(time)
         np.testing.assert_allclose(host.get(*names), reference.forces[k], rtol=1e-12, atol=1e-12)
     host.free()
+
+
+def sixth_order(value_at: Callable[[float], float], h: float) -> float:
+    weights = ((1, 45.0), (2, -9.0), (3, 1.0))
+    return sum(weight / (60.0 * h) * (value_at(j * h) - value_at(-j * h)) for j, weight in weights)
+
+
+def test_derivatives_of_forces_with_respect_to_time_and_masses(fmu_of: Callable[..., Path], tmp_path: Path) -> None:
+    host = Host(fmu_of(press(), "native", 3), tmp_path / "timed")
+    host.enter(0.0)
+    model = kinfmu.compile(press())
+
+    def torque(t: float, mass: float) -> float:
+        return float(model.solve([t], parameters={"ram_mass": mass}, work_force=-150.0)["crank.torque"][0])
+
+    host.set({"work_force": -150.0})
+    of_mass, of_time = (host.slopes(["crank.torque"], [name], [1.0])[0] for name in ("ram_mass", "time"))
+    assert of_mass == pytest.approx(sixth_order(lambda d: torque(0.0, 3.0 + d), 0.1), rel=1e-9)
+    assert of_time == pytest.approx(sixth_order(lambda d: torque(d, 3.0), 1e-3), rel=1e-8)
+    host.fmu.exitInitializationMode()
+    host.free()
+
+
+def test_the_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text(encoding="utf-8")
+    (block,) = (block for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "press.toml" in block)
+    monkeypatch.chdir(tmp_path)
+    Path("press.toml").write_text(PRESS, encoding="utf-8")
+    columns = "time,crank_angle,crank_speed,crank_acceleration,work_force"
+    rows = [f"{0.01 * k},{0.02 * k},2.0,0.0,-150.0" for k in range(101)]
+    Path("crank.csv").write_text("\n".join([columns, *rows]), encoding="utf-8")
+    names: dict[str, float] = {}
+    exec(block, names)  # noqa: S102  our page
+    same = {"crank.start": 0.0, "crank.speed": 2.0}  # the law that gives these angles
+    run = kinfmu.compile(press()).solve(0.01 * np.arange(101), parameters=same, work_force=-150.0)
+    assert names["peak"] == pytest.approx(np.abs(run["crank.torque"]).max(), rel=1e-9)
