@@ -82,6 +82,8 @@ def test_its_fmu_driven_by_time_equals_the_reference(name: str, member: Callable
     asked, (times, step) = member(name), samples(name)
     run = kinfmu.simulate(asked.fmu("time"), start=times[0], stop=times[-1], step=step)
     assert _largest_disagreement(run, asked) <= AGREEMENT
+    assert bool(run.force_names) == asked.has_forces
+    assert _largest_force_disagreement(run, asked) <= FORCES_AGREE
 
 
 @every_member
@@ -92,6 +94,8 @@ def test_its_fmu_driven_from_a_csv_equals_the_reference(
     table = _inputs(asked, tmp_path / "inputs.csv")
     run = kinfmu.simulate(asked.fmu("inputs"), start=times[0], stop=times[-1], step=step, inputs=table)
     assert _largest_disagreement(run, asked) <= AGREEMENT
+    assert bool(run.force_names) == asked.has_forces
+    assert _largest_force_disagreement(run, asked) <= FORCES_AGREE
 
 
 @every_member
