@@ -17,12 +17,13 @@ from kinfmu.errors import KinfmuError, RequestError, listed
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
+from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.measure import chosen_measures, listed_measures, measure, reason_without_value
-from kinfmu.motion.motion import Motion, argument_of
+from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
 from kinfmu.motion.quintic import FloatArray, use_compiled
-from kinfmu.motion.track import FEWEST, Track
+from kinfmu.motion.track import FEWEST
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
@@ -304,19 +305,7 @@ class BatchReading:
         """Return a motion at the samples that goes round, with NaN for the first design, and the samples' order."""
         plan, driving = self._model.plan, self._driving
         samples = self._samples(0)
-        x, per = argument_of(samples)
-        order = np.s_[:] if x[-1] > x[0] else np.s_[::-1]
-        x = x[order]
-        if not np.all(np.diff(x) > 0.0):
-            raise RequestError("the samples are not in ascending or descending order")
-        drive, driver = None, TIME
-        if len(samples.input_names) == 3 or samples.axis != TIME:
-            column = 0 if samples.axis == TIME else samples.input_names.index(samples.axis)
-            driver = samples.input_names[column].driver
-            u, ud, udd = (samples.inputs[order, column + k] for k in range(3))
-            if per != "time":
-                ud, udd = np.ones_like(x), np.zeros_like(x)
-            drive = Track(x, u, ud, udd, is_closed=True)
+        x, per, order, driver, drive = driven_samples(samples)
         outputs = [self._model.outputs[k] for k in self._columns]
         gap = np.full((len(driving.times), len(outputs)), np.nan)
         fixed: Any = plan.fixed
@@ -327,7 +316,7 @@ class BatchReading:
             tables=(gap, gap, gap),
             outputs=outputs,
             fixed=fixed,
-            drive=drive,
+            drive=replace(drive, is_closed=True) if drive else None,
             points=self._model.mechanism.body_points,
             driver=driver,
             margin=np.full(len(x), np.nan),

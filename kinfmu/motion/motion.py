@@ -20,6 +20,7 @@ from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.checks import coordinate_orders
 from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.members import kind_of_measured
+from kinfmu.motion.driven_samples import driven_samples
 from kinfmu.motion.fitting import Circle, Line, deviation
 from kinfmu.motion.going_round import goes_round
 from kinfmu.motion.needed import Cosine, PathCoordinate, QuantityRead, cosine_between, is_angle, value_of
@@ -27,7 +28,7 @@ from kinfmu.motion.quintic import FloatArray, IntArray
 from kinfmu.motion.sampled import sampled_track
 from kinfmu.motion.track import FEWEST, Track
 from kinfmu.run import Run
-from kinfmu.run.axis import TIME, HasAxis, axis_of, rates_per
+from kinfmu.run.axis import TIME
 from kinfmu.units import CoordinateName, ForceName, Quantity
 
 SHAPES: dict[str, type[Line] | type[Circle]] = {"line": Line, "circle": Circle}
@@ -91,20 +92,8 @@ class Motion:
             raise RequestError("the run holds no mechanism, so nothing can be measured on it")
         if len(run) < FEWEST:
             raise RequestError(f"the run has {len(run)} samples; measures need {FEWEST} or more")
-        x, per = argument_of(run)
-        order = np.s_[:] if x[-1] > x[0] else np.s_[::-1]
-        x = x[order]
-        if not np.all(np.diff(x) > 0.0):
-            raise RequestError("the samples of the run are not in ascending or descending order")
+        x, per, order, driver, drive = driven_samples(run)
         tables = tuple(table[order] for table in (run.values, run.rates, run.accelerations))
-        drive, driver = None, TIME
-        if len(run.input_names) == 3 or run.axis != TIME:
-            column = 0 if run.axis == TIME else run.input_names.index(run.axis)
-            driver = run.input_names[column].driver
-            u, ud, udd = (run.inputs[order, column + k] for k in range(3))
-            if per != "time":
-                ud, udd = np.ones_like(x), np.zeros_like(x)
-            drive = Track(x, u, ud, udd)
         motion = cls(
             mechanism,
             x,
@@ -412,25 +401,6 @@ def _force(run: Run, name: str) -> FloatArray:
 def _derived(track: Track, order: int) -> Track:
     """Return the derivative of an order 0 to 2."""
     return (lambda: track, track.derivative, track.second_derivative)[order]()
-
-
-def argument_of(run: HasAxis) -> tuple[FloatArray, str]:
-    """Return the arguments of a run's samples and what they are: 'time', or 'angle' or 'length' of a driver."""
-    if run.axis == TIME:
-        return run.t, "time"
-    per = rates_per(run)
-    if run.axis not in run.input_names:
-        changes = "several drivers change" if len(run.input_names) > 3 else "no driver moves"
-        raise RequestError(f"measures need samples over time or over one driver; here {changes}")
-    column = run.input_names.index(run.axis)
-    speed = run.inputs[:, column + 1]
-    others = np.delete(run.inputs, (column, column + 1, column + 2), axis=1)
-    if not (np.all(speed == speed[0]) and speed[0] and not run.inputs[:, column + 2].any()) or np.ptp(others, 0).any():
-        raise RequestError(
-            f"measures over {axis_of(run).name} need one constant speed other than 0, acceleration 0, "
-            f"and other drivers at rest"
-        )
-    return (run.inputs[:, column], per) if per != "time" else (run.inputs[:, column] / speed[0], per)
 
 
 def _argument_at(drive: Track, value: float) -> float:
