@@ -1,4 +1,4 @@
-"""Arrows of the forces that joints transmit, to one scale for the whole run, with a legend."""
+"""Arrows of the forces that joints transmit and loads exert, to one scale for the whole run, with a legend."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from kinfmu.joints import Distance, Fixed, Joint, PointOnLine, Revolute, Transla
 from kinfmu.measures.placement import body_of
 from kinfmu.mechanism.mechanism import Mechanism
 from kinfmu.run import FloatArray, Run
+from kinfmu.scene.loads import load_forces
 from kinfmu.scene.placing import world
 from kinfmu.scene.scene import Scene
 
@@ -21,10 +22,10 @@ _STEPS = (5.0, 2.0, 1.0)  # first digits of the force in the legend
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Forces at joints: the force of the first body of a joint on the second, from where it acts.
+    """Forces: of the first body of a joint on the second, and of loads, from where they act.
 
-    at: tails (n, 2) by joint [length]; along: (n, 2) by joint, drawn to scale [length], NaN where unknown; newton: the
-    force in the legend [N]; length: of an arrow of that force [length].
+    at: tails (n, 2) by name, such as 'joints.pin' or 'loads.gas' [length]; along: (n, 2) by name, drawn to scale
+    [length], NaN where unknown; newton: the force in the legend [N]; length: of an arrow of that force [length].
     """
 
     at: Mapping[str, FloatArray]
@@ -39,7 +40,7 @@ class Arrows:
 
 
 def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
-    """Return the arrows of all reactions that the run holds; None if it holds none that is determined.
+    """Return the arrows of loads and of all reactions that the run holds; None if there are none.
 
     The scale is that of the largest force, without outliers: forces may grow without bound at a singular point.
     """
@@ -55,7 +56,10 @@ def arrows(run: Run, mechanism: Mechanism, scene: Scene) -> Arrows | None:
         ends = [world(scene.frames[body_of(point)], mechanism.body_points[point]) for point in points]
         force = _force(run, scene, joint, ends)
         if force is not None and np.isfinite(force).any():
-            known[joint.name], tails[joint.name] = force, ends[-1]
+            known[f"joints.{joint.name}"], tails[f"joints.{joint.name}"] = force, ends[-1]
+    for name, at, force in load_forces(run, mechanism, scene):
+        if np.isfinite(force).any():
+            known[f"loads.{name}"], tails[f"loads.{name}"] = force, at
     sizes = [np.hypot(*force.T) for force in known.values()]
     largest = max((float(np.nanpercentile(size, 99.0)) for size in sizes), default=0.0)
     if not (largest > 0.0 and math.isfinite(largest)):

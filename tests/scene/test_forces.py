@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import kinfmu
+from kinfmu.mechanism.toml_file import parse
 from kinfmu.run import Run
 from kinfmu.scene.forces import LONGEST, arrows
 from kinfmu.scene.scene import scene
+from tests.analysis.test_loading import ARM
 from tests.sweep.test_forces import loaded
 
 
@@ -22,13 +24,13 @@ def test_arrows_are_the_forces_to_the_scale_of_the_legend(run: Run) -> None:
     shown = scene(run, run.mechanism)
     found = arrows(run, run.mechanism, shown)
     assert found is not None
-    assert set(found.along) == {"O", "P", "S", "bore"}
-    newtons = found.along["P"] * found.newton / found.length
+    assert set(found.along) == {"joints.O", "joints.P", "joints.S", "joints.bore"}
+    newtons = found.along["joints.P"] * found.newton / found.length
     np.testing.assert_allclose(newtons, np.column_stack([run["P.force_x"], run["P.force_y"]]), rtol=1e-12)
-    bore = found.along["bore"] * found.newton / found.length
+    bore = found.along["joints.bore"] * found.newton / found.length
     np.testing.assert_allclose(bore[:, 0], 0.0, atol=1e-12)  # the bore is along x
     np.testing.assert_allclose(bore[:, 1], run["bore.force"], rtol=1e-12)
-    np.testing.assert_allclose(found.at["P"], np.column_stack([run["rod.x"], run["rod.y"]]), atol=1e-9)
+    np.testing.assert_allclose(found.at["joints.P"], np.column_stack([run["rod.x"], run["rod.y"]]), atol=1e-9)
     longest = max(float(np.hypot(*along.T).max()) for along in found.along.values())
     assert longest == pytest.approx(LONGEST * shown.size, rel=0.02)
     assert found.legend == "1000 N"
@@ -42,4 +44,57 @@ def test_undetermined_reactions_and_those_not_kept_have_no_arrow(run: Run) -> No
     part = run.without(["P.force_x"])
     found = arrows(part, run.mechanism, scene(part, run.mechanism))
     assert found is not None
-    assert set(found.along) == {"O", "S", "bore"}
+    assert set(found.along) == {"joints.O", "joints.S", "joints.bore"}
+
+
+LOADS = """
+[loads.weight]
+type = "force"
+at = "arm.O"
+y = "-50 N"
+
+[loads.push]
+type = "force_along"
+at = "arm.O"
+axes = "arm"
+law = "constant"
+level = "30 N"
+
+[loads.wind]
+type = "force_along"
+at = "arm.O"
+law = "external"
+
+[loads.brake]
+type = "torque"
+on = "arm"
+law = "constant"
+level = "-3 N m"
+"""
+SPRING = """
+[loads.spring]
+type = "spring"
+between = ["ground.far", "arm.tip"]
+stiffness = "200 N/m"
+free_length = 100
+"""
+
+
+def test_loads_have_arrows_where_they_act() -> None:
+    text = ARM.replace("{ O = [0, 0] }, mass", "{ O = [0, 0], tip = [300, 0] }, mass")
+    text = text.replace("ground.points = { O = [0, 0] }", "ground.points = { O = [0, 0], far = [900, 0] }")
+    mechanism = parse(text + LOADS + SPRING, "arm.toml")
+    run = kinfmu.solve(mechanism)
+    found = arrows(run, mechanism, scene(run, mechanism))
+    assert found is not None
+    assert set(found.along) == {"joints.O", "loads.weight", "loads.push", "loads.spring"}
+    newtons = {name: along * found.newton / found.length for name, along in found.along.items()}
+    np.testing.assert_allclose(newtons["loads.weight"], np.tile([0.0, -50.0], (len(run), 1)), atol=1e-11)
+    phi = run["arm.phi"]
+    turning = np.column_stack([np.cos(phi), np.sin(phi)])
+    np.testing.assert_allclose(newtons["loads.push"], 30.0 * turning, atol=1e-11)
+    tip = 300.0 * turning
+    np.testing.assert_allclose(found.at["loads.spring"], tip, atol=1e-9)
+    away = np.array([900.0, 0.0]) - tip
+    length = np.hypot(*away.T)[:, None]
+    np.testing.assert_allclose(newtons["loads.spring"], 200.0 * (length - 100.0) * 1e-3 * away / length, atol=1e-10)

@@ -1,4 +1,4 @@
-"""Force arrows of a recording, at the joints of the moving linkage, and their legend."""
+"""Force arrows of a recording, at the joints and loads of the moving linkage, and their legend."""
 
 from __future__ import annotations
 
@@ -13,28 +13,30 @@ from kinfmu.scene.forces import arrows
 if TYPE_CHECKING:
     import rerun as rr
 
-_COLOUR = (185, 28, 28)
+_JOINT, _LOAD = (185, 28, 28), (168, 85, 247)
 _ORDER = 50.0  # above the linkage
 _RADIUS = 0.005  # as a part of the size
 
 
 def log_arrows(linkage: Linkage) -> None:
-    """Log the forces that joints transmit, as the scene scales them; samples without numbers have no arrows."""
+    """Log the forces of joints and loads, as the scene scales them; samples without numbers have no arrows."""
     import rerun as rr
 
     run, scene, path = linkage.run, linkage.scene, f"{linkage.root}/forces"
-    found = arrows(run, run.mechanism, scene) if run.reaction_names and run.mechanism else None
+    found = arrows(run, run.mechanism, scene) if (run.reaction_names or run.force_names) and run.mechanism else None
     if found is None:
         return
     look: dict[str, Any] = {
-        "colors": [_COLOUR],
         "radii": [_RADIUS * linkage.size],
         "draw_order": linkage.layer + _ORDER,
     }
     for name, along in found.along.items():
-        entity = f"{path}/{name}"
+        kind, _, label = name.partition(".")
+        entity, colour = f"{path}/{kind}/{label}", _LOAD if kind == "loads" else _JOINT
         known = np.asarray(np.isfinite(along + found.at[name]).all(axis=1))
-        linkage.rec.log(entity, rr.Arrows2D.from_fields(**look, labels=[name], show_labels=False), static=True)
+        linkage.rec.log(
+            entity, rr.Arrows2D.from_fields(**look, colors=[colour], labels=[label], show_labels=False), static=True
+        )
         tails, vectors = found.at[name].astype(np.float32), along.astype(np.float32)
 
         def columns(
@@ -48,6 +50,13 @@ def log_arrows(linkage: Linkage) -> None:
     corner = [float(scene.low[0]), float(scene.low[1] - 0.6 * MARGIN * scene.size)]
     linkage.rec.log(
         f"{path}/legend",
-        rr.Arrows2D(origins=[corner], vectors=[[found.length, 0.0]], labels=[found.legend], show_labels=True, **look),
+        rr.Arrows2D(
+            origins=[corner],
+            vectors=[[found.length, 0.0]],
+            labels=[found.legend],
+            show_labels=True,
+            colors=[_JOINT],
+            **look,
+        ),
         static=True,
     )
