@@ -164,4 +164,5 @@ def force_plan(plan: SolvePlan) -> SolvePlan:
     local, open_ones = replace(local, coordinates="moving"), [parameter.name for parameter in plan.parameters]
     wanted = [name for name in loaded_coordinates(local) if name in moving]
     solved = {name for block in compile_plan(local, wanted, open_ones).blocks for name in block.coordinates}
-    return compile_plan(local, [name for name in moving if name in solved], open_ones)
+    found = compile_plan(local, [name for name in moving if name in solved], open_ones)
+    return replace(found, origin=plan.origin)  # potential energy counts from the world's origin

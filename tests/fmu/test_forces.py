@@ -351,3 +351,22 @@ def test_the_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     same = {"crank.start": 0.0, "crank.speed": 2.0}  # the law that gives these angles
     run = kinfmu.compile(press()).solve(0.01 * np.arange(101), parameters=same, work_force=-150.0)
     assert names["peak"] == pytest.approx(np.abs(run["crank.torque"]).max(), rel=1e-9)
+
+
+def test_potential_energy_counts_from_the_origin_of_the_world(tmp_path: Path) -> None:
+    text = PRESS
+    for near, far in (
+        ("O = [0, 0], spring = [500, 40] }", "O = [100000, 200000], spring = [100500, 200040] }"),
+        ('x = 0, y = 0, phi = "40 deg"', 'x = 100000, y = 200000, phi = "40 deg"'),
+        ("x = 380, y = 0, phi = 0", "x = 100380, y = 200000, phi = 0"),
+    ):
+        assert near in text
+        text = text.replace(near, far)
+    mechanism = toml_file.parse(text.replace('"press"', '"far_press"'), "far_press")
+    t = np.linspace(0.0, 1.0, 5)
+    lifted = kinfmu.solve(press(), t)["potential_energy"] + (1.5 + 0.8 + 3.0) * 9.81 * 200.0
+    run = kinfmu.solve(mechanism, t)
+    np.testing.assert_allclose(run["potential_energy"], lifted, rtol=1e-12)
+    for flavour in ("python", "native"):
+        fmu = kinfmu.build(mechanism, tmp_path / f"{flavour}.fmu", flavour=flavour)
+        assert_forces_equal(kinfmu.simulate(fmu, step=0.25), run)
