@@ -19,6 +19,7 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {  # module of kinfmu.bench, and
     "sample": ("solve_sample", ()),
     "sweep": ("native_sweep", ()),
     "designs": ("designs", ()),
+    "forces": ("forces", ()),
     "step": ("fmu_step", ("fourbar",)),
     "native": ("native_step", ("fourbar",)),
     "log": ("log_files", ()),
@@ -78,6 +79,7 @@ def bench(what: tuple[str, ...], mechanisms: tuple[str, ...], rounds: int | None
     sample    a sample of solve, compared with the readable reference
     sweep     a sweep by the native engine, compared with closed forms and pylinkage
     designs   calls and batches with other lengths, compared with closed forms and scipy
+    forces    efforts and reactions of a sweep, compared with the sweep alone
     step      a step of the FMU, compared with the smallest pythonfmu FMU
     native    a step of the native FMU in a C host, compared with closed forms
     log       writing and reading records of a million samples, compared with mcap

@@ -20,7 +20,7 @@
 
 typedef double kf_numbers[KF_BLOCK]; /* one for each sample */
 
-/* Samples of a stage. step: of each list of given numbers, 0 if it is one number for all samples. pitch: of the rows of
+/* Samples of a stage. step: between the given numbers of two samples, 0 if it is one number for all. pitch: of the rows of
  * results, which are aligned to cache lines. places: rows of the results in order. is_large: larger than the caches.
  */
 typedef struct {
@@ -125,9 +125,14 @@ static inline void kf_gather(const kf_stage *stage, int64_t first, int count, kf
 {
     int k, i;
     for (k = 0; k < KF_GIVEN; ++k) {
-        const double *const from = stage->given[k];
-        for (i = 0; i < KF_BLOCK; ++i) {
-            x[k][i] = stage->step[k] == 0 ? from[0] : from[first + (i < count ? i : count - 1)];
+        const int64_t step = stage->step[k];
+        const double *const from = stage->given[k] + step * first;
+        if (step == 1 && count == KF_BLOCK) {
+            memcpy(x[k], from, sizeof x[k]);
+        } else {
+            for (i = 0; i < KF_BLOCK; ++i) {
+                x[k][i] = from[step * (i < count ? i : count - 1)];
+            }
         }
     }
 }

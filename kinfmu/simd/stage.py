@@ -176,12 +176,14 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
 
     def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
         single = np.array([number for number in given if not isinstance(number, np.ndarray)])
-        arrays = [np.ascontiguousarray(number) if isinstance(number, np.ndarray) else None for number in given]
+        arrays = [number if isinstance(number, np.ndarray) else None for number in given]
         place = itertools.count(single.ctypes.data, single.itemsize)
         starts = np.array(
             [next(place) if array is None else array.__array_interface__["data"][0] for array in arrays], dtype=np.uintp
         )
-        steps = np.array([array is not None for array in arrays], dtype=np.int64)
+        steps = np.array(
+            [0 if array is None else array.strides[0] // array.itemsize for array in arrays], dtype=np.int64
+        )
         n, pitch, start = results.shape[1], results.strides[0] // results.itemsize, results.ctypes.data
         job = _Stage(n, starts.ctypes.data, steps.ctypes.data, start, pitch, results.size > LARGE)
         answer: int = library.kf_evaluate(ctypes.byref(job))

@@ -19,7 +19,7 @@ from kinfmu.plan.origin import localized
 from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
 from kinfmu.plan.steps import law_symbol
 from kinfmu.plan.trace import parameter_symbol
-from kinfmu.run import FloatArray, Run
+from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep.arguments import Setting
 from kinfmu.sweep.designs import Solvable
@@ -80,12 +80,8 @@ class ForceModel:
         Samples that are interpolated across a singular point take the velocity coefficients from runs with unit speeds,
         which are interpolated likewise: there the blocks do not give them.
         """
-        status = run.poses.status
-        if status.max(initial=0) < Status.BRIDGED:
-            return self._evaluated(self._stage, self._given(run, slice(None)), len(status))
-        forces = np.full((len(status), len(self.names)), np.nan)
-        regular, bridged = np.flatnonzero(status < Status.BRIDGED), np.flatnonzero(status == Status.BRIDGED)
-        forces[regular] = self._evaluated(self._stage, self._given(run, regular), len(regular))
+        forces, irregular = self._at_regular_samples(self._stage, run)
+        bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
         if len(bridged):
             given = self._given(run, bridged) | self._coefficients(run, bridged)
             forces[bridged] = self._evaluated(self._stage_of_coefficients, given, len(bridged))
@@ -97,16 +93,21 @@ class ForceModel:
         They are NaN where the run has no numbers, at samples that are interpolated across a singular point, where the
         rows do not determine them, and for rows that share a load with redundant ones.
         """
-        status = run.poses.status
         names = reaction_names(self.poses.plan)
-        if status.max(initial=0) < Status.BRIDGED:
-            reactions = self._evaluated(self._reaction_stage, self._given(run, slice(None)), len(status))
-        else:
-            reactions = np.full((len(status), len(names)), np.nan)
-            regular = np.flatnonzero(status < Status.BRIDGED)
-            reactions[regular] = self._evaluated(self._reaction_stage, self._given(run, regular), len(regular))
+        reactions, _ = self._at_regular_samples(self._reaction_stage, run)
         reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
         return reactions
+
+    def _at_regular_samples(self, stage: CompiledStage, run: LoadedRun) -> tuple[FloatArray, IntArray]:
+        """Return the results of a stage, (n, results), and the numbers of all other samples, where they are NaN.
+
+        The stage runs over these too: they are few, and tables of the others would be copied without them.
+        """
+        status = run.poses.status
+        results = self._evaluated(stage, self._given(run, slice(None)), len(status))
+        irregular = np.flatnonzero(status >= Status.BRIDGED)
+        results[irregular] = np.nan
+        return results, irregular
 
     @cached_property
     def _stage(self) -> CompiledStage:
@@ -139,12 +140,12 @@ class ForceModel:
     def _coefficients(self, run: LoadedRun, samples: Any) -> Given:
         """Return the derivatives of the coordinates with respect to each driver: rates at a speed of 1."""
         plan = self.poses.plan
-        values = {driver.inputs[0]: run.poses[driver.inputs[0]][samples] for driver in plan.drivers}
+        values = {driver.inputs[0]: run.poses.inputs[samples, 3 * k] for k, driver in enumerate(plan.drivers)}
         found: Given = {}
         for number in range(len(plan.drivers)):
             speeds: dict[str, Any] = {driver.inputs[1]: float(k == number) for k, driver in enumerate(plan.drivers)}
-            unit = self.poses.solve(parameters=run.setting.given, **values, **speeds)
-            found |= {coefficient_symbol(name, number): unit[name.derivative(1)] for name in plan.outputs}
+            rates = self.poses.solve(parameters=run.setting.given, **values, **speeds).rates.T
+            found |= {coefficient_symbol(name, number): rate for name, rate in zip(plan.outputs, rates, strict=True)}
         return found
 
     def _evaluated(self, stage: CompiledStage, given: Mapping[str, Any], n: int) -> FloatArray:

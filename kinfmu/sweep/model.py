@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, Literal
@@ -184,8 +185,8 @@ class Model:
 
         def loaded() -> LoadedRun:
             """Return what forces are computed from; tables that were given may hold other numbers by now."""
-            poses = run
-            if self._force_model.poses is not self or out is not None:
+            poses = itself()
+            if poses is None or self._force_model.poses is not self or out is not None:
                 again: dict[str, Any] = dict(inputs)
                 model = self._force_model.poses
                 poses = model.solve(t, parameters=parameters, tolerance=tolerance, wrap=wrap, **again)
@@ -200,7 +201,7 @@ class Model:
             accelerations=tables[2],
             fixed=lambda: dict(zip(plan.fixed_nodes, engine.fixed.values(), strict=True)),
             input_names=self._input_names,
-            inputs=lambda: np.stack(given, axis=2).reshape(count, len(self._input_names)),
+            inputs=lambda: np.stack([table.T for table in given], axis=1).reshape(len(self._input_names), count).T,
             status=result.status,
             iterations=result.iterations,
             residual=result.residual,
@@ -218,6 +219,7 @@ class Model:
             events=tuple(Event(float(k if inputs else times[k]), "error", message) for k, message in result.failures),
             axis=(lambda: axis_for(given[0], self._input_names[::3])) if inputs else TIME,
         )
+        itself = weakref.ref(run)  # a run that refers to itself would keep its tables until they are collected
         return run
 
     def solve_designs(

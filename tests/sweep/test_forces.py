@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -196,3 +198,18 @@ def test_reactions_and_torques_balance_every_body(name: str) -> None:
         np.testing.assert_allclose(
             moment[body.name][run.good], euler[run.good], rtol=0, atol=1e-10 * largest + 1e-10 * np.abs(euler).max()
         )
+
+
+def test_a_run_with_forces_is_freed_when_it_is_no_longer_used() -> None:
+    """Its tables are large: they must not wait for the collector of cycles."""
+    model = kinfmu.compile(loaded("crank_rocker"), engine="python")
+    gc.disable()
+    try:
+        for read in ("status", "forces", "reactions"):
+            run = model.solve(crank_angle=np.linspace(0.0, 1.0, 5))
+            getattr(run, read)
+            gone = weakref.ref(run)
+            del run
+            assert gone() is None
+    finally:
+        gc.enable()
