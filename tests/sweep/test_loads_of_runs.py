@@ -1,0 +1,168 @@
+"""Forces of loads by closed forms: laws over time and over quantities, external loads, parameters, redundant bars."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Mechanism
+from kinfmu.mechanism.toml_file import parse
+from tests.mechanisms import reference_fourbar
+
+PENDULUM = """
+name = "pendulum"
+[units]
+length = "LENGTH"
+[parameters]
+m = "2 kg"
+[bodies.ground]
+points = { O = [0, 0], way = [0, "-500 mm"] }
+[bodies.arm]
+points = { O = [0, 0], P = ["300 mm", 0] }
+start = { x = 0, y = 0, phi = 0.4 }
+mass = "m"
+center_of_mass = ["200 mm", 0]
+inertia = "0.05 kg m2"
+[bodies.block]
+points = { S = [0, 0] }
+start = { x = "100 mm", y = "-500 mm", phi = 0 }
+mass = "3*m"
+[gravity]
+x = 0
+y = "-9.81 m/s2"
+[joints.O]
+type = "revolute"
+between = ["ground.O", "arm.O"]
+[joints.slide]
+type = "translational"
+between = ["ground.way", "block.S"]
+[drivers.swing]
+type = "angle"
+of = "arm"
+law = "constant_speed"
+start = 0.4
+speed = "0.7 rad/s"
+[drivers.push]
+type = "slide"
+between = ["ground.way", "block.S"]
+law = "polynomial"
+coefficients = ["100 mm", "200 mm/s", "50 mm/s2"]
+[loads.wind]
+type = "force_along"
+at = "arm.P"
+angle = "90 deg"
+axes = "arm"
+law = "external"
+[loads.brake]
+type = "torque"
+on = "arm"
+law = "polynomial"
+coefficients = ["3 N m", "-2 N m/s"]
+[loads.cutting]
+type = "force_along"
+at = "block.S"
+angle = "180 deg"
+law = "constant_speed"
+start = "4 N"
+speed = "30 N/m"
+over = { measure = "coordinate", of = "block.S", axis = "x" }
+"""
+G, ARM, INERTIA, REACH = 9.81, 0.2, 0.05, 0.3
+T = np.linspace(0.0, 1.2, 13)
+
+
+def run_of(length: str, **given: Any) -> kinfmu.Run:
+    return kinfmu.compile(parse(PENDULUM.replace("LENGTH", length))).solve(T, **given)
+
+
+@pytest.mark.parametrize("length", ["m", "mm"])
+@pytest.mark.parametrize("mass", [2.0, 3.5])
+def test_efforts_of_a_pendulum_and_a_block_follow_their_formulas(length: str, mass: float) -> None:
+    """Torque in N m and force in N in any unit of length; masses by a parameter, one load by an input."""
+    wind = 5.0 + T
+    run = run_of(length, parameters={"m": mass}, wind_force=wind)
+    phi = 0.4 + 0.7 * T
+    torque = mass * G * ARM * np.cos(phi) - REACH * wind - (3.0 - 2.0 * T)
+    np.testing.assert_allclose(run["swing.torque"], torque, rtol=0, atol=1e-13 * np.abs(torque).max())
+    np.testing.assert_allclose(run["swing.reduced_inertia"], INERTIA + mass * ARM**2, rtol=1e-14)
+    x = 0.1 + 0.2 * T + 0.05 * T**2
+    force = 3.0 * mass * 0.1 + (4.0 + 30.0 * x)
+    np.testing.assert_allclose(run["push.force"], force, rtol=1e-13)
+    np.testing.assert_allclose(run["push.reduced_inertia"], 3.0 * mass, rtol=1e-14)
+    np.testing.assert_allclose(run["swing.reduced_inertia.push"], 0.0, atol=1e-15)
+    np.testing.assert_allclose(run["push.power"], force * (0.2 + 0.1 * T), rtol=1e-13)
+    np.testing.assert_allclose(run["slide.force"], 3.0 * mass * G, rtol=1e-13)
+
+
+def test_an_external_load_that_is_not_given_is_zero() -> None:
+    np.testing.assert_array_equal(run_of("m")["swing.torque"], run_of("m", wind_force=0.0)["swing.torque"])
+
+
+MASS, CENTER, TURNING = 1.5, (0.3, 0.2), 0.07
+
+
+def heavy() -> Mechanism:
+    """The reference four-bar: its bars turn as the crank does, and its coupler does not turn."""
+    mechanism = reference_fourbar()
+    bodies = [
+        body if body.is_ground else replace(body, mass=MASS, center_of_mass=CENTER, inertia=TURNING)
+        for body in mechanism.bodies
+    ]
+    return replace(mechanism, bodies=tuple(bodies), gravity=(0.4, -9.81))
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_torque_of_the_reference_fourbar_is_exact_through_its_change_points(engine: str) -> None:
+    """Closed form: crank and rocker have equal angles, the coupler moves on a circle; two places are bridged."""
+    angles = np.radians(np.concatenate([np.arange(-30.0, 400.0, 5.0), [359.999, 360.0, 540.0]]))
+    speed, acceleration = 1.3, -0.8
+    run = kinfmu.solve(heavy(), engine=engine, crank_angle=angles, crank_speed=speed, crank_acceleration=acceleration)
+    assert run.good.all()
+    assert (run.status == 2).any()
+    c, s = np.cos(angles), np.sin(angles)
+    turning = 2 * (TURNING + MASS * (CENTER[0] ** 2 + CENTER[1] ** 2)) * acceleration
+    turning += 2 * MASS * (9.81 * (c * CENTER[0] - s * CENTER[1]) + 0.4 * (s * CENTER[0] + c * CENTER[1]))
+    coupler = MASS * (acceleration + 9.81 * c + 0.4 * s)  # on a circle of radius 1
+    np.testing.assert_allclose(
+        run["crank.torque"], turning + coupler, rtol=0, atol=1e-11 * np.abs(turning + coupler).max()
+    )
+    regular = run.status == 0
+    np.testing.assert_allclose(
+        run["crank.torque"][regular], (turning + coupler)[regular], rtol=0, atol=1e-12 * np.abs(turning + coupler).max()
+    )
+
+
+def test_reactions_that_share_a_load_with_the_redundant_bar_are_undetermined() -> None:
+    run = kinfmu.solve(heavy(), crank_angle=np.radians([40.0, 75.0, 130.0]))
+    determined = [name for name in run.reaction_names if not np.isnan(run[name]).any()]
+    undetermined = [name for name in run.reaction_names if np.isnan(run[name]).all()]
+    assert len(determined) + len(undetermined) == len(run.reaction_names)
+    assert any(name.startswith("AB.") for name in undetermined)
+    assert kinfmu.check(heavy()).redundant
+
+
+def test_nothing_is_left_over_a_turn_at_constant_speed() -> None:
+    """The work of a conservative system over a turn is 0; the rule for periodic functions converges with all digits."""
+    mechanism = kinfmu.load("crank_rocker")
+    metre = 0.001 if mechanism.length_unit == "mm" else 1.0
+    bodies = [
+        body
+        if body.is_ground
+        else replace(body, mass=1.0 + k, center_of_mass=(0.02 / metre, 0.01 / metre), inertia=0.003)
+        for k, body in enumerate(mechanism.bodies)
+    ]
+    point = next(f"{body.name}.{name}" for body in reversed(bodies) for name in body.points)
+    other = next(f"{body.name}.{name}" for body in bodies[1:2] for name in list(body.points)[-1:])
+    spring = kinfmu.Spring("spring", (point, other), 150.0, 0.01 / metre)
+    loads = (spring, kinfmu.TorsionSpring("torsion", ("ground", bodies[-1].name), 3.0))
+    heavy_one = replace(mechanism, bodies=tuple(bodies), gravity=(0.3 / metre, -9.81 / metre), loads=loads)
+    angles = 2.0 * math.pi * np.arange(256) / 256
+    run = kinfmu.solve(heavy_one, crank_angle=angles, crank_speed=2.0, crank_acceleration=0.0)
+    torque = run["crank.torque"]
+    assert np.abs(torque).max() > 0.1
+    assert abs(torque.mean()) < 1e-12 * np.abs(torque).max()
