@@ -18,7 +18,14 @@ from kinfmu.mechanism.force_names import measured_forces
 from kinfmu.mechanism.settings import LawConstant
 from kinfmu.motion.design_points import dependent_numbers, points_of_designs
 from kinfmu.motion.driven_samples import driven_samples
-from kinfmu.motion.measure import chosen_measures, listed_measures, measure, reason_without_value
+from kinfmu.motion.measure import (
+    MeasuredValue,
+    chosen_measures,
+    listed_measures,
+    measure,
+    read_value,
+    reason_without_value,
+)
 from kinfmu.motion.motion import Motion
 from kinfmu.motion.needed import QuantityRead, needed
 from kinfmu.motion.quantity_model import quantity_model
@@ -27,6 +34,7 @@ from kinfmu.motion.track import FEWEST
 from kinfmu.plan.plan import PlanParameter
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.readings import Finding, LowestMargin, PressureAngle, Reading
+from kinfmu.run import Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python.status import Status
 from kinfmu.sweep import Model
@@ -250,13 +258,21 @@ class BatchReading:
         reasons = []
         for reading in readings:
             try:
-                found = measure(run, [self._asked[reading.name]])[reading.name]
+                found = self._value_of(run, reading)
             except KinfmuError as error:
                 reasons.append(str(error))
                 continue
             self.values[reading.name][design], self.at[reading.name][design] = found.value, found.at
             reasons += [found.reason] if found.reason else []
         return reasons[0] if reasons else ""
+
+    def _value_of(self, run: Run, reading: Reading) -> MeasuredValue:
+        """Return a measure of one design, as `measure` does."""
+        if isinstance(reading, LowestMargin) and reading.name not in self._dependent:
+            # It reads the samples alone: the mechanism with these parameters, which takes milliseconds, is not needed.
+            run = run.replaced(mechanism_source=self._model.mechanism)
+            return read_value(run, Motion.of_run(run), reading)
+        return measure(run, [self._asked[reading.name]])[reading.name]
 
     def _found(self, reading: Reading, motion: Motion) -> Finding:
         try:
@@ -349,12 +365,15 @@ class BatchReading:
                 return names
         elif driven[0].ndim == 3:
             return names
-        chosen = replace(self._model.mechanism, measures=self._readings)
         forces = measured_forces(self._model.mechanism)
-        dependent = {place[1] for place in dependent_numbers(chosen, self._open) if place[0] == "measures"}
-        return {
-            reading.name for reading in self._readings if reading.name in dependent or isinstance(reading, LowestMargin)
-        } | {reading.name for reading in self._readings if getattr(reading, "of", None) in forces}
+        margins = {reading.name for reading in self._readings if isinstance(reading, LowestMargin)}
+        return self._dependent | margins | {one.name for one in self._readings if getattr(one, "of", None) in forces}
+
+    @cached_property
+    def _dependent(self) -> set[str]:
+        """Names of the measures whose own numbers depend on parameters that are given."""
+        chosen = replace(self._model.mechanism, measures=self._readings)
+        return {str(place[1]) for place in dependent_numbers(chosen, self._open) if place[0] == "measures"}
 
     def _units_of_parameters(self) -> dict[str, str]:
         """Return the units of the parameters and law constants that are given."""

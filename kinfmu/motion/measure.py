@@ -89,7 +89,7 @@ def measure(run: Run, measures: Iterable[Reading | str] | None = None) -> Measur
         raise RequestError("the run holds no mechanism, so nothing can be measured on it")
     readings = chosen_measures(run.mechanism, measures)
     motion = Motion.of_run(run, with_margin=any(isinstance(reading, LowestMargin) for reading in readings))
-    return MeasuredValues((reading.name, _value(run, motion, reading)) for reading in readings)
+    return MeasuredValues((reading.name, read_value(run, motion, reading)) for reading in readings)
 
 
 def chosen_measures(
@@ -127,7 +127,8 @@ def listed_measures(measures: Iterable[Reading | str] | Reading | str) -> list[R
     return found  # type: ignore[return-value]
 
 
-def _value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
+def read_value(run: Run, motion: Motion, reading: Reading) -> MeasuredValue:
+    """Return the value of a measure, which holds numbers, on a run and its motion."""
     unit = motion.mechanism.length_unit
     try:
         quantities = needed(motion.mechanism, [reading]).quantities

@@ -84,7 +84,6 @@ READ: tuple[Reading, ...] = (
     Maximum("maximum", DistanceBetween(("ground.O", "coupler.tracer"))),
     Range("range", "rocker.omega", BEGIN, END),
     Range("relative", AngleBetween("coupler", to="rocker")),
-    Peak("peak", "rocker.phi"),
     PeakSpeed("peak_speed", "coupler.tracer"),
     PeakAcceleration("peak_acceleration", "rocker.phi"),
     TimeRatio("time_ratio", "rocker.phi"),
@@ -96,6 +95,7 @@ READ: tuple[Reading, ...] = (
     PressureAngle("pressure_angle", "crank", "coupler.tracer", "rocker.C"),
     VelocityRatio("velocity_ratio", "rocker.phi", None, "minimum", BEGIN, END),
     MechanicalAdvantage("mechanical_advantage", "coupler.phi", "rocker.phi", 2.0, 2.5),
+    Peak("peak", "rocker.phi"),
     LowestMargin("lowest_margin"),
 )
 LENGTHS = ("ground_link", "crank_link", "coupler_link", "rocker_link")
@@ -314,3 +314,21 @@ def test_what_a_model_lacks_is_named_with_what_helps() -> None:
         kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="coupler.x")], crank_angle=TURN)
     with pytest.raises(RequestError, match="here no driver moves"):
         kinfmu.measure_designs(model, {"height": [1.0]}, [Range("far", of="rocker.phi")], crank_angle=[1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_margins_of_designs_need_no_mechanism_of_each_design(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = kinfmu.compile(crank_rocker(), engine=engine)
+    lengths = np.linspace(14.0, 16.0, 4)
+    margins = [LowestMargin("all"), LowestMargin("part", 5.5, 1.0)]  # the part crosses the end of the turn
+    runs = [model.solve(crank_angle=TURN, parameters={"crank_link": length}) for length in lengths.tolist()]
+    expected = [kinfmu.measure(run, margins) for run in runs]
+
+    def never(*_: object) -> None:
+        raise AssertionError("a mechanism is resolved, which takes milliseconds")
+
+    monkeypatch.setattr(kinfmu.Mechanism, "with_parameters", never)
+    found = kinfmu.measure_designs(model, {"crank_link": lengths}, margins, crank_angle=TURN)
+    for name in ("all", "part"):
+        assert found[name].tolist() == [one[name].value for one in expected]
+        assert found.at[name][:, 0].tolist() == [one[name].at[0] for one in expected]
