@@ -94,6 +94,7 @@ class Stepper:
         self._atol = tolerance * np.concatenate([reach, reach])
         self._longest = float(np.diff(times).max()) if len(times) > 1 else inf
         self._refined = 0  # how often the present step was divided
+        self._suspect_until = inf  # [s] its end
         self.steps = 0
         self.end: End | None = None
 
@@ -101,6 +102,8 @@ class Stepper:
         """Yield the samples until the last one, or until the motion ends early: see `end`."""
         times = self._times.tolist()
         yield self._sample(times[0])
+        if len(times) == 1:
+            return
         edges = [times[0], *self._jumps, times[-1]]
         following = iter(times[1:])
         sample = next(following, None)
@@ -160,6 +163,8 @@ class Stepper:
             if integrator.status == "failed":
                 self._fail(before)
                 return False
+            if self._refined and before.t >= self._suspect_until:  # it had none
+                self._take_long_steps()
             if self._has_limit(before, Step(integrator.t, integrator.y, integrator.f, self._equation.pose)):
                 return False
         self._y = self._integrator.y.copy()
@@ -191,14 +196,19 @@ class Stepper:
             return False
         if self._refined < REFINED:
             self._refined += 1
+            self._suspect_until = after.t
             equation.pose, self._y = before.pose, before.y
             self._restart(before.t, (after.t - before.t) / SHARE)
             return False
-        self._refined = 0
         if pose is not None and pose.margin > sqrt(max(TOUCHING**2, ERRORS * self._tolerance)):
-            self._integrator.max_step = min(self._longest, self._span[1] - self._span[0])
+            self._take_long_steps()
             return False
         return self._ends_at(t, before.pose if pose is None else pose, before.y[d:])
+
+    def _take_long_steps(self) -> None:
+        """End the search of a step in smaller ones."""
+        self._refined = 0
+        self._integrator.max_step = min(self._longest, self._span[1] - self._span[0])
 
     def _singular(self, curve: Callable[[float], FloatArray], t0: float, t1: float) -> float:
         """Return the time of the smallest determinant within a step."""

@@ -26,6 +26,7 @@ from kinfmu import (
 )
 from kinfmu.errors import KinfmuError, RequestError
 from kinfmu.laws import External, Harmonic, MotionSequence, Segment
+from kinfmu.readings import Maximum, PeakSpeed
 from kinfmu.solver.python.status import Status
 from tests.dynamics import andrews
 from tests.mechanisms import five_bar, fourbar
@@ -235,6 +236,36 @@ def test_the_run_is_one_over_time() -> None:
     assert [column.name for column in run.columns()] == [column.name for column in solved.columns()]
     for column in solved.columns():
         np.testing.assert_allclose(run[column.name], column.values, rtol=0, atol=1e-12, err_msg=column.name)
+
+
+def test_a_run_of_one_sample_has_the_accelerations_of_its_start() -> None:
+    run = kinfmu.simulate(pendulum(), drive="torque", start=0.0, stop=0.0, step=0.1)
+    assert run["crank_acceleration"].tolist() == pytest.approx([-G / 0.5])
+
+
+def test_a_turn_shortly_before_a_limit_is_none() -> None:
+    """Pulled back by gravity 1e-3 rad before its dead centre, the crank returns to where it was released."""
+    mechanism = heavy(fourbar(2.0, 1.0, 0.9, 1.5), gravity=(0, G))
+    run = simulated(mechanism, 3.0, 30, state={"crank_angle": 0.5, "crank_speed": 0.0}, tolerance=1e-11)
+    assert not run.events
+    assert np.abs(energy(run) - energy(run)[0]).max() < 1e-8 * run["kinetic_energy"].max()
+    assert run["crank_angle"].min() >= 0.5 - 1e-9
+
+
+def test_measures_are_read_from_the_run() -> None:
+    """A pendulum released from the horizontal: extremes between the samples by the balance of energy."""
+    readings = (PeakSpeed("speed", "rod.phi"), Maximum("fastest", "kinetic_energy"))
+    run = simulated(pendulum(0.5, measures=readings), 0.6, 20, tolerance=1e-11)
+    found = {name: found.value for name, found in kinfmu.measure(run).items()}
+    assert found["speed"] == pytest.approx(math.sqrt(2 * G / 0.5), rel=1e-6)
+    assert found["fastest"] == pytest.approx(2.0 * G * 0.5, rel=1e-6)
+
+
+def test_three_cylinders_keep_the_energy() -> None:
+    digger = replace(kinfmu.load("excavator_loaded"), loads=())
+    run = simulated(digger, 0.3, 6, tolerance=1e-9)
+    assert np.abs(energy(run) - energy(run)[0]).max() < 1e-9 * run["kinetic_energy"].max()
+    assert run["kinetic_energy"].max() > 1e3
 
 
 def test_laws_of_loads_are_over_the_time_of_the_run() -> None:
