@@ -5,7 +5,7 @@
     binaries/<platform>/<identifier>.so|dll       pythonfmu's, unchanged
     resources/slavemodule.txt                     names the module that holds the slave class
     resources/<package>_slave.py                  the slave class, with its model and layout
-    resources/<package>/solver/                   the solver, and the emitted model
+    resources/<package>/solver/                   the solver, and the emitted model; forces, if they are outputs
     resources/<package>/{fmu,pythonfmu}/          the base classes of the slave: kinfmu's and pythonfmu's
     resources/mechanism.toml
 

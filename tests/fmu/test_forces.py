@@ -17,7 +17,7 @@ from kinfmu.errors import RequestError
 from kinfmu.fmu.description import read
 from kinfmu.fmu.unpacked import text_in, unpacked
 from kinfmu.mechanism import toml_file
-from tests.fmu.host import DISCARD, OK, Host
+from tests.fmu.host import DISCARD, OK, Host, answer
 from tests.sweep.test_forces import loaded
 
 FLAVOURS = [("python", 2), ("native", 2), ("native", 3)]
@@ -225,8 +225,6 @@ def test_an_unreachable_sample_keeps_the_forces_of_the_last_good_one(
     fmu_of: Callable[..., Path], tmp_path: Path
 ) -> None:
     mechanism = loaded("triple_rocker")
-    limits = kinfmu.check(mechanism)
-    assert limits
     host = Host(fmu_of(mechanism, "python", 2, "inputs"), tmp_path / "slave")
     name = host.about.interface.part("inputs")[0].name
     host.set({"rates": 2})
@@ -237,6 +235,17 @@ def test_an_unreachable_sample_keeps_the_forces_of_the_last_good_one(
     assert host.status() > 2
     assert host.get(*(variable.name for variable in host.about.interface.part("forces"))) == before
     assert host.step(0.1, 0.1) == DISCARD
+    host.free()
+
+
+def test_a_native_fmu_discards_forces_of_an_unreachable_sample(fmu_of: Callable[..., Path], tmp_path: Path) -> None:
+    host = Host(fmu_of(loaded("triple_rocker"), "native", 2, "inputs"), tmp_path / "slave")
+    name = host.about.interface.part("inputs")[0].name
+    host.set({"rates": 2})
+    host.initialize(0.0)
+    host.set({name: host.get(name)[0] + math.pi})
+    assert host.status() > 2
+    assert answer(host.get, "potential_energy") == DISCARD
     host.free()
 
 
