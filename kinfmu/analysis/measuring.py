@@ -72,6 +72,9 @@ def measurements(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> Measure
 def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[Run, str]:
     """Return the samples of the motion, and what it is as text."""
     inputs, over = _cycle(mechanism, ranges)
+    if mechanism.loads and inputs and isinstance(law := mechanism.drivers[0].law, ConstantSpeed) and law.speed:
+        angles, speed = next(iter(inputs.values())), float(law.speed)
+        inputs = {"t": mechanism.run.start + (angles - angles[0]) / abs(speed)}  # laws of loads may need times
     run = solve(mechanism, **inputs)
     return run, over or f"the run of the file, {axis_of(run).range()}"
 

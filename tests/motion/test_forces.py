@@ -89,3 +89,16 @@ def test_wrong_names_and_rates_of_forces_get_one_line() -> None:
         replace(arm, measures=(Peak("a", "arm.torqe"),))
     with pytest.raises(MechanismError, match=r"'crank.torque' is not a coordinate"):
         replace(kinfmu.load("slider_crank"), measures=(Peak("a", "crank.torque"),))
+
+
+def test_loads_over_time_are_measured_over_one_turn_by_check() -> None:
+    """Torque 6 cos(4 t) - 2 sin(4 t) N m."""
+    load = '[loads.brake]\ntype = "torque"\non = "arm"\nlaw = "harmonic"\namplitude = 2\nfrequency = 4\n'
+    report = kinfmu.check(parse(ARM + load + '[measures.motor]\ntype = "peak"\nof = "arm.torque"\n', "arm.toml"))
+    assert report.measured is not None
+    (motor,) = report.measured.values
+    assert motor.value == pytest.approx(math.sqrt(40.0), rel=1e-11)
+    assert motor.driver == "arm"
+    assert report.loading is not None
+    assert abs(report.loading.efforts[0].value) == pytest.approx(math.sqrt(40.0), rel=1e-4)  # of the samples
+    assert report.loading.efforts[0].rms == pytest.approx(math.sqrt(20.0), rel=1e-12)

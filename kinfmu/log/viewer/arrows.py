@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _JOINT, _LOAD = (185, 28, 28), (168, 85, 247)
 _ORDER = 50.0  # above the linkage
-_RADIUS = 0.005  # as a part of the size
+_RADIUS = 0.004  # as a part of the scene's size, however thin its links are
 
 
 def log_arrows(linkage: Linkage) -> None:
@@ -27,7 +27,7 @@ def log_arrows(linkage: Linkage) -> None:
     if found is None:
         return
     look: dict[str, Any] = {
-        "radii": [_RADIUS * linkage.size],
+        "radii": [_RADIUS * max(linkage.size, scene.size)],
         "draw_order": linkage.layer + _ORDER,
     }
     for name, along in found.along.items():
