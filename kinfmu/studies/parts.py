@@ -19,7 +19,7 @@ _MANIFEST = "study.json"
 _END = b"PAR1"  # of a Parquet file
 
 
-class Parts:
+class PartsFolder:
     """The folder FILE.parts next to the results FILE while a study runs.
 
     Args:
@@ -77,7 +77,7 @@ class Parts:
             return None
         return manifest if isinstance(manifest, dict) else {}
 
-    def __enter__(self) -> Parts:
+    def __enter__(self) -> PartsFolder:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -19,7 +19,7 @@ from kinfmu.readings import Reading
 from kinfmu.studies.chunk import Job, run_chunk
 from kinfmu.studies.definition import SAMPLES, SEED, Study, define
 from kinfmu.studies.nominal import nominal
-from kinfmu.studies.parts import Parts, remove_finished
+from kinfmu.studies.parts import PartsFolder, remove_finished
 from kinfmu.studies.result import StudyResult
 from kinfmu.studies.rows import is_result_of
 from kinfmu.studies.sampling import METHODS
@@ -140,7 +140,7 @@ def _run(study: Study, path: Path, workers: int, dask: str | None, progress: Pro
     """Measure the parts that are missing, and join all parts."""
     if find_spec("pyarrow") is None:  # else the study would end after its first part
         raise MissingPackageError("a study needs pyarrow: pip install pyarrow")
-    with Parts(path, study, restart=restart) as parts:
+    with PartsFolder(path, study, restart=restart) as parts:
         job = Job.of(study)
         schema = schema_of(study, nominal(study, job))
         missing = parts.missing()

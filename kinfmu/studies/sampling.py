@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinfmu.run import FloatArray
-from kinfmu.studies.variation import Grid, Interval, Tolerance, Variation
+from kinfmu.studies.variation import Grid, Tolerance, UniformRange, Variation
 
 METHODS = ("sobol", "latin_hypercube")
 _BITS = 30  # of a number of a Sobol point
@@ -47,7 +47,7 @@ class Sampling:
         return tuple(one for one in self.variations if isinstance(one, Grid))
 
     @property
-    def sampled(self) -> tuple[Interval | Tolerance, ...]:
+    def sampled(self) -> tuple[UniformRange | Tolerance, ...]:
         """The parameters that are sampled."""
         return tuple(one for one in self.variations if not isinstance(one, Grid))
 

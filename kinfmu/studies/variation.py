@@ -45,7 +45,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Interval:
+class UniformRange:
     """A parameter that is sampled evenly between two values.
 
     Attributes:
@@ -114,7 +114,7 @@ class Tolerance:
         }
 
 
-Variation = Grid | Interval | Tolerance
+Variation = Grid | UniformRange | Tolerance
 
 
 def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: Mechanism) -> Variation:
@@ -174,7 +174,7 @@ def read_variation(where: str, name: str, table: Mapping[str, Any], mechanism: M
             return Grid(name, unit, tuple(np.linspace(low, high, count).tolist()))
         if low == high:
             raise MechanismError(f"{where}: 'from' and 'to' are equal: {low:.9g}")
-        return Interval(name, unit, min(low, high), max(low, high))
+        return UniformRange(name, unit, min(low, high), max(low, high))
     written = setting.value
     nominal = number("nominal", table.get("nominal", float(written)))
     tolerance = number("tolerance", table["tolerance"], above=0.0)

@@ -15,7 +15,7 @@ from kinfmu.readings import Minimum, Range
 from kinfmu.studies import StudyResult
 from kinfmu.studies.definition import define
 from kinfmu.studies.sampling import Sampling
-from kinfmu.studies.variation import Interval, Tolerance
+from kinfmu.studies.variation import Tolerance, UniformRange
 from tests.studies.linkage import RANGES, linkage, swing
 
 
@@ -51,7 +51,7 @@ def test_grids_are_combined_with_the_last_one_fastest_and_each_point_with_the_sa
 
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
 def test_the_numbers_of_a_design_do_not_depend_on_the_part_it_is_in(method: str) -> None:
-    variations = (Interval("a", "mm", 1.0, 2.0), Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0))
+    variations = (UniformRange("a", "mm", 1.0, 2.0), Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0))
     sampling = Sampling(variations, method, 1000, 5)
     whole = sampling.values(0, 1000)
     for first, count in ((0, 1), (1, 1), (3, 64), (511, 2), (512, 488)):
@@ -64,7 +64,7 @@ def test_the_numbers_of_a_design_do_not_depend_on_the_part_it_is_in(method: str)
 
 def test_samples_have_their_distributions_and_fill_the_space_evenly() -> None:
     variations = (
-        Interval("a", "mm", 1.0, 2.0),
+        UniformRange("a", "mm", 1.0, 2.0),
         Tolerance("b", "mm", 3.0, 0.3, "normal", 3.0),
         Tolerance("c", "mm", 3.0, 0.3, "uniform", 3.0),
     )

@@ -11,7 +11,7 @@ import pytest
 import kinfmu
 from kinfmu.errors import KinfmuError, RequestError, StudyError
 from kinfmu.studies import read_study
-from kinfmu.studies.variation import Grid, Interval, Tolerance
+from kinfmu.studies.variation import Grid, Tolerance, UniformRange
 from tests.studies.linkage import linkage, write
 
 CRANK = 'mechanism = "hoeken.toml"\n[parameters]\ncrank = { from = 15, to = 25 }\n'
@@ -115,7 +115,7 @@ def test_the_mechanism_is_found_from_the_folder_of_the_file_or_in_the_gallery(
     path = write(folder, 'mechanism = "hoeken.toml"\ndesigns = 3\nparameters.crank = { from = "1.5 cm", to = 25 }')
     monkeypatch.chdir(tmp_path)
     study = read_study(path)
-    assert study.sampling.variations == (Interval("crank", "mm", 15.0, 25.0),)
+    assert study.sampling.variations == (UniformRange("crank", "mm", 15.0, 25.0),)
     assert len(study) == 3
     assert (study.motion.over, len(study.motion)) == ("one turn of crank at 3.14159 rad/s", 361)
     measures = "[measures.stride]\ntype = 'range'\nof = 'foot.x'"
