@@ -54,7 +54,7 @@ def read_table(where: str, name: Any, folder: Path | None) -> tuple[tuple[Any, A
         except csv.Error as error:
             raise MechanismError(f"{where}, line {k}: {error}") from None
         if len(cells) != 2:
-            raise MechanismError(f"{where}, line {k}: {len(cells)} columns; there must be two, x and u")
+            raise MechanismError(f"{where}, line {k}: {len(cells)} columns; there must be two")
         if place == 0 and not any(map(_DECIMAL.fullmatch, cells)):
             units = (_unit(cells[0]), _unit(cells[1]))
         else:

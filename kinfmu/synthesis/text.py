@@ -9,7 +9,8 @@ import numpy as np
 
 from kinfmu.display import aligned
 from kinfmu.synthesis.outcome import FitOutcome, TargetErrors, argument_unit
-from kinfmu.units import unit_of
+from kinfmu.synthesis.problem import FitProblem
+from kinfmu.units import Quantity, unit_of
 
 MOST_OPTIMA = 10
 _MOST_POINTS = 40  # of a target in the table
@@ -80,12 +81,24 @@ def parameter_rows(result: FitOutcome) -> list[tuple[str, ...]]:
     problem = result.problem
     settable = problem.mechanism.settable
     rows: list[tuple[str, ...]] = []
+    own = _own_quantities(problem)
     for name, value in result.parameters.items():
         setting = settable.constants.get(name) or problem.mechanism.parameters.get(name)
-        quantity = setting.quantity if setting is not None else None
+        quantity = setting.quantity if setting is not None else own.get(name)
         unit = "" if quantity is None or quantity.kind == "number" else unit_of(quantity, problem.mechanism.length_unit)
         low, high = problem.bounds[name]
         near = 1e-6 * (high - low)
         at = "at its lower bound" if value - low < near else "at its upper bound" if high - value < near else ""
         rows.append((name, f"{value:.12g}", unit, f"[{low:.6g}, {high:.6g}]", at))
     return rows
+
+
+def _own_quantities(problem: FitProblem) -> dict[str, Quantity]:
+    """Return the quantities of the starts and offsets of the targets, by the name of the unknown."""
+    is_angle = {str(name): name.is_angle for name in problem.mechanism.coordinate_names}
+    found = {}
+    for target in problem.sampled:
+        over, of = (Quantity("angle" if angle else "length") for angle in (is_angle.get(target.over), target.angles[0]))
+        found[f"{target.name}.start"] = over if target.over else problem.argument.quantity
+        found[f"{target.name}.offset"] = of
+    return found

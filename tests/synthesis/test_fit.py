@@ -21,6 +21,7 @@ from kinfmu.synthesis import (
     PathTarget,
     PoseTarget,
 )
+from kinfmu.synthesis.text import parameter_rows
 from tests.synthesis.fourbars import LENGTHS, four_bar
 
 POINTS = [(0.5, 2.3), (0.0, 2.3), (-0.4, 1.9), (-0.4, 1.5)]
@@ -114,6 +115,16 @@ def test_a_file_gives_what_python_gives(tmp_path: Path) -> None:
     assert all(f">{name}<" in page for name in (*BOUNDS, "curve"))
     assert page.count("<img ") == 1
     assert "curve: wanted" in str(expected._repr_svg_())
+
+
+def test_starts_and_offsets_are_listed_with_their_units() -> None:
+    points = [("0 deg", 0.0), ("30 deg", 0.1), ("60 deg", 0.2)]
+    angle = FunctionTarget(name="f", of="rocker.phi", points=points, start=(1, 2), offset=(1, 3))
+    length = FunctionTarget(name="g", of="coupler.y", points=points, over="rocker.phi", start=(1, 3), offset=(-1, 1))
+    rows = {row[0]: row[2] for row in parameter_rows(kinfmu.fit(_problem(targets=[angle, length]), starts=1))}
+    unit = four_bar().length_unit
+    units = {"f.start": "rad", "f.offset": "rad", "g.start": "rad", "g.offset": unit}
+    assert {name: rows[name] for name in units} == units
 
 
 def test_the_files_of_a_fit_are_never_replaced_by_its_result(tmp_path: Path) -> None:
