@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kinfmu.analysis.measuring import SAMPLES_PER_TURN
+from kinfmu.analysis.measuring import SAMPLES_PER_TURN, turns_of_cycle
 from kinfmu.analysis.singular import DriverRange
 from kinfmu.errors import KinfmuError
 from kinfmu.laws import ConstantSpeed, External
@@ -118,7 +118,7 @@ def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[s
     """Return the motion as `solve` takes it, over time where a law gives it, since laws of loads may need times."""
     if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
         return {}, ""
-    (driver,), turns = mechanism.drivers, ranges[0].turns
+    (driver,), turns = mechanism.drivers, turns_of_cycle(mechanism, ranges[0].turns)
     count = "one turn" if turns == 1 else f"{turns} turns"
     angle, speed_name, _ = driver.inputs()
     turned = np.linspace(0.0, turns * math.tau, turns * SAMPLES_PER_TURN + 1)

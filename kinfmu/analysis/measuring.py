@@ -12,7 +12,10 @@ import numpy as np
 from kinfmu.analysis.driver_path import follow
 from kinfmu.analysis.singular import DriverRange, driver_range
 from kinfmu.errors import KinfmuError
-from kinfmu.laws import ConstantSpeed
+from kinfmu.laws import ConstantSpeed, Spline
+from kinfmu.laws.law import NEARLY
+from kinfmu.laws.spline import PERIODIC
+from kinfmu.loads.following import Following
 from kinfmu.mechanism import Mechanism
 from kinfmu.motion import MeasuredValue, measure
 from kinfmu.plan import SolvePlan
@@ -22,6 +25,7 @@ from kinfmu.sweep import solve
 from kinfmu.units import unit_of
 
 SAMPLES_PER_TURN = 360
+_MOST_TURNS = 24  # of a table of a load
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,22 @@ def _motion(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[Run, s
     return run, over or f"the run of the file, {axis_of(run).range()}"
 
 
+def turns_of_cycle(mechanism: Mechanism, turns: int) -> int:
+    """Return the turns after which the loads repeat too, such as two for the gas force of a four-stroke engine.
+
+    turns: after which the pose repeats. Loads whose table repeats after no whole number of turns do not count.
+    """
+    for load in mechanism.loads:
+        if not (isinstance(load, Following) and load.over is not None and load.over.kind == "angle"):
+            continue
+        law = load.law
+        if isinstance(law, Spline) and law.ends == PERIODIC:
+            own = (float(law.points[-1][0]) - float(law.points[0][0])) / math.tau
+            if abs(own - round(own)) <= NEARLY and 1 <= round(own) <= _MOST_TURNS:
+                turns = math.lcm(turns, round(own))
+    return turns
+
+
 def driver_cycle(plan: SolvePlan) -> tuple[dict[str, Any], str]:
     """Return the driver values of one cycle of a single driver, as `solve` takes them, and what it is as text.
 
@@ -94,7 +114,7 @@ def driver_cycle(plan: SolvePlan) -> tuple[dict[str, Any], str]:
 def _cycle(mechanism: Mechanism, ranges: Sequence[DriverRange]) -> tuple[dict[str, Any], str]:
     if len(mechanism.drivers) != 1 or not ranges or ranges[0].turns is None:
         return {}, ""
-    (driver,), turns = mechanism.drivers, ranges[0].turns
+    (driver,), turns = mechanism.drivers, turns_of_cycle(mechanism, ranges[0].turns)
     speed = driver.law.speed if isinstance(driver.law, ConstantSpeed) else 0.0
     angle, speed_name, _ = driver.inputs()
     start = float(driver.law.at(mechanism.run.start))

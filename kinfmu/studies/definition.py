@@ -27,7 +27,8 @@ from kinfmu.run import FloatArray
 from kinfmu.studies.sampling import METHODS, Sampling
 from kinfmu.studies.variation import Grid, read_variation, whole_number
 from kinfmu.sweep import Model, compile, run_times  # noqa: A004  as re.compile
-from kinfmu.sweep.model import WORTH_COMPILING, require_engine
+from kinfmu.sweep.engine import require_engine
+from kinfmu.sweep.model import WORTH_COMPILING
 
 SAMPLES = 1000  # of sampled parameters, by default
 SEED = 0

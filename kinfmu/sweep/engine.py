@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
-from kinfmu.errors import KinfmuError
+import numpy as np
+
+from kinfmu.errors import KinfmuError, RequestError, listed, suggestion
 from kinfmu.run import FloatArray, IntArray
+
+ENGINES = ("auto", "python", "native")
 
 Driven = tuple[FloatArray, FloatArray, FloatArray]  # (n, d) values, speeds and accelerations of the drivers
 Tables = tuple[FloatArray, FloatArray, FloatArray]  # (n, m) values, rates and accelerations of the outputs
@@ -45,3 +49,27 @@ class Engine(Protocol):
 
     def sweep(self, driven: Driven, tables: Tables) -> SweepResult:
         """Fill the tables, with NaN for samples that cannot be reached, and return the diagnostics."""
+
+
+def require_engine(engine: str) -> None:
+    """Raise a RequestError for the name of an unknown engine."""
+    if engine not in ENGINES:
+        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
+
+
+def tables_for(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:
+    """Return the tables that are given, checked, or new ones."""
+    if out is None:
+        rows, columns = shape
+        whole = np.empty((3, *shape)) if order == "C" else np.empty((3, columns, rows)).transpose(0, 2, 1)
+        return tuple(whole)  # type: ignore[return-value]  # three; the system provides one large array faster
+    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
+        _refuse_table(name, array, shape)
+    return out
+
+
+def _refuse_table(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape or array.dtype != np.float64:
+        raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
+    if not array.flags.writeable:
+        raise RequestError(f"out: {name} is read-only")

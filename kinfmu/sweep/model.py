@@ -5,13 +5,13 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kinfmu.codegen.python import load_model, load_module
-from kinfmu.errors import CompilerError, RequestError, listed, suggestion
+from kinfmu.errors import CompilerError, RequestError, listed
 from kinfmu.mechanism import Mechanism
 from kinfmu.mechanism.mechanism import require_mechanism
 from kinfmu.mechanism.settings import read_tolerance
@@ -19,7 +19,7 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names
 from kinfmu.plan.reactions import reaction_names
 from kinfmu.processes import require_workers
-from kinfmu.run import Event, FloatArray, Run
+from kinfmu.run import Event, Run
 from kinfmu.run.axis import TIME, axis_for
 from kinfmu.solver.python import Solver, UnsolvableModel, with_parameters
 from kinfmu.solver.python.pose import Vector
@@ -28,12 +28,11 @@ from kinfmu.sweep.arguments import Arguments, Setting, Settings
 from kinfmu.sweep.continued import anew as anew_note
 from kinfmu.sweep.designs import Batch, Designs, Driving, solve_batch
 from kinfmu.sweep.driving import column_of, driven_by_inputs, run_times, without_huge_rates
-from kinfmu.sweep.engine import Engine, Tables, UnreachedError
+from kinfmu.sweep.engine import Engine, Tables, UnreachedError, require_engine, tables_for
 from kinfmu.sweep.forces import ForceModel, LoadedRun, applied_efforts, force_plan
 from kinfmu.sweep.python_engine import PythonEngine
 from kinfmu.sweep.sensitivities import Sensitivities, SensitivityModel, plan_of_unknowns
 
-ENGINES = ("auto", "python", "native")
 WORTH_COMPILING = 300_000  # samples times blocks: Python needs a second or more for them
 _SOLVERS_KEPT = 8  # of the last parameters
 
@@ -172,7 +171,7 @@ class Model:
             engine = self._engine(count, setting, tolerance, by_law=driven is None)
             if driven is None:
                 driven = without_huge_rates(engine.drive(times, setting.constants))
-            tables = _tables(out, (count, len(self.outputs)), engine.order)
+            tables = tables_for(out, (count, len(self.outputs)), engine.order)
             result = engine.sweep(driven, tables)
         except UnreachedError as reason:
             if not anew:
@@ -394,32 +393,9 @@ class Model:
         return run.replaced(events=(note, *run.events)) if note else run
 
 
-def require_engine(engine: str) -> None:
-    """Raise a RequestError for the name of an unknown engine."""
-    if engine not in ENGINES:
-        raise RequestError(f"engine '{engine}' is not known{suggestion(engine, ENGINES)}; engines: {listed(ENGINES)}")
-
-
 def _from_text(text: str, outputs: Sequence[str], parameters: Sequence[str], engine: str) -> Model:
     """Return the model of a mechanism file's text: how models arrive in other processes."""
     from kinfmu.mechanism import toml_file
 
     mechanism = toml_file.parse(text, "the model's mechanism")
     return Model(compile_plan(mechanism, outputs, parameters), engine)
-
-
-def _tables(out: Tables | None, shape: tuple[int, int], order: Literal["C", "F"]) -> Tables:
-    if out is None:
-        rows, columns = shape
-        whole = np.empty((3, *shape)) if order == "C" else np.empty((3, columns, rows)).transpose(0, 2, 1)
-        return tuple(whole)  # type: ignore[return-value]  # three; the system provides one large array faster
-    for name, array in zip(("values", "rates", "accelerations"), out, strict=True):
-        _refuse_table(name, array, shape)
-    return out
-
-
-def _refuse_table(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
-    if array.shape != shape or array.dtype != np.float64:
-        raise RequestError(f"out: {name} must be float64 of shape {shape}, not {array.dtype} of {array.shape}")
-    if not array.flags.writeable:
-        raise RequestError(f"out: {name} is read-only")

@@ -14,8 +14,8 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.run import Run
 from kinfmu.solver.python.solver import TOLERANCE
 from kinfmu.sweep.arguments import Settings
-from kinfmu.sweep.engine import Tables
-from kinfmu.sweep.model import Model, require_engine
+from kinfmu.sweep.engine import Tables, require_engine
+from kinfmu.sweep.model import Model
 
 MODELS_KEPT = 16
 

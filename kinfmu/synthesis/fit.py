@@ -10,7 +10,7 @@ import numpy as np
 
 from kinfmu.errors import AssemblyError, RequestError
 from kinfmu.run import FloatArray
-from kinfmu.sweep.model import require_engine
+from kinfmu.sweep.engine import require_engine
 from kinfmu.synthesis.fit_file import read_problem
 from kinfmu.synthesis.outcome import Optimum
 from kinfmu.synthesis.problem import FitProblem

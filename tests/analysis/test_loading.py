@@ -106,3 +106,9 @@ def test_a_load_moves_the_peak() -> None:
     assert report.loading.efforts[0].value == pytest.approx(3.0, rel=1e-12)
     assert report.loading.efforts[0].rms == pytest.approx(3.0, rel=1e-12)
     assert report.loading.inertias == ()
+
+
+def test_the_cycle_of_a_four_stroke_engine_is_two_turns() -> None:
+    found = kinfmu.check(kinfmu.load("engine")).loading
+    assert found is not None
+    assert found.over.startswith("2 turns of crank")
