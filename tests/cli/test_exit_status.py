@@ -92,6 +92,10 @@ WRONG_USAGE = [
     ("recover damaged.mcap -o run.csv", "run.csv: its name must end in .mcap"),
     ("simulate fourbar --channels qddd", "did you mean 'qdd'?"),
     ("simulate fourbar --rate 0", "0.0 is not in the range"),
+    ("study none.toml", "none.toml: there is no such file"),
+    ("study short.csv", "short.csv"),
+    ("fit none.toml", "none.toml: there is no such file"),
+    ("fit short.csv", "short.csv"),
     ("bench speed", "'speed' is not a measurement"),
     ("bench --mechanism forbar", "did you mean 'fourbar'?"),
 ]
@@ -112,6 +116,8 @@ AT_FAULT = [
     ("review damaged.mcap --save run.rrd", "damaged.mcap"),
     ("export damaged.mcap -o run.csv", "damaged.mcap"),
     ("recover damaged.mcap", "nothing can be recovered"),
+    ("study broken.toml", "broken.toml: "),
+    ("fit broken.toml", "broken.toml: "),
 ]
 
 

@@ -36,7 +36,7 @@ def faults(mechanism: Mechanism) -> Iterator[str]:
     versions: tuple[FmiVersion, ...] = ("2.0", "3.0")
     for version in versions:
         variables = interface(plan, "time", has_time=version == "3.0")
-        yield from _archive_faults(_contents(plan, variables, "0", version, "{}"), mechanism)
+        yield from _archive_faults(_contents(plan, variables, "0", version, "{}", None), mechanism)
 
 
 def _archive_faults(contents: dict[str, bytes], mechanism: Mechanism) -> Iterator[str]:

@@ -414,8 +414,8 @@ def test_laws_of_cams_and_couplings_have_units_of_output_over_input() -> None:
         ),
         (
             'type = "cam_roller"\nbetween = ["cam.O", "follower.R"]\nlaw = "external"',
-            "[joints.c] law = 'external' is not known; known: constant_speed, polynomial, harmonic, simple_harmonic, "
-            "cycloidal, modified_sine, modified_trapezoid, 3-4-5, 4-5-6-7, spline, sequence",
+            "[joints.c] law = 'external' is not known; known: constant_speed, constant, polynomial, harmonic, "
+            "simple_harmonic, cycloidal, modified_sine, modified_trapezoid, 3-4-5, 4-5-6-7, spline, sequence",
         ),
         (
             'type = "cam_oscillating"\nbetween = ["ground", "follower"]\ncam = "cam"\nlaw = "3-4-5"\n'

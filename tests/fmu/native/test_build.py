@@ -50,7 +50,7 @@ def test_contents_do_not_depend_on_the_hash_seed() -> None:
     code = (
         "import hashlib, kinfmu; from kinfmu.fmu.native.archive import _contents; from kinfmu.plan import compile_plan;"
         "from kinfmu.fmu.variables import interface; plan = compile_plan(kinfmu.load('double_pendulum'));"
-        "files = _contents(plan, interface(plan), '1', '2.0', '{x}');"
+        "files = _contents(plan, interface(plan), '1', '2.0', '{x}', None);"
         "print(hashlib.sha256(repr(files).encode()).hexdigest())"
     )
     runs = [
