@@ -214,8 +214,9 @@ def _compare(
             for j, (other, _) in enumerate(drivers[k:], start=k):
                 column = f"{name}.reduced_inertia" + ("" if j == k else f".{other}")
                 matrix[k, j] = matrix[j, k] = run[column][sample]
-        diagonal = np.sqrt(np.diag(exact.inertias))
+        diagonal = np.sqrt([np.abs(run[f"{name}.reduced_inertia"][which]).max() for name, _ in drivers])
         scale = np.outer(diagonal, diagonal)
+        scale[scale < WRONG**2 * size * size] = 0.0  # a driver that moves no mass
         error = judged("reduced inertia", matrix, lambda b: b.inertias, np.where(scale > 0, scale, 1))
         result.inertias = max(result.inertias, error)
     _reactions(result, run, which, sample, statics, exact, judged, ours)
@@ -279,11 +280,14 @@ def _stretch(
         run = model.solve(**inputs)
         if (run.status != 0).any() or run.margin.min() < 0.5 * MARGIN:
             return False
-        power = sum(run[f"{driver.name}.power"] for driver in model.plan.drivers) + _lost(mechanism, run)
+        driving, lost = sum(run[f"{driver.name}.power"] for driver in model.plan.drivers), _lost(mechanism, run)
+        power = driving + lost
         work = half * float(weights @ power[1:-1])
         energies = [run[name] for name in ("kinetic_energy", "potential_energy") if name in run.force_names]
         change = sum(float(energy[-1] - energy[0]) for energy in energies)
-        exchanged = half * float(weights @ np.abs(power[1:-1])) + sum(float(np.ptp(energy)) for energy in energies)
+        exchanged = half * float(weights @ (np.abs(driving) + np.abs(lost))[1:-1]) + sum(
+            float(np.ptp(energy)) for energy in energies
+        )
         if energies[1:]:
             exchanged += float(energies[0].max())  # a balanced mechanism at constant speed exchanges none
         rounding = 8 * EPS * sum(float(np.abs(energy).max()) for energy in energies)
