@@ -16,7 +16,7 @@ from tests.studies.linkage import write
 
 KILLED = """
 mechanism = "hoeken.toml"
-designs = 3000
+designs = 6000
 seed = 3
 parameters.crank = { from = "15 mm", to = "25 mm" }
 parameters.base = { tolerance = "0.3 mm" }
@@ -50,7 +50,7 @@ def test_a_study_that_is_killed_at_ten_random_moments_has_the_same_rows(tmp_path
     for kill in range(KILLS):
         process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         if kill % 2:  # while it starts, or soon after
-            time.sleep(moments.uniform(0.0, 3.0))
+            time.sleep(moments.uniform(0.0, 1.5))
         else:  # while it measures
             before = written(tmp_path)
             while written(tmp_path) <= before:
