@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinfmu.plan import SolvePlan
-from kinfmu.plan.mechanics import coefficient_symbol
+from kinfmu.plan.steps import derivative_name
 from kinfmu.plan.trace import parameter_symbol
 
 ARGUMENTS = ("time", "u", "ud", "udd", "z", "zd", "zdd", "slopes", "efforts", "parameters")
@@ -24,7 +24,7 @@ def places_of_symbols(plan: SolvePlan) -> dict[str, str]:
     for place, name in enumerate(plan.unknowns):
         places |= {name.derivative(order): f"{z}[{place}]" for order, z in enumerate(("z", "zd", "zdd"))}
         for k in range(len(plan.drivers)):
-            places[coefficient_symbol(name, k)] = f"slopes[{k * count + place}]"
+            places[derivative_name(name, k)] = f"slopes[{k * count + place}]"
     for k, driver in enumerate(plan.drivers):
         places |= {name: f"{u}[{k}]" for name, u in zip(driver.inputs, ("u", "ud", "udd"), strict=True)}
     places |= {name: f"efforts[{k}]" for k, name in enumerate(load_inputs(plan))}

@@ -21,8 +21,7 @@ from kinfmu.dynamics.efforts import Efforts, State
 from kinfmu.errors import RequestError, listed
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import effort_noun, force_names, force_steps
-from kinfmu.plan.mechanics import coefficient_symbol
-from kinfmu.plan.steps import law_symbol
+from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.run import FloatArray
 from kinfmu.solver.python import Pose, Solver
 from kinfmu.solver.python.pose import Vector
@@ -73,7 +72,7 @@ class EquationOfMotion:
         self._reduced = [(k, j, order.index(name)) for (k, j), name in zip(pairs, reduced, strict=True)]
         self._stage = stage.of_sample
         given = [name.derivative(n) for n in range(3) for name in plan.outputs]
-        given += [coefficient_symbol(name, k) for k in range(d) for name in plan.outputs]
+        given += [derivative_name(name, k) for k in range(d) for name in plan.outputs]
         given += [driver.inputs[n] for n in range(3) for driver in plan.drivers]
         given += [*list(efforts.by_name)[d:], "time", *(law_symbol(constant.name) for constant in plan.law_constants)]
         self._constants: Vector = tuple(constant.value for constant in plan.law_constants)

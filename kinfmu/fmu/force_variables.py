@@ -10,9 +10,8 @@ from kinfmu.fmu.interface import Variable
 from kinfmu.mechanism import Mechanism
 from kinfmu.plan import SolvePlan
 from kinfmu.plan.forces import ForceSteps, force_names
-from kinfmu.plan.mechanics import coefficient_symbol
 from kinfmu.plan.reactions import reaction_names_of
-from kinfmu.plan.steps import Assignment
+from kinfmu.plan.steps import Assignment, derivative_name
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.units import ForceName, InputName, Quantity, unit_of
 
@@ -142,7 +141,7 @@ def _behind_symbols(plan: SolvePlan, steps: ForceSteps) -> dict[str, frozenset[s
             moved: Iterable[str] = (one for k in drivers for one in plan.drivers[k].inputs[: order + 1])
             behind[name.derivative(order)] = frozenset(moved) | parameters
         for k in range(len(plan.drivers)):
-            behind[coefficient_symbol(name, k)] = behind[name]
+            behind[derivative_name(name, k)] = behind[name]
     for step in steps.steps:
         if isinstance(step, Assignment):
             behind[step.name] = _of_node(step.node, behind)

@@ -36,7 +36,7 @@ class ForceSteps:
 
     Symbols that no step gives are unknowns with their rates and accelerations, driver values, speeds and accelerations,
     parameters and `time`, under their contract names; with given coefficients also these, under the names of
-    `coefficient_symbol`.
+    `derivative_name`.
 
     Attributes:
         steps: Assignments and linear solves.

@@ -15,7 +15,7 @@ from kinfmu.mechanism.body import GROUND_NAME, Body
 from kinfmu.plan.block import TimeDerivatives
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
-from kinfmu.plan.steps import Tracing
+from kinfmu.plan.steps import Tracing, derivative_name
 from kinfmu.plan.trace import Tracer
 from kinfmu.units import METRES
 
@@ -64,7 +64,7 @@ class Mechanics(Tracing):
             if given_coefficients:
                 for name in block.unknowns:
                     for number, change in enumerate(self.changes):
-                        change[graph.symbol(name)] = graph.symbol(coefficient_symbol(name, number))
+                        change[graph.symbol(name)] = graph.symbol(derivative_name(name, number))
                 self.assigned(block)
             else:
                 self.positions(block)
@@ -121,8 +121,3 @@ class Mechanics(Tracing):
         over = load.argument(at)
         argument = self.graph.symbol(inputs[0] if inputs else "time") if over is None else over
         return [self.graph.lift(one) for one in load.efforts(at, measured, self.rates.of(measured), argument)]
-
-
-def coefficient_symbol(coordinate: str, driver: int) -> str:
-    """Return the name of the symbol of a coordinate's derivative with respect to a driver, by its number."""
-    return f"{coordinate}.by{driver}"

@@ -127,8 +127,8 @@ class Tracing:
             if not node.args:  # a constant or a symbol
                 changes[symbol] = node
             else:
-                self.steps.append(Assignment(_derivative_name(name, number), node))
-                changes[symbol] = self.graph.symbol(_derivative_name(name, number))
+                self.steps.append(Assignment(derivative_name(name, number), node))
+                changes[symbol] = self.graph.symbol(derivative_name(name, number))
 
     def solve(self, jacobian: tuple[tuple[Node, ...], ...], rows: Sequence[Node], unknowns: Sequence[str]) -> None:
         """Add the solution of J x = -b, with b the derivatives of rows; x are the derivatives of unknowns."""
@@ -139,7 +139,7 @@ class Tracing:
         ]
         if not numbered or not unknowns:
             return
-        names = [tuple(_derivative_name(name, number) for name in unknowns) for number, _ in numbered]
+        names = [tuple(derivative_name(name, number) for name in unknowns) for number, _ in numbered]
         solved = self.solutions(jacobian, [column for _, column in numbered], names)
         for (number, _), nodes in zip(numbered, solved, strict=True):
             for name, node in zip(unknowns, nodes, strict=True):
@@ -176,8 +176,8 @@ def law_symbol(name: str) -> str:
     return f"{name}.law"
 
 
-def _derivative_name(name: str, number: int) -> str:
-    """Return the name of a symbol's derivative with respect to a parameter, by its number."""
+def derivative_name(name: str, number: int) -> str:
+    """Return the name of a symbol's derivative in a direction, a parameter or a driver, by its number."""
     return f"{name}.by{number}"
 
 

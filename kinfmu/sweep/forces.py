@@ -14,10 +14,9 @@ from kinfmu.codegen.python.stage import CompiledStage, load_stage
 from kinfmu.errors import RequestError
 from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
-from kinfmu.plan.mechanics import coefficient_symbol
 from kinfmu.plan.origin import localized
 from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
-from kinfmu.plan.steps import law_symbol
+from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
 from kinfmu.solver.python.status import Status
@@ -145,7 +144,7 @@ class ForceModel:
         for number in range(len(plan.drivers)):
             speeds: dict[str, Any] = {driver.inputs[1]: float(k == number) for k, driver in enumerate(plan.drivers)}
             rates = self.poses.solve(parameters=run.setting.given, **values, **speeds).rates.T
-            found |= {coefficient_symbol(name, number): rate for name, rate in zip(plan.outputs, rates, strict=True)}
+            found |= {derivative_name(name, number): rate for name, rate in zip(plan.outputs, rates, strict=True)}
         return found
 
     def _evaluated(self, stage: CompiledStage, given: Mapping[str, Any], n: int) -> FloatArray:
