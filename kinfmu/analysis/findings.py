@@ -107,8 +107,9 @@ class Findings:
         (coordinates), suggestions (name, and the keys of the driver's table).
         measures: over (the motion, as text), values: name, type, value, unit, driver, at (driver values), at_unit,
         reason (why the value is null), refused: reason by name; null without measures.
-        forces, only with masses or loads: over (the motion, as text), efforts and largest_reaction (of a joint; null if
-        none is determined): name, value (the peak with its sign), unit, driver, at (driver value), at_unit, rms;
+        forces, only with masses or loads: over (the motion, as text), efforts, largest_reaction (of a joint; null if
+        none is determined) and shaking (force and moment): name, value (the peak with its sign), unit, driver, at
+        (driver value), at_unit, rms;
         reduced_inertias: name, smallest, largest, unit; undetermined: reactions, and rows that share their load;
         reason (why there are no numbers), samples_without_numbers.
         notes: text; problem: text or null. `kinfmu check --json` adds matrices and assemblies with their options.

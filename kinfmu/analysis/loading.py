@@ -58,14 +58,15 @@ class Loading:
     """Forces over a motion.
 
     over: the motion, as text; efforts: of each driver; inertias: reduced; reaction: the joint that transmits the
-    largest determined force; undetermined: reactions that share a load, with the rows that share it; reason: why there
-    are no numbers, '' if there are; missing: samples without numbers.
+    largest determined force; shaking: force and moment on the ground; undetermined: reactions that share a load, with
+    the rows that share it; reason: why there are no numbers, '' if there are; missing: samples without numbers.
     """
 
     over: str
     efforts: tuple[Peak, ...] = ()
     inertias: tuple[Span, ...] = ()
     reaction: Peak | None = None
+    shaking: tuple[Peak, ...] = ()
     undetermined: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     reason: str = ""
     missing: int = 0
@@ -77,6 +78,7 @@ class Loading:
             "efforts": [asdict(effort) for effort in self.efforts],
             "reduced_inertias": [asdict(inertia) for inertia in self.inertias],
             "largest_reaction": None if self.reaction is None else asdict(self.reaction),
+            "shaking": [asdict(peak) for peak in self.shaking],
             "undetermined": [{"reactions": list(names), "rows": list(rows)} for names, rows in self.undetermined],
             "reason": self.reason or None,
             "samples_without_numbers": self.missing,
@@ -109,7 +111,8 @@ def loading(plan: SolvePlan, ranges: Sequence[DriverRange]) -> Loading | None:
         if missing == len(run):
             return Loading(over, undetermined=shared, reason="no sample has numbers", missing=missing)
         efforts = tuple(_peak(run, name, run[name]) for name in _efforts(mechanism))
-        return Loading(over, efforts, tuple(_inertias(run)), _largest_reaction(run), shared, missing=missing)
+        inertias, shaking = tuple(_inertias(run)), tuple(_shaking(run))
+        return Loading(over, efforts, inertias, _largest_reaction(run), shaking, shared, missing=missing)
     except KinfmuError as reason:
         return Loading("no motion", undetermined=shared, reason=str(reason))
 
@@ -149,10 +152,16 @@ def _largest_reaction(run: Run) -> Peak | None:
     """Return the largest force that a joint transmits; None if there is none that is determined."""
     found: dict[str, list[FloatArray]] = {}
     for name in run.reaction_names:
-        if name.quantity.kind == "force":
+        if name.owner and name.quantity.kind == "force":
             found.setdefault(name.owner, []).append(run[name])
     peaks = [_peak(run, joint, np.hypot.reduce(parts)) for joint, parts in found.items()]
     return max((peak for peak in peaks if np.isfinite(peak.value)), key=lambda peak: peak.value, default=None)
+
+
+def _shaking(run: Run) -> Iterator[Peak]:
+    """Yield the largest shaking force and moment."""
+    yield _peak(run, "shaking_force", np.hypot(run["shaking_force_x"], run["shaking_force_y"]))
+    yield _peak(run, "shaking_moment", run["shaking_moment"])
 
 
 def _peak(run: Run, name: str, values: FloatArray) -> Peak:

@@ -250,6 +250,8 @@ def _forces(report: Findings) -> Iterator[ReportLine]:
         yield ReportLine("", f"{inertia.name}: {ends}")
     if loading.reaction is not None:
         yield ReportLine("", f"largest reaction: {loading.reaction.name} {_peak_text(loading.reaction)}")
+    for peak in loading.shaking:
+        yield ReportLine("", f"{peak.name}: peak {_peak_text(peak)}")
     redundant = {row.row.name: row.row.owner for row in report.redundant}
     for names, rows in loading.undetermined:
         others = [row for row in rows if row in redundant]

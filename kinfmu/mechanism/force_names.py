@@ -57,10 +57,20 @@ def effort_noun(kind: str) -> str:
 
 
 def reaction_names_of(mechanism: HasForces) -> tuple[ForceName, ...]:
-    """Return the names of all reactions of a mechanism, one for each row of a joint; none without masses and loads."""
+    """Return the names of all reactions of a mechanism: of each row of a joint, then shaking force and moment.
+
+    There are none without masses and loads.
+    """
+    of_ground = shaking_names(mechanism)
+    return (*(name for joint in mechanism.joints for name in names_of_rows(joint)), *of_ground) if of_ground else ()
+
+
+def shaking_names(mechanism: HasForces) -> tuple[ForceName, ...]:
+    """Return the names of what the mechanism exerts on the ground; none without masses and loads."""
     if not (mechanism.loads or any(body.has_mass for body in mechanism.bodies)):
         return ()
-    return tuple(name for joint in mechanism.joints for name in names_of_rows(joint))
+    components = (ForceName("", f"shaking_force_{axis}", Quantity("force")) for axis in ("x", "y"))
+    return (*components, ForceName("", "shaking_moment", Quantity("torque")))
 
 
 def names_of_rows(joint: Joint) -> list[ForceName]:
@@ -76,12 +86,12 @@ def names_of_rows(joint: Joint) -> list[ForceName]:
 def measured_forces(mechanism: HasForces) -> dict[str, tuple[ForceName, ...]]:
     """Return the forces that measures read, by name, with the columns they are made of.
 
-    The size of a pin's force, 'pin.force', is made of 'pin.force_x' and 'pin.force_y'.
+    The size of a pin's force, 'pin.force', is made of 'pin.force_x' and 'pin.force_y', and so is 'shaking_force'.
     """
     names = [*force_names(mechanism), *reaction_names_of(mechanism)]
     found: dict[str, tuple[ForceName, ...]] = {str(name): (name,) for name in names}
     for name in names:
-        other = f"{name.owner}.force_y"
-        if name.noun == "force_x" and other in found:
-            found[f"{name.owner}.force"] = (name, *found[other])
+        size = name.removesuffix("_x")
+        if name.noun in ("force_x", "shaking_force_x") and f"{size}_y" in found:
+            found[size] = (name, *found[f"{size}_y"])
     return found

@@ -5,7 +5,7 @@ All is in SI units, whatever the mechanism's unit of length is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from kinfmu.equations.graph import Node
@@ -121,3 +121,27 @@ class Mechanics(Tracing):
         over = load.argument(at)
         argument = self.graph.symbol(inputs[0] if inputs else "time") if over is None else over
         return [self.graph.lift(one) for one in load.efforts(at, measured, self.rates.of(measured), argument)]
+
+    def unbalanced(self, loads: Sequence[Load]) -> dict[str, Node]:
+        """Return what the motion needs besides gravity and some loads, by coordinate [J per unit of the coordinate].
+
+        M qdd - Q        Q: generalized forces of gravity and the loads
+        """
+        graph, metre = self.graph, self.metre
+        found: dict[str, Node] = {}
+        for center in self.centers():
+            mass, inertia = graph.lift(center.body.mass), graph.lift(center.body.inertia)
+            f_x, f_y = (mass * acceleration for acceleration in center.acceleration)
+            name = center.body.name
+            found[f"{name}.x"], found[f"{name}.y"] = f_x * metre, f_y * metre
+            found[f"{name}.phi"] = f_y * center.arm[0] - f_x * center.arm[1] + inertia * center.alpha
+        one = graph.constant(1.0)
+        for load in loads:
+            efforts = self.efforts(load)
+            for body in load.acts_on():
+                for axis in () if body == GROUND_NAME else ("x", "y", "phi"):
+                    name = f"{body}.{axis}"
+                    slopes = graph.derivative(self.measured(load, free=name), {graph.symbol(name): one})
+                    for effort, slope in zip(efforts, slopes, strict=True):
+                        found[name] = found[name] - effort * slope
+        return found

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from kinfmu.equations.graph import Node
 from kinfmu.equations.system import System
-from kinfmu.mechanism.body import GROUND_NAME
 from kinfmu.mechanism.force_names import names_of_rows, reaction_names_of
 from kinfmu.plan.block import Block
 from kinfmu.plan.forces import ForceSteps
 from kinfmu.plan.mechanics import Mechanics
 from kinfmu.plan.origin import localized
 from kinfmu.plan.plan import SolvePlan
+from kinfmu.plan.shaking import shaking_nodes
 from kinfmu.plan.steps import Assignment, needed_steps
 from kinfmu.plan.structure import RowTracer
 from kinfmu.units import CoordinateName, ForceName
@@ -54,7 +54,7 @@ def row_names(plan: SolvePlan) -> list[str]:
 
 
 def reaction_steps(plan: SolvePlan) -> ForceSteps:
-    """Return the steps to the reactions of all joints, in the order of `reaction_names`.
+    """Return the steps to the reactions of all joints and on the ground, in the order of `reaction_names`.
 
     Where redundant rows share a load, the steps give one of the possible distributions.
 
@@ -70,6 +70,7 @@ def reaction_steps(plan: SolvePlan) -> ForceSteps:
         for kind, scale in zip(joint.kinds(), joint.scales(), strict=True):
             effort = -(multipliers.get(len(results), zero) * scale)
             results.append(effort / mechanics.metre if kind == "length" else effort)
+    results += shaking_nodes(plan, mechanics)
     return ForceSteps(needed_steps(results, mechanics.steps), reaction_names(plan), results)
 
 
@@ -88,7 +89,7 @@ class _Multipliers:
         self._system = System(localized(plan.mechanism)[0])
         self._row = RowTracer(self._system, mechanics.tracer)
         self._index = {row.name: index for index, row in enumerate(self._system.rows)}
-        self._open = _open_forces(mechanics)
+        self._open = mechanics.unbalanced(mechanics.members.loads)
         mechanics.steps += [Assignment(name, node) for name, node in mechanics.known.items()]
         for block in reversed(plan.blocks):
             self._block(block)
@@ -149,25 +150,3 @@ class _Multipliers:
         known = {other: node for other, node in self._mechanics.known.items() if other != name}
         row = self._row(index, known)
         return self._graph.derivative([row], {self._graph.symbol(name): self._graph.constant(1.0)})[0]
-
-
-def _open_forces(mechanics: Mechanics) -> dict[str, Node]:
-    """Return what the rows have to balance, M qdd - Q, by coordinate [J per unit of the coordinate]."""
-    graph, metre = mechanics.graph, mechanics.metre
-    found: dict[str, Node] = {}
-    for center in mechanics.centers():
-        mass, inertia = graph.lift(center.body.mass), graph.lift(center.body.inertia)
-        f_x, f_y = (mass * acceleration for acceleration in center.acceleration)
-        name = center.body.name
-        found[f"{name}.x"], found[f"{name}.y"] = f_x * metre, f_y * metre
-        found[f"{name}.phi"] = f_y * center.arm[0] - f_x * center.arm[1] + inertia * center.alpha
-    one = graph.constant(1.0)
-    for load in mechanics.members.loads:
-        efforts = mechanics.efforts(load)
-        for body in load.acts_on():
-            for axis in () if body == GROUND_NAME else ("x", "y", "phi"):
-                name = f"{body}.{axis}"
-                slopes = graph.derivative(mechanics.measured(load, free=name), {graph.symbol(name): one})
-                for effort, slope in zip(efforts, slopes, strict=True):
-                    found[name] = found[name] - effort * slope
-    return found

@@ -16,6 +16,7 @@ from kinfmu.plan import SolvePlan, compile_plan
 from kinfmu.plan.forces import force_names, force_steps, loaded_coordinates
 from kinfmu.plan.origin import localized
 from kinfmu.plan.reactions import reaction_names, reaction_steps, undetermined_reactions
+from kinfmu.plan.shaking import shaking_steps
 from kinfmu.plan.steps import derivative_name, law_symbol
 from kinfmu.plan.trace import parameter_symbol
 from kinfmu.run import FloatArray, IntArray, Run
@@ -25,7 +26,7 @@ from kinfmu.sweep.designs import Solvable
 from kinfmu.sweep.driving import column_of
 from kinfmu.sweep.stages import native_stage, stage_results
 
-_STAGES = 3  # forces, the same with coefficients given, reactions
+_STAGES = 4  # forces, the same with coefficients given, reactions, those on the ground alone
 Given = dict[str, FloatArray | float]
 
 
@@ -89,12 +90,17 @@ class ForceModel:
     def reactions(self, run: LoadedRun) -> FloatArray:
         """Return the reactions at all samples, (n, reactions).
 
-        They are NaN where the run has no numbers, at samples that are interpolated across a singular point, where the
-        rows do not determine them, and for rows that share a load with redundant ones.
+        Those of joints are NaN where the run has no numbers, at samples that are interpolated across a singular point,
+        where the rows do not determine them, and for rows that share a load with redundant ones. Shaking force and
+        moment follow from the motion alone.
         """
         names = reaction_names(self.poses.plan)
-        reactions, _ = self._at_regular_samples(self._reaction_stage, run)
+        reactions, irregular = self._at_regular_samples(self._reaction_stage, run)
         reactions[:, [names.index(name) for name in undetermined_reactions(self.poses.plan)]] = np.nan
+        bridged = irregular[run.poses.status[irregular] == Status.BRIDGED]
+        if len(bridged):
+            shaking = self._evaluated(self._shaking_stage, self._given(run, bridged), len(bridged))
+            reactions[bridged, len(names) - shaking.shape[1] :] = shaking
         return reactions
 
     def _at_regular_samples(self, stage: CompiledStage, run: LoadedRun) -> tuple[FloatArray, IntArray]:
@@ -119,6 +125,10 @@ class ForceModel:
     @cached_property
     def _reaction_stage(self) -> CompiledStage:
         return load_stage(reaction_steps(self.poses.plan))
+
+    @cached_property
+    def _shaking_stage(self) -> CompiledStage:
+        return load_stage(shaking_steps(self.poses.plan))
 
     def _given(self, run: LoadedRun, samples: Any) -> Given:
         """Return the numbers of the symbols in a stage, at some samples."""

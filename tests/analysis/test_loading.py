@@ -50,10 +50,14 @@ def test_an_arm_that_turns_has_the_torque_of_its_weight() -> None:
     assert found.reaction.value == pytest.approx(20.0 + 2.0 * 0.3 * 16.0, rel=1e-12)
     assert found.reaction.at == pytest.approx(1.5 * math.pi, rel=1e-12)
     assert found.undetermined == ()
+    force, moment = found.shaking  # the arm is at the origin: its torque and bearing are all that the ground feels
+    assert (force.value, moment.value) == pytest.approx((29.6, -torque.value), rel=1e-12)
+    assert (force.unit, moment.unit) == ("N", "N m")
     text = str(report)
     assert "  forces      over one turn of arm at 4 rad/s\n" in text
     assert ", rms 4.24264 N m\n              arm.reduced_inertia: 0.68 to 0.68 kg m2\n" in text
-    assert "              largest reaction: O 29.6 N (arm at 270 deg)" in text
+    assert "              largest reaction: O 29.6 N (arm at 270 deg)\n" in text
+    assert "              shaking_force: peak 29.6 N (arm at 270 deg)\n" in text
 
 
 def test_json_has_the_same_numbers() -> None:
@@ -62,6 +66,7 @@ def test_json_has_the_same_numbers() -> None:
     assert found["over"] == "one turn of arm at 4 rad/s"
     assert abs(found["efforts"][0]["value"]) == pytest.approx(6.0, rel=1e-12)
     assert found["largest_reaction"]["value"] == pytest.approx(29.6, rel=1e-12)
+    assert [peak["name"] for peak in found["shaking"]] == ["shaking_force", "shaking_moment"]
     assert found["reduced_inertias"][0]["name"] == "arm.reduced_inertia"
     assert (found["undetermined"], found["reason"], found["samples_without_numbers"]) == ([], None, 0)
 

@@ -128,7 +128,7 @@ def toggle_press(t: float, at: Motion) -> FreeBodies:  # noqa: ARG001
     bodies.slide("guide", GROUND, "ram", s, mp.pi / 2)
     tool = s + Vector(0, -120)
     bodies.push("ram", tool, Vector(0, _of_a_turn(at["crank.phi"], 400e3, (0, 10, -400e3), (320, 40, 400e3))))
-    bodies.push("ram", tool, Vector(0, 3100 + 1.5 * ((top.y - tool.y.c[0]) - 650)))
+    bodies.push("ram", tool, Vector(0, 3100 + 1.5 * ((top.y - tool.y.c[0]) - 650)), GROUND)
     return bodies
 
 

@@ -33,7 +33,7 @@ class FreeBodies:
     def __init__(self, metre: float) -> None:
         self._metre = decimal(metre)
         self._bodies: dict[str, _Body] = {}
-        self._known: dict[str, list[Any]] = {}
+        self._known: dict[str, list[Any]] = {GROUND: [mp.mpf(0)] * 3}
         self._unknown: dict[str, dict[str, list[Any]]] = {}  # by column: force and moment on each body per unit
 
     def body(self, name: str, at: Vector, phi: Quantity, mass: float, center: Vector, inertia: float = 0) -> None:
@@ -56,10 +56,12 @@ class FreeBodies:
         inertia = decimal(mass) * (decimal(length) * self._metre) ** 2 / 12
         self.body(name, at, phi, mass, Vector(decimal(length) / 2, 0), inertia)
 
-    def push(self, body: str, at: Vector, force: Vector) -> None:
-        """Add a known force on a body at a point [N]."""
-        for k, amount in enumerate(self._on(body, at, (_now(force.x), _now(force.y)))):
-            self._known[body][k] += amount
+    def push(self, body: str, at: Vector, force: Vector, against: str = "") -> None:
+        """Add a known force on a body at a point [N], from outside or with its opposite on another body."""
+        for name, sign in ((body, 1), (against, -1)):
+            if name:
+                for k, amount in enumerate(self._on(name, at, (sign * _now(force.x), sign * _now(force.y)))):
+                    self._known[name][k] += amount
 
     def pin(self, name: str, first: str, second: str, at: Vector) -> None:
         """Add a pin: an unknown force of the first body on the second."""
@@ -73,7 +75,7 @@ class FreeBodies:
 
     def motor(self, name: str, body: str) -> None:
         """Add an unknown torque of the ground on a body."""
-        self._unknown[f"{name}.torque"] = {body: [0, 0, 1]}
+        self._unknown[f"{name}.torque"] = {body: [0, 0, 1], GROUND: [0, 0, -1]}
 
     def cylinder(self, name: str, first: str, second: str, a: Vector, b: Vector) -> None:
         """Add an unknown force that pushes two points apart."""
@@ -82,7 +84,10 @@ class FreeBodies:
         self._pair(f"{name}.force", first, second, b, (x / length, y / length))
 
     def solved(self) -> dict[str, Any]:
-        """Return the unknowns by column, in the order in which they were added; the kinetic energy last."""
+        """Return the unknowns by column, in the order in which they were added; kinetic energy and shaking force last.
+
+        The shaking force and moment are the sum of all that is exerted on the ground, about its origin.
+        """
         names = list(self._bodies)
         columns = list(self._unknown.values())
         matrix = mp.matrix(3 * len(names), len(columns))
@@ -93,7 +98,14 @@ class FreeBodies:
                 for j, column in enumerate(columns):
                     matrix[3 * i + k, j] = column.get(name, (0, 0, 0))[k]
         found = dict(zip(self._unknown, mp.lu_solve(matrix, right), strict=True))
-        return found | {"kinetic_energy": mp.fsum(body.energy for body in self._bodies.values())}
+        energy = {"kinetic_energy": mp.fsum(body.energy for body in self._bodies.values())}
+        exerted = [(force, self._unknown[name].get(GROUND, (0, 0, 0))) for name, force in found.items()]
+        shaking = ("shaking_force_x", "shaking_force_y", "shaking_moment")
+        on_ground = {
+            column: self._known[GROUND][k] + mp.fsum(force * per_unit[k] for force, per_unit in exerted)
+            for k, column in enumerate(shaking)
+        }
+        return found | energy | on_ground
 
     def _pair(self, column: str, first: str, second: str, at: Vector, force: tuple[Any, Any]) -> None:
         """Add an unknown force on the second body, and its opposite on the first, at one point or along one line."""
@@ -101,10 +113,8 @@ class FreeBodies:
         self._unknown[column] = {first: self._on(first, at, opposite), second: self._on(second, at, force)}
 
     def _on(self, body: str, at: Vector, force: tuple[Any, Any]) -> list[Any]:
-        """Return a force, and its moment about the centre of mass."""
-        if body == GROUND:
-            return [0, 0, 0]
-        x, y = self._bodies[body].center
+        """Return a force, and its moment about the centre of mass, of the ground about its origin."""
+        x, y = (0, 0) if body == GROUND else self._bodies[body].center
         moment = (_now(at.x) * self._metre - x) * force[1] - (_now(at.y) * self._metre - y) * force[0]
         return [*force, moment]
 

@@ -1,7 +1,8 @@
 """fmus/<name>/reference.csv: the reference of a mechanism in numbers, as scripts/references writes it.
 
     time, then q, qd, qdd of every output of the mechanism, 20 digits; about 20 samples of the mechanism's run
-    of a mechanism with masses then also efforts of the drivers, reactions of the joints and the kinetic energy
+    of a mechanism with masses then also efforts of the drivers, reactions of the joints, the kinetic energy, and
+    the shaking force and moment
 
 `python -m tests.gallery.reference_file [name ...]` writes those of the mechanisms named, or of all.
 """

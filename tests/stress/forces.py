@@ -233,8 +233,9 @@ def _reactions(
     efforts: Floats,
 ) -> None:
     assert run.reactions is not None
-    assert tuple(map(str, run.reaction_names)) == tuple(statics.names)
-    ours = run.reactions[sample]
+    of_joints = run.reactions[:, : len(statics.names)]
+    assert tuple(map(str, run.reaction_names))[: len(statics.names)] == tuple(statics.names)
+    ours = of_joints[sample]
     is_known = ~np.isnan(ours)
     result.shared += int((~is_known).sum())
     for name, known in zip(statics.names, is_known, strict=True):
@@ -244,7 +245,7 @@ def _reactions(
     largest = np.ones(len(ours))
     with np.errstate(invalid="ignore"):
         for kind in (is_moment, ~is_moment):
-            columns = np.abs(run.reactions[which][:, kind & is_known])
+            columns = np.abs(of_joints[which][:, kind & is_known])
             largest[kind] = columns.max(initial=0.0) or 1.0
     names = [name for name, known in zip(statics.names, is_known, strict=True) if known]
     result.reactions = max(

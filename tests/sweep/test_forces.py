@@ -14,6 +14,8 @@ import pytest
 import kinfmu
 from kinfmu import Mechanism, Run, gallery
 from kinfmu.joints import Distance, Fixed, PointOnLine, Revolute, Translational
+from kinfmu.mechanism import toml_file
+from kinfmu.readings import Peak
 from kinfmu.units import METRES
 from tests.gallery.references import REFERENCES
 from tests.power_series import Series, mp, sin_cos
@@ -184,7 +186,8 @@ def test_reactions_and_torques_balance_every_body(name: str) -> None:
             force[body] += sign * on_second
             moment[body] += sign * (arm[:, 0] * on_second[:, 1] - arm[:, 1] * on_second[:, 0] + besides)
     for driver in mechanism.drivers:
-        moment[driver.of] += run[f"{driver.name}.torque"]
+        for body, sign in ((driver.of, 1.0), ("ground", -1.0)):
+            moment[body] += sign * run[f"{driver.name}.torque"]
     largest = max(np.nanmax(np.abs(run.reactions)), 1e-300)
     for body in mechanism.moving_bodies:
         _, acceleration = center_rates(run, body, metre)
@@ -198,6 +201,9 @@ def test_reactions_and_torques_balance_every_body(name: str) -> None:
         np.testing.assert_allclose(
             moment[body.name][run.good], euler[run.good], rtol=0, atol=1e-10 * largest + 1e-10 * np.abs(euler).max()
         )
+    shaking = np.stack([run[f"shaking_{name}"] for name in ("force_x", "force_y", "moment")], axis=1)[run.good]
+    on_ground = np.column_stack([force["ground"], moment["ground"]])[run.good]
+    np.testing.assert_allclose(shaking, on_ground, rtol=0, atol=1e-10 * max(largest, np.abs(on_ground).max()))
 
 
 def test_a_run_with_forces_is_freed_when_it_is_no_longer_used() -> None:
@@ -213,3 +219,33 @@ def test_a_run_with_forces_is_freed_when_it_is_no_longer_used() -> None:
             assert gone() is None
     finally:
         gc.enable()
+
+
+def test_what_presses_from_outside_reaches_the_ground_and_what_is_held_by_it_does_not() -> None:
+    """An arm without mass far from the origin: a weight at its tip, a brake on the ground, a spring to the ground."""
+    text = """
+    name = "arm"
+    [bodies.ground]
+    points = { O = [2, 3], S = [2, 9] }
+    [bodies.arm]
+    points = { O = [0, 0], T = [0.5, 0] }
+    start = { x = 2, y = 3 }
+    [joints]
+    O = { type = "revolute", between = ["ground.O", "arm.O"] }
+    [drivers]
+    arm = { type = "angle", of = "arm", law = "constant_speed", start = "30 deg", speed = 2 }
+    [loads]
+    weight = { type = "force", at = "arm.T", y = "-20 N" }
+    brake = { type = "torque", on = "arm", law = "constant", level = "-7 N m" }
+    spring = { type = "spring", between = ["ground.S", "arm.T"], stiffness = 30, free_length = 1 }
+    """
+    run = kinfmu.solve(toml_file.parse(text, "arm"), np.linspace(0.0, 3.0, 9))
+    np.testing.assert_allclose(run["shaking_force_x"], 0.0, atol=1e-13)
+    np.testing.assert_allclose(run["shaking_force_y"], -20.0, rtol=1e-14)
+    np.testing.assert_allclose(run["shaking_moment"], -20.0 * (2.0 + 0.5 * np.cos(run["arm.phi"])), rtol=1e-13)
+    assert np.ptp(run["arm.torque"]) > 10.0
+    high = kinfmu.measure(run, [Peak("shaking", of="shaking_force"), Peak("tilting", of="shaking_moment")])
+    assert [(value.value, value.unit) for value in high.values()] == [
+        (pytest.approx(20.0), "N"),
+        (pytest.approx(50.0, rel=1e-2), "N m"),
+    ]

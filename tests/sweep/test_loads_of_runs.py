@@ -137,6 +137,26 @@ def test_torque_of_the_reference_fourbar_is_exact_through_its_change_points(engi
     )
 
 
+@pytest.mark.parametrize("count", [1, 90])  # one by one, and as arrays
+def test_shaking_force_of_the_reference_fourbar_is_known_where_its_reactions_are_not(count: int) -> None:
+    """Closed form from the momentum, through a change point and with the redundant bar."""
+    angles = np.radians(np.linspace(180.0, 90.0, count))[:7][::-1]
+    mechanism, speed, acceleration = heavy(), 1.3, -0.8
+    run = kinfmu.solve(mechanism, crank_angle=angles, crank_speed=speed, crank_acceleration=acceleration)
+    assert run.status[-1] == 2
+    assert np.isnan(run["AB.force"]).all()
+    turn = np.exp(1j * angles) * (1j * acceleration - speed**2)
+    moving = ("crank", "coupler", "rocker")
+    centers = {name: turn * complex(*CENTER) if name != "coupler" else turn * 1.0 for name in moving}
+    at = {name: run[f"{name}.x"] + 1j * run[f"{name}.y"] + np.exp(1j * run[f"{name}.phi"]) * complex(*CENTER)
+          for name in moving}  # fmt: skip
+    pushed = {name: MASS * (complex(0.4, -9.81) - one) for name, one in centers.items()}
+    force = sum(pushed.values())
+    moment = sum((at[name].conj() * pushed[name]).imag for name in moving) - 2 * TURNING * acceleration
+    np.testing.assert_allclose(run["shaking_force_x"] + 1j * run["shaking_force_y"], force, rtol=1e-11)
+    np.testing.assert_allclose(run["shaking_moment"], moment, rtol=0, atol=1e-11 * np.abs(moment).max())
+
+
 def test_reactions_that_share_a_load_with_the_redundant_bar_are_undetermined() -> None:
     run = kinfmu.solve(heavy(), crank_angle=np.radians([40.0, 75.0, 130.0]))
     determined = [name for name in run.reaction_names if not np.isnan(run[name]).any()]
