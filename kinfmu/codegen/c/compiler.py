@@ -30,6 +30,8 @@ SOLVER = (*MODEL, "solver.h", "internal.h", "pose.c", "hermite.c", "span.c", "tr
           "singularity_map.c", "survey.c", "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c",
           "continuation.c", "worst_case_step.c", "estimate.c")  # fmt: skip
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
+WASM = "wasm32-wasi"
+MODULE = ("-std=c99", "-ffp-contract=off", "-s", "-mexec-model=reactor", "-Wl,-z,stack-size=1048576")
 
 _ZIG = (sys.executable, "-m", "ziglang", "cc")
 
@@ -82,15 +84,23 @@ def shared_library_bytes(files: Mapping[str, str], flags: Sequence[str] = (), ta
         CompilerError: There is no compiler, or it fails.
 
     """
-    build = _Build(files, flags, target)
-    with suppress(CompilerError, OSError):
-        cached = library_cache.find(build.key, build.suffix)
-        if cached is not None:
-            return cached.read_bytes()
-    data = build.compile()
-    with suppress(CompilerError):
-        library_cache.store(build.key, build.suffix, data)
-    return data
+    return _Build(files, flags, target).found_or_compiled()
+
+
+def wasm_module(files: Mapping[str, str], exports: Sequence[str], flags: Sequence[str] = ()) -> bytes:
+    """Return a WebAssembly module of C files without imports, compiled by zig or taken from the cache.
+
+    Args:
+        files: Texts by file name.
+        exports: Names of the functions that the module exports.
+        flags: Flags of the compiler, after MODULE.
+
+    Raises:
+        CompilerError: Zig is not installed, or it fails.
+
+    """
+    exported = (f"-Wl,--export={name}" for name in exports)
+    return _Build(files, (*flags, *exported), WASM, MODULE).found_or_compiled()
 
 
 def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
@@ -125,14 +135,27 @@ def _shown(line: str) -> Iterator[None]:
 class _Build:
     """Files, compiler and flags of one compilation; key: identifies the result."""
 
-    def __init__(self, files: Mapping[str, str], flags: Sequence[str], target: str | None) -> None:
+    def __init__(
+        self, files: Mapping[str, str], flags: Sequence[str], target: str | None, common: Sequence[str] = FLAGS
+    ) -> None:
         self._files = files
         self._compiler = command() if target is None else zig(target)
-        self._flags = (*FLAGS, *flags)
+        self._flags = (*common, *flags)
         content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags]
         content += [part for name in sorted(files) for part in (name, files[name])]
         self.key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
         self.suffix = _suffix(target)
+
+    def found_or_compiled(self) -> bytes:
+        """Return the library in the cache, or compile it; also if the cache cannot be used."""
+        with suppress(CompilerError, OSError):
+            cached = library_cache.find(self.key, self.suffix)
+            if cached is not None:
+                return cached.read_bytes()
+        data = self.compile()
+        with suppress(CompilerError):
+            library_cache.store(self.key, self.suffix, data)
+        return data
 
     def compile(self) -> bytes:
         """Return the compiled library."""
@@ -231,6 +254,8 @@ def zig(target: str) -> tuple[str, ...]:
 def _suffix(target: str | None) -> str:
     """Return the suffix of shared libraries on a platform, as zig names it; default: this platform."""
     system = target or {"win32": "windows", "darwin": "macos"}.get(sys.platform, "")
+    if system == WASM:
+        return ".wasm"
     return ".dll" if "windows" in system else ".dylib" if "macos" in system else ".so"
 
 

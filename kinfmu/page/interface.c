@@ -1,0 +1,209 @@
+/* What a page calls: one mechanism with its parameters, the pose that is shown, and sweeps beside it.
+ *
+ * Numbers are exchanged in arrays, whose places kf_page_place returns; they stay where they are. Every function works on
+ * these arrays, so that a call from JavaScript passes no memory.
+ */
+#include "interface.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "follower.h"
+#include "points.h"
+
+#define LARGEST_RATE 1e100   /* of drivers; squares of much larger numbers are infinite */
+#define LARGEST_NUMBER 1e30  /* of parameters: as mechanism files have them */
+
+/* The pose shown, and another solver with the same parameters: for sweeps, and for parameters that may have no solution. */
+static kf_follower followers[2];
+static int shown;
+static const char *message = "";
+static char refusal[KF_MESSAGE];
+
+static double settings[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)]; /* asked for: parameters, then constants of the laws */
+static double bound[KF_ROOM(KF_PARAMETERS + KF_CONSTANTS)];
+static double drive[3][KF_DRIVERS];
+static double motion[3][KF_ROOM(KF_OUTPUTS)], swept[3][KF_ROOM(KF_OUTPUTS)];
+static double errors[3], fixed[KF_ROOM(KF_FIXED)], points[KF_ROOM(2 * KF_POINTS)];
+
+/* The arrays, in the order that web/engine.js gives their numbers. */
+double *kf_page_place(int which)
+{
+    double *const places[] = {settings, bound, drive[0], motion[0], swept[0], errors, fixed, points};
+    return places[which];
+}
+
+int kf_page_length(int which)
+{
+    static const int lengths[] = {KF_PARAMETERS + KF_CONSTANTS, KF_PARAMETERS + KF_CONSTANTS, 3 * KF_DRIVERS,
+                                  3 * KF_OUTPUTS, 3 * KF_OUTPUTS, 3, KF_FIXED, 2 * KF_POINTS};
+    return lengths[which];
+}
+
+const char *kf_page_message(void)
+{
+    return message;
+}
+
+static kf_pose *pose_of(kf_follower *follower)
+{
+    return follower->started ? &follower->poses[follower->here] : &follower->solver.anchor;
+}
+
+/* Compute driver values at a time; NaN where a rate is too large. */
+static void drive_at(const kf_model *model, const double *constants, double time, double values[3][KF_DRIVERS])
+{
+    int k;
+    kf_drive(model, time, constants, values[0], values[1], values[2]);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        if (!(fabs(values[1][k]) <= LARGEST_RATE && fabs(values[2][k]) <= LARGEST_RATE)) {
+            values[0][k] = NAN;
+        }
+    }
+}
+
+/* Return whether the settings are numbers that the mechanism accepts; else write why they are not. */
+static bool is_accepted(void)
+{
+    int k;
+    refusal[0] = '\0';
+    for (k = 0; k < KF_PARAMETERS + KF_CONSTANTS; ++k) {
+        const char *const name = k < KF_PARAMETERS ? kf_parameter_names[k] : kf_constant_names[k - KF_PARAMETERS];
+        const bool is_positive = k >= KF_PARAMETERS && kf_constant_is_positive[k - KF_PARAMETERS];
+        if (!(fabs(settings[k]) <= LARGEST_NUMBER)) {
+            snprintf(refusal, sizeof refusal, "%s = %.6g must be a number of at most %g", name, settings[k],
+                     LARGEST_NUMBER);
+            return false;
+        }
+        if (is_positive && !(settings[k] > 0.0)) {
+            snprintf(refusal, sizeof refusal, "%s = %.15g must be positive", name, settings[k]);
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Return whether the laws start at a pose that can be reached, if they start elsewhere than in the file. */
+static bool starts(kf_follower *follower)
+{
+    const kf_model *const model = &follower->solver.model;
+    double there[3][KF_DRIVERS], written[3][KF_DRIVERS];
+    bool is_elsewhere = false;
+    int k;
+    for (k = 0; k < KF_PARAMETERS; ++k) {
+        is_elsewhere = is_elsewhere || settings[k] != kf_parameters_written[k];
+    }
+    kf_drive(model, KF_START, settings + KF_PARAMETERS, there[0], there[1], there[2]);
+    kf_drive(model, KF_START, kf_constants_written, written[0], written[1], written[2]);
+    for (k = 0; k < KF_DRIVERS; ++k) {
+        is_elsewhere = is_elsewhere || there[0][k] != written[0][k];
+    }
+    return !is_elsewhere || KF_GOOD(kf_followed(follower, there[0])->status);
+}
+
+/* Take over the follower whose parameters are set, and set those of the other one to the same. */
+static void show(int number)
+{
+    shown = number;
+    memcpy(&followers[1 - number].solver, &followers[number].solver, KF_SOLVER_STATE);
+    kf_restart(&followers[0]);
+    kf_restart(&followers[1]);
+}
+
+static void read_model(void)
+{
+    const kf_model *const model = &followers[shown].solver.model;
+    kf_fixed(model, fixed);
+    kf_points(model, points);
+}
+
+void kf_page_start(void)
+{
+    kf_solver_start(&followers[0].solver);
+    memcpy(settings, kf_parameters_written, KF_PARAMETERS * sizeof(double));
+    memcpy(settings + KF_PARAMETERS, kf_constants_written, KF_CONSTANTS * sizeof(double));
+    memcpy(bound, settings, sizeof bound);
+    show(0);
+    read_model();
+}
+
+/* Set the parameters to the settings; if they have no solution, those bound before stay, and so does the pose. */
+bool kf_page_bind(void)
+{
+    kf_follower *const next = &followers[1 - shown];
+    if (!is_accepted()) {
+        message = refusal;
+        memcpy(settings, bound, sizeof bound);
+        return false;
+    }
+    kf_restart(next);
+    if (kf_solver_bind(&next->solver, settings) && starts(next)) {
+        show(1 - shown);
+        memcpy(bound, settings, sizeof bound);
+        read_model();
+        message = "";
+        return true;
+    }
+    memcpy(refusal, next->solver.message, sizeof refusal);
+    message = refusal;
+    memcpy(&next->solver, &followers[shown].solver, KF_SOLVER_STATE);
+    kf_restart(next);
+    memcpy(settings, bound, sizeof bound);
+    return false;
+}
+
+/* Compute the driver values at a time, by the laws. */
+void kf_page_drive(double time)
+{
+    drive_at(&followers[shown].solver.model, bound + KF_PARAMETERS, time, drive);
+}
+
+/* Follow the branch again from where it is known. */
+void kf_page_restart(void)
+{
+    kf_restart(&followers[shown]);
+    kf_page_drive(KF_START);
+}
+
+/* Go on to the driver values; a pose that is not good leaves the one before and its numbers. */
+int kf_page_at(void)
+{
+    kf_follower *const follower = &followers[shown];
+    kf_pose *const pose = kf_followed(follower, drive[0]);
+    if (KF_GOOD(pose->status)) {
+        kf_motion(&follower->solver, pose, drive[1], drive[2], motion[0], motion[1], motion[2]);
+        message = "";
+    } else {
+        message = follower->solver.message;
+    }
+    return (int)pose->status;
+}
+
+double kf_page_margin(void)
+{
+    return kf_margin(&followers[shown].solver, pose_of(&followers[shown]));
+}
+
+void kf_page_errors(void)
+{
+    kf_errors(&followers[shown].solver, pose_of(&followers[shown]), drive[1], drive[2], errors);
+}
+
+/* Begin a sweep: it starts where the branch is known, and leaves the pose shown. */
+void kf_page_sweep(void)
+{
+    kf_restart(&followers[1 - shown]);
+}
+
+/* Compute one sample of a sweep at the driver values; orders: 1 positions alone, 2 with rates, 3 with accelerations. */
+int kf_page_sample(int orders)
+{
+    kf_follower *const follower = &followers[1 - shown];
+    kf_pose *const pose = kf_followed(follower, drive[0]);
+    if (KF_GOOD(pose->status)) {
+        kf_motion(&follower->solver, pose, drive[1], drive[2], swept[0], orders > 1 ? swept[1] : NULL,
+                  orders > 2 ? swept[2] : NULL);
+    }
+    return (int)pose->status;
+}

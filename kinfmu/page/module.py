@@ -1,0 +1,128 @@
+"""A mechanism as a WebAssembly module: the C of its plan, the solver and `interface.c`, compiled without any import.
+
+The module does the same arithmetic as the native engine and the native FMU, operation by operation: numbers are equal to
+the bit. It holds one instance of the mechanism; web/engine.js calls it.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from kinfmu.codegen.c import compiler, emit
+from kinfmu.codegen.c.text import FUNCTIONS, array, booleans, function, string
+from kinfmu.codegen.writer import Names, Writer, identifier
+from kinfmu.mechanism import Mechanism
+from kinfmu.plan import SolvePlan, compile_plan
+from kinfmu.plan.trace import Tracer, parameter_symbol
+
+FOLLOWER = ("follower.h", "follower.c")
+EXPORTS = (
+    "kf_page_start",
+    "kf_page_place",
+    "kf_page_length",
+    "kf_page_message",
+    "kf_page_bind",
+    "kf_page_drive",
+    "kf_page_restart",
+    "kf_page_at",
+    "kf_page_margin",
+    "kf_page_errors",
+    "kf_page_sweep",
+    "kf_page_sample",
+)
+FLAGS = ("-Oz",)
+_INTERFACE = Path(__file__).with_name("interface.c")
+
+
+class PageModule(NamedTuple):
+    """A compiled mechanism and what its arrays hold.
+
+    Attributes:
+        data: The WebAssembly module.
+        plan: What it solves: all bodies' coordinates that move, then the points of interest.
+        points: The points 'body.point' whose places in their bodies it returns.
+
+    """
+
+    data: bytes
+    plan: SolvePlan
+    points: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The module for a page: compressed by gzip, in base64."""
+        return base64.b64encode(gzip.compress(self.data, 9, mtime=0)).decode()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of what the module can bind, in its order: parameters, then constants of the laws."""
+        return tuple(one.name for one in (*self.plan.parameters, *self.plan.law_constants))
+
+
+def page_module(mechanism: Mechanism) -> PageModule:
+    """Return the module of a mechanism, compiled now or taken from the cache of compiled libraries.
+
+    Raises:
+        KinfmuError: The mechanism cannot be solved, as `compile_plan` reports it.
+        CompilerError: ziglang is not installed, or it fails.
+
+    """
+    plan = compile_plan(replace(mechanism, coordinates="moving"))
+    files, points = page_sources(plan)
+    return PageModule(compiler.wasm_module(files, EXPORTS, FLAGS), plan, points)
+
+
+def page_sources(plan: SolvePlan) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the C files of a module by name, and the points that it returns. All is one unit, page.c."""
+    points = tuple(plan.mechanism.body_points)
+    files = emit(plan) | compiler.sources([*compiler.SOLVER, *FOLLOWER])
+    files |= {"interface.h": _header(plan, points), "points.h": _points(plan, points)}
+    files["interface.c"] = _INTERFACE.read_text("utf-8")
+    lines = ["/* The whole module as one unit. Files included here are not compiled separately. */"]
+    lines += [f'#include "{name}"' for name in sorted(files) if name.endswith(".c")]
+    return files | {"page.c": "\n".join(lines) + "\n"}, points
+
+
+def _header(plan: SolvePlan, points: Sequence[str]) -> str:
+    constants = plan.law_constants
+    lines = [
+        f"/* What the page of {plan.mechanism.name} needs to know: generated from its mechanism, not to be edited. */",
+        "#ifndef KF_INTERFACE_H",
+        "#define KF_INTERFACE_H",
+        "",
+        "#include <stdbool.h>",
+        "",
+        f"#define KF_POINTS {len(points)}",
+        f"#define KF_START {plan.mechanism.run.start!r} /* [s] of the laws */",
+        "",
+        *array("static char *const kf_constant_names", [string(one.name) for one in constants]),
+        *array("static bool kf_constant_is_positive", booleans(one.is_positive for one in constants)),
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _points(plan: SolvePlan, points: Sequence[str]) -> str:
+    """Return points.h: a function that computes x, y of all points in their bodies from the parameters."""
+    tracer = Tracer(plan.mechanism, [parameter.name for parameter in plan.parameters])
+    nodes = [tracer.graph.lift(value) for name in points for value in tracer.members.body_points[name]]
+    writer = Writer(Names(functions=FUNCTIONS), ())
+    body = [f"{line};" for line in writer.statements(nodes)]
+    body += [f"points[{k}] = {writer.expression(node)};" for k, node in enumerate(nodes)]
+    used = {node.name for node in writer.used if node.op == "symbol"}
+    places = {parameter_symbol(one.name): f"model->parameters[{k}]" for k, one in enumerate(plan.parameters)}
+    loads = [f"{identifier(name)} = {place};" for name, place in places.items() if name in used]
+    lines = [
+        f"/* Points of {plan.mechanism.name}: generated from its mechanism, not to be edited. */",
+        '#include "kinfmu.h"',
+        '#include "sincos.h"',
+        "",
+        *function("static void kf_points(const kf_model *model, double *points)", [*loads, *body], ("model", "points")),
+    ]
+    return "\n".join(lines) + "\n"

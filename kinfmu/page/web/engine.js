@@ -1,0 +1,152 @@
+// The engine: the compiled mechanism (WebAssembly) behind an interface of numbers.
+//
+// All arrays are views of the module's memory: they hold until the next call that writes them, and are not to be kept.
+
+const ARRAYS = ["settings", "bound", "drive", "motion", "swept", "errors", "fixed", "points"]; // as in interface.c
+const BRIDGED = 2; // the last status of a pose with numbers: see kinfmu.Status
+
+export class Engine {
+  // Return the engine of a module: text is gzip in base64, as PageModule.text gives it.
+  static async load(text) {
+    const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const { instance } = await WebAssembly.instantiate(await new Response(stream).arrayBuffer(), {});
+    return new Engine(instance.exports);
+  }
+
+  #code;
+  #arrays;
+  #drive;
+  #swept;
+
+  constructor(code) {
+    this.#code = code;
+    this.#arrays = Object.fromEntries(ARRAYS.map((name, which) => [name, this.#view(which)]));
+    this.#drive = thirds(this.#arrays.drive);
+    this.#swept = this.#arrays.swept;
+    [this.q, this.qd, this.qdd] = thirds(this.#arrays.motion); // (outputs) of the last good pose
+    this.status = 0; // of the last call of at
+    code._initialize?.();
+    code.kf_page_start();
+    this.restart();
+  }
+
+  #view(which) {
+    const { memory, kf_page_place, kf_page_length } = this.#code;
+    return new Float64Array(memory.buffer, kf_page_place(which), kf_page_length(which));
+  }
+
+  // Values of the parameters and then of the law constants.
+  get parameters() {
+    return this.#arrays.bound;
+  }
+
+  // Set parameters and law constants, followed from the written lengths: { ok, message }. If not ok, those bound before
+  // stay, and so does the pose; if ok, the pose is that of the next call of at, followed from the start.
+  bind(values) {
+    this.#expect("bind", "values", values, this.#arrays.settings.length);
+    this.#arrays.settings.set(values);
+    const ok = this.#code.kf_page_bind() !== 0;
+    return { ok, message: this.message };
+  }
+
+  // Go where the laws start.
+  restart() {
+    this.#code.kf_page_restart();
+    this.status = this.#code.kf_page_at();
+    return this.status;
+  }
+
+  // Driver values, speeds and accelerations at a time [s], by the laws.
+  driven(t) {
+    this.#code.kf_page_drive(t);
+    const [u, ud, udd] = this.#drive.map((part) => part.slice());
+    return { u, ud, udd };
+  }
+
+  // Go on to driver values in a straight line; return the status. A pose that is not good leaves the last good one.
+  at(u, ud, udd) {
+    this.#set(u, ud, udd);
+    this.status = this.#code.kf_page_at();
+    return this.status;
+  }
+
+  // One line: why the last call of at or bind failed; empty after one that did not.
+  get message() {
+    const bytes = new Uint8Array(this.#code.memory.buffer, this.#code.kf_page_message());
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+  }
+
+  // Distance from singular poses, 0 to 1, of the pose.
+  get margin() {
+    return this.#code.kf_page_margin();
+  }
+
+  // Estimated errors of q, qd and qdd of the pose, in radians and sizes.
+  errors() {
+    this.#code.kf_page_errors();
+    return this.#arrays.errors;
+  }
+
+  // Coordinates that never move, for the parameters bound.
+  fixed() {
+    return this.#arrays.fixed;
+  }
+
+  // x, y of the points in the frames of their bodies, for the parameters bound.
+  points() {
+    return this.#arrays.points;
+  }
+
+  // Positions at many driver values us (samples x drivers), followed from the start; the pose stays.
+  //
+  // columns: numbers of outputs k; with n outputs, n + k is the rate of one and 2 n + k its acceleration, for which uds
+  // and udds give speeds and accelerations of the drivers (default: 1 and 0). Returns values (samples x columns), NaN
+  // where a pose is not good, and the status of each sample.
+  sweep(us, columns, uds = null, udds = null) {
+    const drivers = this.#drive[0].length;
+    const samples = us.length / drivers;
+    const outputs = this.q.length;
+    const orders = 1 + Math.floor(Math.max(0, ...columns) / outputs);
+    const values = new Float64Array(samples * columns.length);
+    const status = new Uint8Array(samples);
+    const [u, ud, udd] = this.#drive;
+    ud.fill(1);
+    udd.fill(0);
+    this.#code.kf_page_sweep();
+    for (let sample = 0, place = 0; sample < samples; sample += 1) {
+      for (let driver = 0; driver < drivers; driver += 1) {
+        const number = sample * drivers + driver;
+        u[driver] = us[number];
+        if (uds) ud[driver] = uds[number];
+        if (udds) udd[driver] = udds[number];
+      }
+      status[sample] = this.#code.kf_page_sample(orders);
+      const good = status[sample] <= BRIDGED;
+      for (const column of columns) {
+        values[place] = good ? this.#swept[column] : NaN;
+        place += 1;
+      }
+    }
+    return { values, status };
+  }
+
+  #set(...given) {
+    given.forEach((values, order) => {
+      this.#expect("at", ["u", "ud", "udd"][order], values, this.#drive[order].length);
+      this.#drive[order].set(values);
+    });
+  }
+
+  #expect(call, name, values, length) {
+    if (values.length !== length) {
+      throw new RangeError(`${call}: ${name} has ${values.length} numbers; ${length} are needed`);
+    }
+  }
+}
+
+// Three views, each of a third of an array.
+function thirds(array) {
+  const n = array.length / 3;
+  return [0, 1, 2].map((k) => array.subarray(k * n, (k + 1) * n));
+}

@@ -1,0 +1,149 @@
+"""The WebAssembly module of a page gives the numbers of the native engine, to the bit. See also tests/stress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kinfmu
+from kinfmu import Status
+from kinfmu.errors import KinfmuError
+from kinfmu.page.module import page_module
+from tests.page.engines import (
+    StepByStep,
+    answers,
+    drag_call,
+    driven_of,
+    driven_through,
+    needs_node,
+    rows_of,
+    sweep_call,
+    table,
+)
+
+MEMBERS = {  # with what their poses are
+    "fourbar": {Status.OK, Status.BRIDGED},  # a parallelogram: change points
+    "jansen_leg": {Status.OK},
+    "excavator": {Status.OK},  # three cylinders
+    "triple_rocker": {Status.OK, Status.OUTSIDE},
+}
+LEG = kinfmu.load("jansen_leg")
+OTHER_LEG = {"m": 14.0, "k": 62.5, "crank.speed": 3.0}
+NO_LEGS: tuple[dict[str, float], ...] = ({"m": 45.0}, {"e": 3.0}, {"crank.speed": float("nan")})
+
+pytestmark = needs_node
+
+
+def settings(changed: dict[str, float]) -> list[Any]:
+    """Return the values to bind for a leg with other parameters."""
+    module = page_module(LEG)
+    written = [one.value for one in (*module.plan.parameters, *module.plan.law_constants)]
+    values = [changed.get(name, value) for name, value in zip(module.parameters, written, strict=True)]
+    return [str(value) if value != value else value for value in values]
+
+
+@pytest.fixture(scope="module")
+def native() -> Callable[[str], StepByStep]:
+    return cache(lambda name: StepByStep(kinfmu.load(name)))
+
+
+@pytest.fixture(scope="module")
+def swept(native: Callable[[str], StepByStep], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return run of the native engine and answers of the page's, by member; the last ones are of the leg."""
+    runs = {name: driven_through(kinfmu.load(name), native(name)) for name in MEMBERS}
+    jobs: list[Any] = []
+    for name, run in runs.items():
+        module, driven = page_module(kinfmu.load(name)), driven_of(run)
+        jobs.append((module, [sweep_call(module, driven), ["restart"], drag_call(driven), ["driven", 0.25]]))
+    leg = page_module(LEG)
+    binds = [["bind", settings(changed)] for changed in NO_LEGS]
+    at_rest = [1.0], [0.0]
+    here: list[Any] = [
+        ["at", [0.5], *at_rest],
+        ["q"],
+        ["margin"],
+        ["errors"],
+        ["at", ["NaN"], *at_rest],
+        ["message"],
+        ["q"],
+    ]
+    bound = [
+        ["bind", settings(OTHER_LEG)],
+        ["points"],
+        sweep_call(leg, driven_of(runs["jansen_leg"])),
+        ["driven", 0.25],
+    ]
+    jobs += [(leg, [*here, *binds, ["q"], ["parameters"]]), (leg, [*binds, *bound, *here[:4]])]
+    found = answers(tmp_path_factory.mktemp("page"), jobs)
+    return {"runs": runs, **dict(zip([*MEMBERS, "refused", "bound"], found, strict=True))}
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_sweeps_and_steps_equal_the_native_engine_to_the_bit(swept: dict[str, Any], name: str) -> None:
+    run, (sweep, _, drag, _) = swept["runs"][name], swept[name]
+    expected = rows_of(run)
+    assert set(run.status.tolist()) == MEMBERS[name]
+    assert sweep["status"] == drag["statuses"] == run.status.tolist()
+    assert np.array_equal(table(sweep["values"], expected.shape[1]), expected, equal_nan=True)
+    good = run.status <= Status.BRIDGED  # dragged beyond a limit, the last good pose stays
+    rows = np.array(drag["rows"])
+    assert np.array_equal(rows[good], expected[good])
+    for k in np.flatnonzero(~good):
+        assert np.array_equal(rows[k], rows[k - 1])
+
+
+def test_laws_drive_the_page_as_the_mechanism(swept: dict[str, Any]) -> None:
+    run = kinfmu.solve(kinfmu.load("excavator"), [0.25])
+    found = swept["excavator"][3]
+    assert [[found[key][k] for key in ("u", "ud", "udd")] for k in range(3)] == run.inputs.reshape(3, 3).tolist()
+
+
+def test_margin_and_errors_are_those_of_a_run(swept: dict[str, Any], native: Callable[[str], StepByStep]) -> None:
+    status, q, margin, errors, *_ = swept["refused"]
+    run = native("jansen_leg").solve(crank_angle=np.array([0.5]))
+    assert (status, margin) == (0, run.margin[0])
+    assert q == run.values[0].tolist()
+    assert errors == run.error[0].tolist()
+
+
+def test_an_unreachable_pose_leaves_the_last_one(swept: dict[str, Any]) -> None:
+    _, q, _, _, status, message, after, *_ = swept["refused"]
+    assert status == Status.OUTSIDE
+    assert message == "crank = nan rad (nan deg) is not a finite number"
+    assert after == q
+
+
+def test_bound_parameters_equal_the_native_engine_to_the_bit(
+    swept: dict[str, Any], native: Callable[[str], StepByStep]
+) -> None:
+    bind, points, sweep, driven, status, q, *_ = swept["bound"][len(NO_LEGS) :]
+    start = swept["runs"]["jansen_leg"]
+    u, ud, udd = driven_of(start)
+    given = {"crank_angle": u[:, 0], "crank_speed": ud[:, 0], "crank_acceleration": udd[:, 0]}
+    expected = native("jansen_leg").solve(parameters=OTHER_LEG, **given)
+    assert bind == {"ok": True, "message": ""}
+    assert np.array_equal(table(sweep["values"], 3 * expected.values.shape[1]), rows_of(expected))
+    assert driven == {"u": [0.75], "ud": [3.0], "udd": [0.0]}
+    assert status == Status.OK
+    changed = LEG.with_parameters(OTHER_LEG)
+    assert np.array_equal(table(points, 2), list(changed.body_points.values()))
+
+
+@pytest.mark.parametrize(("number", "changed"), [*enumerate(NO_LEGS)])
+def test_parameters_without_a_solution_leave_those_before(
+    swept: dict[str, Any], native: Callable[[str], StepByStep], number: int, changed: dict[str, float]
+) -> None:
+    _, q, *_ = swept["refused"]
+    *_, first, second, third, after, parameters = swept["refused"]
+    bind = (first, second, third)[number]
+    if all(value == value for value in changed.values()):
+        with pytest.raises(KinfmuError) as caught:
+            native("jansen_leg").solve(np.zeros(1), parameters=changed)
+        assert bind == {"ok": False, "message": str(caught.value)}
+    else:
+        assert bind == {"ok": False, "message": "crank.speed = nan must be a number of at most 1e+30"}
+    assert (after, parameters) == (q, settings({}))
