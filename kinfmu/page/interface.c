@@ -1,4 +1,4 @@
-/* What a page calls: one mechanism with its parameters, the pose that is shown, and sweeps beside it.
+/* What a page calls: one mechanism with its parameters, the pose that is shown, and sweeps that leave it.
  *
  * Numbers are exchanged in arrays, whose places kf_page_place returns; they stay where they are. Every function works on
  * these arrays, so that a call from JavaScript passes no memory.

@@ -1,7 +1,7 @@
 """A mechanism as a WebAssembly module: the C of its plan, the solver and `interface.c`, compiled without any import.
 
-The module does the same arithmetic as the native engine and the native FMU, operation by operation: numbers are equal to
-the bit. It holds one instance of the mechanism; web/engine.js calls it.
+The module does the same arithmetic as the native engine and the native FMU, operation by operation: numbers are equal
+to the bit. It holds one instance of the mechanism; web/engine.js calls it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class PageModule(NamedTuple):
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of what the module can bind, in its order: parameters, then constants of the laws."""
-        return tuple(one.name for one in (*self.plan.parameters, *self.plan.law_constants))
+        constants = (constant.name for constant in self.plan.law_constants)
+        return (*(parameter.name for parameter in self.plan.parameters), *constants)
 
 
 def page_module(mechanism: Mechanism) -> PageModule:

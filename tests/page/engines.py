@@ -20,7 +20,8 @@ from kinfmu.page.module import PageModule
 from kinfmu.simd import lanes
 
 SCRIPT = Path(__file__).with_name("run_engines.mjs")
-NEEDED = {"node": shutil.which("node"), "ziglang": find_spec("ziglang")}
+NODE = shutil.which("node") or ""
+NEEDED = {"node": NODE, "ziglang": find_spec("ziglang")}
 MISSING = [name for name, found in NEEDED.items() if not found]
 needs_node = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 POSES = 361
@@ -37,7 +38,7 @@ def answers(folder: Path, jobs: Sequence[tuple[PageModule, Sequence[Call]]]) -> 
         path = folder / f"module_{number}.txt"
         path.write_text(module.text)
         listed.append({"module": str(path), "calls": calls})
-    done = subprocess.run(["node", SCRIPT], input=json.dumps(listed), capture_output=True, text=True, check=False)
+    done = subprocess.run([NODE, SCRIPT], input=json.dumps(listed), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     found: list[list[Any]] = json.loads(done.stdout)
     return found

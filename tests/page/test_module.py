@@ -120,7 +120,7 @@ def test_an_unreachable_pose_leaves_the_last_one(swept: dict[str, Any]) -> None:
 def test_bound_parameters_equal_the_native_engine_to_the_bit(
     swept: dict[str, Any], native: Callable[[str], StepByStep]
 ) -> None:
-    bind, points, sweep, driven, status, q, *_ = swept["bound"][len(NO_LEGS) :]
+    bind, points, sweep, driven, status, *_ = swept["bound"][len(NO_LEGS) :]
     start = swept["runs"]["jansen_leg"]
     u, ud, udd = driven_of(start)
     given = {"crank_angle": u[:, 0], "crank_speed": ud[:, 0], "crank_acceleration": udd[:, 0]}
