@@ -82,7 +82,7 @@ class CoordinateOf(PoseQuantity):
 
 @dataclass(frozen=True)
 class DistanceBetween(PoseQuantity):
-    """Distance L = |d| of two points.
+    """Distance L = norm(d) of two points.
 
     The row d.d - L^2 needs no root and is smooth for every d.
     """

@@ -117,7 +117,7 @@ class Body:
 
     @property
     def has_mass(self) -> bool:
-        """True if a mass is given: a number other than 0, or an expression."""
+        """True if a mass is given, as a number other than 0 or as an expression."""
         return not is_number(self.mass) or _is_computed(self.mass) or self.mass != 0.0
 
     def mass_properties(self, length_unit: str) -> MassProperties:

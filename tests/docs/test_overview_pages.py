@@ -47,11 +47,19 @@ def test_the_commands_page_shows_every_command() -> None:
 
 
 def test_every_link_between_the_pages_leads_to_a_file() -> None:
+    made = ("reference/",)  # while the site is built; scripts/docs checks links to them
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         for target in re.findall(r"\]\(([\w./-]+)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+            assert target.startswith(made) or (page.parent / target).exists(), f"{page.name}: {target}"
 
 
 def test_the_readme_leads_to_every_page() -> None:
-    pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} - {"docs/accuracy-settings.md"}
+    for_the_site = {
+        "docs/index.md",
+        "docs/howto.md",
+        "docs/method.md",
+        "docs/reference.md",
+        "docs/accuracy-settings.md",
+    }
+    pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} - for_the_site
     assert pages <= set(re.findall(r"\((docs/[\w-]+\.md)\)", README))

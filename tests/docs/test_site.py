@@ -1,0 +1,105 @@
+"""The documentation site: each page is in a table of contents; its generated pages hold every public name and option.
+
+`scripts/docs`, which continuous integration runs, builds it and takes every warning as an error.
+"""
+
+from __future__ import annotations
+
+import re
+import runpy
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import kinfmu
+from kinfmu import gallery
+from kinfmu.cli import main
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.fixture
+def site(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The modules that generate pages."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    yield __import__("importlib").import_module
+    for name in [name for name in sys.modules if name.partition(".")[0] == "_site"]:
+        del sys.modules[name]
+
+
+def test_every_page_is_in_one_table_of_contents() -> None:
+    listed = []
+    for page in DOCS.glob("*.md"):
+        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            listed += [line for line in block.splitlines() if line and not line.startswith(":")]
+    generated = [name for name in listed if name.startswith("reference/")]
+    assert sorted(name for name in listed if name not in generated) == sorted(
+        page.stem for page in DOCS.glob("*.md") if page.stem != "index"
+    )
+
+
+def test_the_api_pages_hold_every_public_name(site: Any, tmp_path: Path) -> None:
+    pages = site("_site.pages").Pages(tmp_path)
+    site("_site.api").write(pages)
+    text = "".join(path.read_text(encoding="utf-8") for path in pages.written)
+    documented = set(re.findall(r"^\.\. auto\w+:: kinfmu\.([\w.]+)$", text, re.MULTILINE))
+    modules = {"draw", "log", "readings", "synthesis"}
+    assert set(kinfmu.__all__) - modules - {"VERSION"} <= documented
+    assert {f"log.{name}" for name in kinfmu.log.__all__} <= documented
+    assert (tmp_path / "reference" / "api.md").is_file()
+
+
+def test_the_page_of_the_command_line_holds_every_option(site: Any, tmp_path: Path) -> None:
+    site("_site.command_line").write(site("_site.pages").Pages(tmp_path))
+    sections = (tmp_path / "reference" / "command-line.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    assert [section.split("`")[1] for section in sections] == main.list_commands(None)  # type: ignore[arg-type]
+    for section in sections:
+        options = {name for option in main.commands[section.split("`")[1]].params for name in option.opts}
+        assert {name for name in options if name.startswith("-")} <= set(re.findall(r"--?[\w-]+", section))
+
+
+def test_a_page_of_the_gallery_has_figure_report_file_and_reference(site: Any) -> None:
+    page = site("_site.gallery")._page("fourbar")
+    mechanism = kinfmu.load("fourbar")
+    assert page.startswith(f"# {mechanism.title}\n")
+    assert str(kinfmu.check(mechanism)) in page
+    for name in ("figure.svg", "mechanism.toml", "reference.csv"):
+        assert f"../../fmus/fourbar/{name}>`" in page
+    assert "| `time` | `crank.phi` |" in page
+    assert "| 10 | 0.174532925199433 | 1.98480775301221 | 0.17364817766693 |" in page
+
+
+def test_links_to_folders_of_the_gallery_lead_to_its_pages(site: Any) -> None:
+    source = ["[`engine`](../fmus/engine/README.md) and [page](fmu.md)"]
+    site("_site.gallery").linked(None, "gallery", source)
+    assert source[0].startswith("[`engine`](gallery/engine.md) and [page](fmu.md)")
+    assert re.findall(r"^gallery/(\w+)$", source[0], re.MULTILINE) == gallery.names()
+
+
+@pytest.mark.parametrize(
+    ("html", "said"),
+    [
+        ('<a href="other.html">x</a>', "other.html does not exist"),
+        ('<a href="#there">x</a>', "#there: no such place in the page"),
+        ('<a href="index.html#here">x</a><p id="here">', ""),
+        ('<a href="https://example.org/">x</a>', ""),
+        ('<script src="https://example.org/a.js"></script>', "loads https://example.org/a.js from the net"),
+        ('<img src="a%20b.png">', "a%20b.png does not exist"),
+    ],
+)
+def test_the_check_of_links_finds_what_is_wrong(
+    html: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "index.html").write_text(html, encoding="utf-8")
+    check = runpy.run_path(str(DOCS / "_site" / "links.py"))["main"]
+    assert check(tmp_path) == (1 if said else 0)
+    assert (f"index.html: {said}\n" in capsys.readouterr().err) == bool(said)
+
+
+def test_the_check_of_links_finds_fonts_from_the_net(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("", encoding="utf-8")
+    (tmp_path / "a.css").write_text('@import "https://example.org/font.css";', encoding="utf-8")
+    check = runpy.run_path(str(DOCS / "_site" / "links.py"))["problems"]
+    assert check(tmp_path) == ["a.css: loads a file from the net"]
