@@ -44,12 +44,16 @@ def quickly_compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
     The run time of a library is compiled as one unit, in half of the time.
     """
     run_time = {path.name for folder in (compiler.RUNTIME, sources.RUNTIME) for path in folder.glob("*.c")}
+    run_time |= set(library.RARE)
 
-    def compile_files(cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
+    def compile_files(
+        cc: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path, rare: Sequence[str] = ()
+    ) -> None:
         if "-O0" in flags and "-shared" in flags:
             joined = [f'#include "{name}"\n' for name in compiler.units(files) if name in run_time]
             files = {**files, "run_time.c": "".join(joined)}
-        FILE_BY_FILE(cc, files, flags, output)
+            rare = ()
+        FILE_BY_FILE(cc, files, flags, output, rare)
 
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:

@@ -18,7 +18,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Rows = tuple[FloatArray, FloatArray, FloatArray]  # (m, n) values, rates and accelerations of a quantity
 
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
 _STEPS = 60  # of a root in its interval; Newton needs a few of them, halving at most 53
 _SAME = 1e-15  # of an interval; roots closer than this are equal
 _compiled: list[ctypes.CDLL] = []  # the library, once it is wanted
@@ -35,7 +34,7 @@ def use_compiled() -> None:
     from kinfmu.codegen.c import compiler
 
     text = (Path(__file__).parent / "quintic.c").read_text("utf-8")
-    library = compiler.load({"quintic.c": text}, FLAGS)
+    library = compiler.load({"quintic.c": text}, compiler.VECTORIZED)
     place, count, step = ctypes.c_void_p, ctypes.c_int64, ctypes.c_ssize_t
     table = (place, step)
     library.kf_maxima.argtypes = (count, count, place, place, ctypes.c_double, *table * 3, place, place)

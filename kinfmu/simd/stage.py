@@ -21,7 +21,6 @@ from kinfmu.errors import KinfmuError
 from kinfmu.plan.steps import LinearSolve
 
 FloatArray = NDArray[np.float64]
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # loops over samples need them
 HEADERS = ("stage.h", "stream.h", "vectors.h")
 FUNCTIONS = {"sin": "kf_sin_lane", "cos": "kf_cos_lane"}
 LINE = 8  # numbers in a line of the caches
@@ -172,7 +171,7 @@ def load_native_stage(stage: CompiledStage) -> Callable[[Sequence[FloatArray | f
     """
     texts = {name: (Path(__file__).parent / name).read_text("utf-8") for name in HEADERS}
     files = {"evaluate.c": stage_source(stage)} | texts | compiler.sources(("sincos.h",))
-    library = compiler.load(files, FLAGS)
+    library = compiler.load(files, compiler.VECTORIZED)
 
     def fill(given: Sequence[FloatArray | float], results: FloatArray) -> bool:
         single = np.array([number for number in given if not isinstance(number, np.ndarray)])

@@ -6,10 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__AVX512F__) || defined(__AVX__)
-#include <immintrin.h>
-#elif defined(__SSE2__)
-#include <emmintrin.h>
+#if defined(__SSE2__)
+#include <emmintrin.h> /* small: that of AVX takes longer to compile than the file that needs it */
 #endif
 
 #define KF_LINE 8 /* numbers in a line of the caches */
@@ -17,12 +15,7 @@
 /* Write a line of numbers to an aligned place. */
 static inline void kf_stream_line(double *to, const double *from)
 {
-#if defined(__AVX512F__)
-    _mm512_stream_pd(to, _mm512_loadu_pd(from));
-#elif defined(__AVX__)
-    _mm256_stream_pd(to, _mm256_loadu_pd(from));
-    _mm256_stream_pd(to + 4, _mm256_loadu_pd(from + 4));
-#elif defined(__SSE2__)
+#if defined(__SSE2__)
     int k;
     for (k = 0; k < KF_LINE; k += 2) {
         _mm_stream_pd(to + k, _mm_loadu_pd(from + k));
@@ -72,7 +65,7 @@ static inline void kf_stream_rest(const kf_column *column, void *to)
 /* Order the streamed writes before all later ones. */
 static inline void kf_stream_end(void)
 {
-#if defined(__AVX512F__) || defined(__AVX__) || defined(__SSE2__)
+#if defined(__SSE2__)
     _mm_sfence();
 #endif
 }

@@ -22,7 +22,12 @@ from kinfmu.sweep.engine import Driven, UnreachedError
 
 FloatArray = NDArray[np.float64]
 
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")  # lanes need them; results are equal
+FLAGS = compiler.VECTORIZED
+RARE = {  # what runs at few samples, joined
+    "singular_points.c": ("bridge.c", "build.c", "hermite.c", "mixed.c", "singularity_map.c", "span.c", "survey.c",
+                          "tracks.c"),
+    "diagnosis.c": ("designs.c", "estimate.c", "limit.c", "linear.c", "message.c", "worst_case_step.c"),
+}  # fmt: skip
 MESSAGE = 480  # characters, as KF_MESSAGE
 MOST_FAILURES = 1000  # intervals without numbers whose reasons are kept
 
@@ -124,7 +129,8 @@ class Library:
     def __init__(self, plan: SolvePlan) -> None:
         self.plan = plan
         files = emit(plan) | compiler.runtime() | sources(plan)
-        library = self._library = compiler.load(files, FLAGS)
+        files |= {name: compiler.joined(names) for name, names in RARE.items()}
+        library = self._library = compiler.load(files, FLAGS, rare=list(RARE))
         self._idle: list[_Memory] = []
         for name, (result, *arguments) in _FUNCTIONS.items():
             function = getattr(library, name)

@@ -86,6 +86,16 @@ def test_optimizing_compilers_find_nothing_to_warn_of(monkeypatch: pytest.Monkey
     assert kinfmu.solve(kinfmu.load("crank_rocker"), crank_angle=[1.0, 2.0], engine="native").good.all()
 
 
+def test_optimization_changes_no_bit(request: pytest.FixtureRequest) -> None:
+    plan = compile_plan(kinfmu.load("jansen_leg"))
+    angles = driven(np.linspace(0.0, 6.0, 200))  # too few for lanes, which fuse on purpose
+    found = [np.zeros((3, 200, len(plan.outputs))) for _ in range(2)]
+    library.Library(plan).sweep(angles, found[0])
+    request.getfixturevalue("optimized")
+    library.Library(plan).sweep(angles, found[1])
+    np.testing.assert_array_equal(*found)
+
+
 def test_most_samples_are_solved_in_lanes() -> None:
     plan = compile_plan(kinfmu.load("crank_rocker"))
     result = library.Library(plan).sweep(driven(np.linspace(0.0, 300.0, SAMPLES)), tables(plan.outputs))

@@ -29,7 +29,12 @@ MODEL = ("kinfmu.h", "sincos.h", "position.c", "linear.c", "curve.c")  # what a 
 SOLVER = (*MODEL, "solver.h", "internal.h", "pose.c", "hermite.c", "span.c", "trusted_step.c", "bridge.c", "build.c",
           "singularity_map.c", "survey.c", "tracks.c", "mixed.c", "limit.c", "advance.c", "message.c", "solver.c",
           "continuation.c", "worst_case_step.c", "estimate.c")  # fmt: skip
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
+_LEVEL = "-O2"
+FLAGS = ("-std=c99", _LEVEL, "-ffp-contract=off", "-fPIC", "-shared")  # no fused multiply-add: Python has none
+VECTORIZED = (  # for loops over samples; results are equal
+    "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math",
+    "-fno-tree-slp-vectorize",  # of statements outside of loops: GCC 12 fuses some of them in spite of FLAGS
+)  # fmt: skip
 WASM = "wasm32-wasi"
 MODULE = ("-std=c99", "-ffp-contract=off", "-s", "-mexec-model=reactor", "-Wl,-z,stack-size=1048576")
 
@@ -52,7 +57,14 @@ def units(files: Mapping[str, str]) -> list[str]:
     return sorted(name for name in files if name.endswith(".c") and name not in included)
 
 
-def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None) -> Path:
+def joined(names: Sequence[str]) -> str:
+    """Return a C file that includes others, which is compiled faster than these one by one."""
+    return "".join(f'#include "{name}"\n' for name in names)
+
+
+def shared_library(
+    files: Mapping[str, str], flags: Sequence[str] = (), target: str | None = None, rare: Sequence[str] = ()
+) -> Path:
     """Return a shared library of C files (and the headers that they include), by name; compile it if it is not cached.
 
     A terminal shows a line while the compiler runs.
@@ -61,6 +73,7 @@ def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: 
         files: Texts by file name.
         flags: Flags of the compiler, after FLAGS.
         target: A platform as zig names it, such as x86_64-windows-gnu, for which zig compiles; default: this platform.
+        rare: Names of C files that run rarely: the compiler optimizes them as in FLAGS, which is faster.
 
     Returns:
         The path of the library in the cache.
@@ -69,7 +82,7 @@ def shared_library(files: Mapping[str, str], flags: Sequence[str] = (), target: 
         CompilerError: There is no compiler, it fails, or the cache cannot be used.
 
     """
-    build = _Build(files, flags, target)
+    build = _Build(files, flags, target, rare)
     found = library_cache.find(build.key, build.suffix)
     if found is not None:
         return found
@@ -100,17 +113,17 @@ def wasm_module(files: Mapping[str, str], exports: Sequence[str], flags: Sequenc
 
     """
     exported = (f"-Wl,--export={name}" for name in exports)
-    return _Build(files, (*flags, *exported), WASM, MODULE).found_or_compiled()
+    return _Build(files, (*flags, *exported), WASM, common=MODULE).found_or_compiled()
 
 
-def load(files: Mapping[str, str], flags: Sequence[str] = ()) -> ctypes.CDLL:
-    """Load a shared library of C files.
+def load(files: Mapping[str, str], flags: Sequence[str] = (), rare: Sequence[str] = ()) -> ctypes.CDLL:
+    """Load a shared library of C files, as `shared_library` compiles it.
 
     Raises:
         CompilerError: As in `shared_library`, or the system refuses to load it.
 
     """
-    path = shared_library(files, flags)
+    path = shared_library(files, flags, rare=rare)
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
@@ -136,12 +149,18 @@ class _Build:
     """Files, compiler and flags of one compilation; key: identifies the result."""
 
     def __init__(
-        self, files: Mapping[str, str], flags: Sequence[str], target: str | None, common: Sequence[str] = FLAGS
+        self,
+        files: Mapping[str, str],
+        flags: Sequence[str],
+        target: str | None,
+        rare: Sequence[str] = (),
+        common: Sequence[str] | None = None,
     ) -> None:
         self._files = files
+        self._rare = rare
         self._compiler = command() if target is None else zig(target)
-        self._flags = (*common, *flags)
-        content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags]
+        self._flags = (*(FLAGS if common is None else common), *flags)
+        content = [platform.machine(), _processor(), *_version(tuple(self._compiler)), *self._flags, *rare]
         content += [part for name in sorted(files) for part in (name, files[name])]
         self.key = hashlib.sha256("\0".join(content).encode()).hexdigest()[:24]
         self.suffix = _suffix(target)
@@ -162,14 +181,16 @@ class _Build:
         try:
             with tempfile.TemporaryDirectory() as scratch:
                 made = Path(scratch) / f"{self.key}{self.suffix}"
-                compile_files(self._compiler, self._files, self._flags, made)
+                compile_files(self._compiler, self._files, self._flags, made, self._rare)
                 return made.read_bytes()
         except OSError as error:
             raise CompilerError(f"{self._compiler[0]} cannot compile the generated C: {error}") from None
 
 
-def compile_files(compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path) -> None:
-    """Run a compiler on C files.
+def compile_files(
+    compiler: Sequence[str], files: Mapping[str, str], flags: Sequence[str], output: Path, rare: Sequence[str] = ()
+) -> None:
+    """Run a compiler on C files; see `shared_library`.
 
     Raises:
         CompilerError: It fails; the message has its first error.
@@ -182,7 +203,8 @@ def compile_files(compiler: Sequence[str], files: Mapping[str, str], flags: Sequ
         libraries = [] if os.name == "nt" else ["-lm"]
         if tuple(compiler[: len(_ZIG)]) != _ZIG:  # zig compiles in parallel itself
             longest_first = sorted(names, key=lambda name: (-_length(files, name), name))
-            _run([[*compiler, *flags, "-c", name] for name in longest_first], scratch)
+            level = {name: [_LEVEL] for name in rare}
+            _run([[*compiler, *flags, *level.get(name, []), "-c", name] for name in longest_first], scratch)
             names = [f"{name.removesuffix('.c')}.o" for name in names]
         _run([[*compiler, *flags, *names, "-o", str(output.resolve()), *libraries]], scratch)
 
